@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+
+namespace panonav {
+
+/// Runs loops on a fixed number of threads. The caller owns it and passes it down; there is no global
+/// one. Work is cut into chunks whose borders depend on `count` and `chunk` alone, so a body that
+/// takes its random stream from the chunk number, and a reduction in the order of the chunk numbers,
+/// give the same bits on any number of threads.
+class Executor {
+ public:
+  /// `threads` 1 runs everything in the calling thread; 0 takes one thread per core. Throws ContractError
+  /// outside 0 .. 1024.
+  explicit Executor(int threads = 1);
+  ~Executor();
+  Executor(const Executor&) = delete;
+  Executor& operator=(const Executor&) = delete;
+
+  [[nodiscard]] int threads() const noexcept;
+
+  /// Calls body(begin, end, chunk_number) for each chunk of [0, count) and waits for all. The first
+  /// exception (by chunk number) is thrown on in the calling thread. Not re-entrant.
+  void for_chunks(std::size_t count, std::size_t chunk,
+                  const std::function<void(std::size_t, std::size_t, std::size_t)>& body);
+
+ private:
+  struct Pool;
+  std::unique_ptr<Pool> pool_;
+};
+
+}  // namespace panonav

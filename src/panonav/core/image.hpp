@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace panonav {
+
+struct ImageSize {
+  int width = 0;
+  int height = 0;
+  friend bool operator==(const ImageSize&, const ImageSize&) = default;
+};
+
+/// 8-bit pixels that belong to somebody else: `channels` interleaved (1 grey, 3 RGB), rows from the
+/// top, `stride` bytes from one row to the next. Pixel (u, v) covers [u, u+1) x [v, v+1) of the
+/// continuous image plane, so its centre lies at (u + 0.5, v + 0.5).
+struct ImageView {
+  const std::uint8_t* data = nullptr;
+  int width = 0;
+  int height = 0;
+  int channels = 1;
+  std::ptrdiff_t stride = 0;
+
+  [[nodiscard]] ImageSize size() const noexcept { return {width, height}; }
+  [[nodiscard]] std::uint8_t at(int u, int v, int channel = 0) const noexcept {
+    return data[v * stride + static_cast<std::ptrdiff_t>(u) * channels + channel];
+  }
+};
+
+/// An 8-bit image that owns its pixels. Invariant: width, height >= 1, channels 1 or 3.
+class Image {
+ public:
+  /// A black image. Throws ContractError.
+  Image(int width, int height, int channels = 1);
+  /// Throws ContractError unless pixels.size() == width * height * channels.
+  Image(int width, int height, int channels, std::vector<std::uint8_t> pixels);
+
+  [[nodiscard]] int width() const noexcept { return width_; }
+  [[nodiscard]] int height() const noexcept { return height_; }
+  [[nodiscard]] int channels() const noexcept { return channels_; }
+  [[nodiscard]] ImageSize size() const noexcept { return {width_, height_}; }
+  [[nodiscard]] std::span<const std::uint8_t> pixels() const& noexcept { return pixels_; }
+  [[nodiscard]] std::span<std::uint8_t> pixels() & noexcept { return pixels_; }
+  std::span<const std::uint8_t> pixels() const&& = delete;  // would dangle
+  [[nodiscard]] ImageView view() const& noexcept;
+  ImageView view() const&& = delete;  // would dangle
+
+  [[nodiscard]] std::uint8_t at(int u, int v, int channel = 0) const noexcept {
+    return pixels_[offset(u, v, channel)];
+  }
+  [[nodiscard]] std::uint8_t& at(int u, int v, int channel = 0) noexcept {
+    return pixels_[offset(u, v, channel)];
+  }
+  friend bool operator==(const Image&, const Image&) = default;
+
+ private:
+  [[nodiscard]] std::size_t offset(int u, int v, int channel) const noexcept {
+    return (static_cast<std::size_t>(v) * width_ + u) * channels_ + channel;
+  }
+  int width_, height_, channels_;
+  std::vector<std::uint8_t> pixels_;
+};
+
+/// One grey channel; colour is weighed as ITU-R BT.601 does (0.299 R + 0.587 G + 0.114 B).
+[[nodiscard]] Image to_grey(ImageView image);
+
+}  // namespace panonav

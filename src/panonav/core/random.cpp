@@ -1,0 +1,68 @@
+#include "panonav/core/random.hpp"
+
+#include <bit>
+#include <cmath>
+#include <numbers>
+
+namespace panonav {
+
+namespace {
+
+std::uint64_t split_mix(std::uint64_t& state) {
+  state += 0x9E3779B97F4A7C15ULL;
+  std::uint64_t z = state;
+  z = (z ^ (z >> 30U)) * 0xBF58476D1CE4E5B9ULL;
+  z = (z ^ (z >> 27U)) * 0x94D049BB133111EBULL;
+  return z ^ (z >> 31U);
+}
+
+}  // namespace
+
+Random::Random(std::uint64_t seed) : Random(seed, 0) {}
+
+Random::Random(std::uint64_t seed, std::uint64_t stream) {
+  // Mixing the stream first keeps (seed, stream + 1) far from (seed + 1, stream).
+  std::uint64_t mixer = stream;
+  std::uint64_t state = seed ^ split_mix(mixer);
+  for (auto& word : state_) word = split_mix(state);
+}
+
+std::uint64_t Random::next() {
+  const std::uint64_t result = std::rotl(state_[0] + state_[3], 23) + state_[0];
+  const std::uint64_t t = state_[1] << 17U;
+  state_[2] ^= state_[0];
+  state_[3] ^= state_[1];
+  state_[1] ^= state_[2];
+  state_[0] ^= state_[3];
+  state_[2] ^= t;
+  state_[3] = std::rotl(state_[3], 45);
+  return result;
+}
+
+double Random::uniform() {
+  return static_cast<double>(next() >> 11U) * 0x1.0p-53;
+}
+
+double Random::uniform(double low, double high) {
+  return low + (high - low) * uniform();
+}
+
+std::uint64_t Random::index(std::uint64_t count) {
+  // Values above the largest multiple of count are drawn again, so no index is favoured.
+  const std::uint64_t limit = UINT64_MAX - UINT64_MAX % count;
+  std::uint64_t value = next();
+  while (value >= limit) value = next();
+  return value % count;
+}
+
+double Random::normal() {
+  // Box-Muller without its second value: no state beyond the generator's own.
+  const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform()));
+  return radius * std::cos(2.0 * std::numbers::pi * uniform());
+}
+
+double Random::normal(double mean, double standard_deviation) {
+  return mean + standard_deviation * normal();
+}
+
+}  // namespace panonav

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <optional>
+#include <span>
+
+namespace panonav {
+
+/// The same angle in [-pi, pi). NaN and infinities give NaN.
+[[nodiscard]] double wrap_angle(double angle_rad);
+
+/// The smallest turn from `from_rad` to `to_rad`, in [-pi, pi).
+[[nodiscard]] double angle_difference(double to_rad, double from_rad);
+
+[[nodiscard]] constexpr double radians(double degrees) { return degrees * 0.017453292519943295; }
+[[nodiscard]] constexpr double degrees(double radians) { return radians * 57.29577951308232; }
+
+/// Mean direction of angles, and how well they agree.
+struct CircularMean {
+  double direction_rad = 0.0;     ///< in [-pi, pi)
+  double resultant_length = 0.0;  ///< 0 (no common direction) .. 1 (all the same)
+};
+
+/// Empty when there are no angles or when they cancel, so that no direction is meant.
+[[nodiscard]] std::optional<CircularMean> circular_mean(std::span<const double> angles_rad);
+
+/// sqrt(-2 ln r), r the resultant length of the mean; in radians.
+[[nodiscard]] double circular_standard_deviation(const CircularMean& mean);
+
+}  // namespace panonav

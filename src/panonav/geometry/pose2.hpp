@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cmath>
+
+#include "panonav/geometry/angles.hpp"
+
+namespace panonav {
+
+struct Point2 {
+  double x_m = 0.0;
+  double y_m = 0.0;
+  friend bool operator==(const Point2&, const Point2&) = default;
+};
+
+[[nodiscard]] inline double distance(Point2 a, Point2 b) {
+  return std::hypot(a.x_m - b.x_m, a.y_m - b.y_m);
+}
+
+/// Position and heading in the plane; x forward, y left, heading counter-clockwise (REP 103). As a
+/// transform, `a_from_b` is the pose of frame b in frame a.
+struct Pose2 {
+  double x_m = 0.0;
+  double y_m = 0.0;
+  double heading_rad = 0.0;  ///< in [-pi, pi) for every pose that panonav makes
+
+  [[nodiscard]] Point2 position() const { return {x_m, y_m}; }
+  friend bool operator==(const Pose2&, const Pose2&) = default;
+};
+
+/// a_from_c = a_from_b * b_from_c.
+[[nodiscard]] inline Pose2 operator*(const Pose2& a_from_b, const Pose2& b_from_c) {
+  const double c = std::cos(a_from_b.heading_rad);
+  const double s = std::sin(a_from_b.heading_rad);
+  return {a_from_b.x_m + c * b_from_c.x_m - s * b_from_c.y_m,
+          a_from_b.y_m + s * b_from_c.x_m + c * b_from_c.y_m,
+          wrap_angle(a_from_b.heading_rad + b_from_c.heading_rad)};
+}
+
+/// b_from_a.
+[[nodiscard]] inline Pose2 inverse(const Pose2& a_from_b) {
+  const double c = std::cos(a_from_b.heading_rad);
+  const double s = std::sin(a_from_b.heading_rad);
+  return {-c * a_from_b.x_m - s * a_from_b.y_m, s * a_from_b.x_m - c * a_from_b.y_m,
+          wrap_angle(-a_from_b.heading_rad)};
+}
+
+/// p_in_a = a_from_b * p_in_b.
+[[nodiscard]] inline Point2 operator*(const Pose2& a_from_b, Point2 p_in_b) {
+  const double c = std::cos(a_from_b.heading_rad);
+  const double s = std::sin(a_from_b.heading_rad);
+  return {a_from_b.x_m + c * p_in_b.x_m - s * p_in_b.y_m,
+          a_from_b.y_m + s * p_in_b.x_m + c * p_in_b.y_m};
+}
+
+/// A direction in space: x forward, y left, z up. Not necessarily of unit length.
+struct Direction3 {
+  double x = 1.0;
+  double y = 0.0;
+  double z = 0.0;
+
+  [[nodiscard]] double azimuth_rad() const { return std::atan2(y, x); }
+  [[nodiscard]] double elevation_rad() const { return std::atan2(z, std::hypot(x, y)); }
+  [[nodiscard]] static Direction3 from_angles(double azimuth_rad, double elevation_rad) {
+    return {std::cos(elevation_rad) * std::cos(azimuth_rad),
+            std::cos(elevation_rad) * std::sin(azimuth_rad), std::sin(elevation_rad)};
+  }
+  friend bool operator==(const Direction3&, const Direction3&) = default;
+};
+
+}  // namespace panonav

@@ -1,0 +1,137 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "panonav/core/ids.hpp"
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/signature/fourier_signature.hpp"
+
+namespace panonav {
+
+/// Where a reference view was taken. Some recordings know positions but no headings.
+struct ReferencePose {
+  double x_m = 0.0;
+  double y_m = 0.0;
+  std::optional<double> heading_rad;
+  [[nodiscard]] Point2 position() const { return {x_m, y_m}; }
+  friend bool operator==(const ReferencePose&, const ReferencePose&) = default;
+};
+
+/// What a memory knows of a view besides its signature.
+struct ReferenceInfo {
+  std::string name;  ///< unique within a memory; usually the image's file name
+  std::optional<ReferencePose> pose;
+  std::optional<double> stamp_s;
+  friend bool operator==(const ReferenceInfo&, const ReferenceInfo&) = default;
+};
+
+enum class LinkKind { sequence, neighbour, closure };
+
+/// Two views between which a robot can move.
+struct Link {
+  ViewId a;
+  ViewId b;
+  LinkKind kind = LinkKind::sequence;
+  friend bool operator==(const Link&, const Link&) = default;
+};
+
+struct Match {
+  ViewId view;
+  std::uint32_t dissimilarity = 0;  ///< integer L1 of packed magnitudes over the components asked for
+  friend bool operator==(const Match&, const Match&) = default;
+};
+
+struct SearchOptions {
+  int top = 10;        ///< matches wanted, >= 1
+  int components = 0;  ///< 1 .. the memory's; 0 takes all
+};
+
+/// Restricts a search. Empty spans restrict nothing.
+struct SearchMask {
+  std::span<const ViewId> excluded_views;      ///< these are not found
+  std::span<const std::uint8_t> allowed_rows;  ///< one entry per row, 0: the row does not count
+};
+
+struct SearchResult {
+  std::vector<Match> matches;       ///< ascending (dissimilarity, view)
+  std::uint64_t bytes_read = 0;     ///< signature and index bytes that the search touched
+  std::uint64_t bytes_in_full = 0;  ///< what a scan over all views would read
+  std::uint64_t views_in_full = 0;  ///< views whose whole sum was computed
+};
+
+/// One level of hierarchical localisation [M04 section 2.3]: the views that may still be the place
+/// when `components` components have been compared.
+struct HierarchyLevel {
+  int components = 0;
+  std::vector<Match> candidates;  ///< ascending (partial dissimilarity, view); nested in the level before
+  std::uint64_t bytes_read = 0;   ///< by all levels so far
+};
+
+/// The reference views that a robot remembers. Views keep their id for ever; ids grow in the order of appending.
+/// Invariant: all signatures have one shape and one full scale.
+/// Reading from several threads at once is safe; changing is not.
+class VisualMemory {
+ public:
+  /// `full_scale`: magnitude that is packed as 255. Throws ContractError.
+  VisualMemory(SignatureShape shape, float full_scale, std::optional<ElevationBand> elevations);
+  ~VisualMemory();
+  VisualMemory(VisualMemory&&) noexcept;
+  VisualMemory& operator=(VisualMemory&&) noexcept;
+  VisualMemory(const VisualMemory&);
+  VisualMemory& operator=(const VisualMemory&);
+
+  [[nodiscard]] SignatureShape shape() const noexcept;
+  [[nodiscard]] float full_scale() const noexcept;
+  [[nodiscard]] const std::optional<ElevationBand>& elevations() const noexcept;
+  [[nodiscard]] std::size_t size() const noexcept;
+  [[nodiscard]] bool empty() const noexcept { return size() == 0; }
+
+  /// Throws ContractError on another shape, an empty or known name, or a pose that is not finite; the memory is then unchanged.
+  ViewId append(const PackedSignature& signature, ReferenceInfo info);
+  /// Packs with the memory's full scale, then appends.
+  ViewId append(const FourierSignature& signature, ReferenceInfo info);
+  /// For readers of files: appends under a given id, which must be larger than all before.
+  void append_as(ViewId id, const PackedSignature& signature, ReferenceInfo info);
+  /// Also drops the links of the view. Throws ContractError when there is no such view.
+  void remove(ViewId view);
+
+  /// Ascending.
+  [[nodiscard]] std::span<const ViewId> views() const noexcept;
+  [[nodiscard]] bool contains(ViewId view) const noexcept;
+  [[nodiscard]] std::optional<ViewId> find(std::string_view name) const;
+  /// These throw ContractError when there is no such view.
+  [[nodiscard]] const ReferenceInfo& info(ViewId view) const;
+  void set_pose(ViewId view, std::optional<ReferencePose> pose);
+  [[nodiscard]] PackedSignature packed(ViewId view) const;
+  [[nodiscard]] FourierSignature signature(ViewId view) const;
+
+  /// Throws ContractError unless both views exist and differ. A second link of the same two views replaces the first.
+  void link(const Link& link);
+  void unlink(ViewId a, ViewId b);
+  [[nodiscard]] std::span<const Link> links() const noexcept;
+  [[nodiscard]] std::vector<ViewId> neighbours(ViewId view) const;
+
+  /// The nearest views by integer L1 over packed magnitudes: exactly what a full scan finds, ties by id.
+  /// Throws ContractError on another shape or options out of range.
+  [[nodiscard]] SearchResult search(const PackedSignature& query, const SearchOptions& options = {},
+                                    const SearchMask& mask = {}) const;
+
+  /// For m = 1 .. components: the views whose partial dissimilarity is at most (1 + tolerance) times the
+  /// best full dissimilarity known so far [M04 section 2.3]. Stops early when `stop` says so after a level.
+  [[nodiscard]] std::vector<HierarchyLevel> hierarchy(
+      const PackedSignature& query, double tolerance, int components = 0,
+      const std::function<bool(const HierarchyLevel&)>& stop = {}, const SearchMask& mask = {}) const;
+
+ private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace panonav

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "panonav/camera/camera.hpp"
+#include "panonav/core/image.hpp"
+
+namespace panonav {
+
+/// A panoramic cylinder [M04 section 2.1]: one channel, float32, row-major. Row 0 is the highest
+/// elevation, rows are equally spaced in angle between the edges of the elevation band. Column c is
+/// centred on azimuth 2 pi c / columns in the robot frame (counter-clockwise, forward at column 0).
+/// Values are in [0, 1] as read from a camera; preprocessing may leave that range.
+/// Invariant: rows >= 1, columns >= 4, all values finite.
+class Panorama {
+ public:
+  /// All values 0. Throws ContractError.
+  Panorama(int rows, int columns, std::optional<ElevationBand> elevations);
+  /// Throws ContractError on a wrong size or a value that is not finite.
+  Panorama(int rows, int columns, std::optional<ElevationBand> elevations,
+           std::vector<float> values);
+
+  [[nodiscard]] int rows() const noexcept { return rows_; }
+  [[nodiscard]] int columns() const noexcept { return columns_; }
+  /// Empty: unknown, every row is then treated as on the horizon.
+  [[nodiscard]] const std::optional<ElevationBand>& elevations() const noexcept {
+    return elevations_;
+  }
+  /// Elevation of the middle of row y; 0 where elevations are unknown.
+  [[nodiscard]] double elevation_rad(int row) const noexcept;
+  /// The row whose middle is nearest to elevation 0; empty when unknown or outside the band.
+  [[nodiscard]] std::optional<int> horizon_row() const noexcept;
+  [[nodiscard]] double azimuth_rad(int column) const noexcept;  ///< in [-pi, pi)
+
+  [[nodiscard]] std::span<const float> values() const& noexcept { return values_; }
+  [[nodiscard]] std::span<float> values() & noexcept { return values_; }
+  std::span<const float> values() const&& = delete;  // would dangle
+  [[nodiscard]] std::span<const float> row(int y) const& noexcept {
+    return std::span(values_).subspan(static_cast<std::size_t>(y) * columns_, columns_);
+  }
+  std::span<const float> row(int y) const&& = delete;  // would dangle
+  [[nodiscard]] float at(int y, int column) const noexcept {
+    return values_[static_cast<std::size_t>(y) * columns_ + column];
+  }
+  [[nodiscard]] float& at(int y, int column) noexcept {
+    return values_[static_cast<std::size_t>(y) * columns_ + column];
+  }
+  friend bool operator==(const Panorama&, const Panorama&) = default;
+
+ private:
+  int rows_, columns_;
+  std::optional<ElevationBand> elevations_;
+  std::vector<float> values_;
+};
+
+/// What the robot sees after turning on the spot by `columns_turned` columns counter-clockwise:
+/// I'(phi) = I(phi + delta), so column c of the result is column c + columns_turned.
+[[nodiscard]] Panorama turn_columns(const Panorama& panorama, int columns_turned);
+
+/// As a picture for people: clockwise, forward in the middle, 0..1 as 0..255 (clamped).
+[[nodiscard]] Image to_picture(const Panorama& panorama);
+
+}  // namespace panonav
