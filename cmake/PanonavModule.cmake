@@ -57,3 +57,28 @@ function(panonav_umbrella)
   target_link_libraries(panonav INTERFACE ${targets})
   install(TARGETS panonav EXPORT panonavTargets)
 endfunction()
+
+# panonav_find(PACKAGE ...): find_package, and remembers it for users of the installed package.
+# Sets PACKAGE_FOUND in the caller's scope as find_package does.
+macro(panonav_find package)
+  find_package(${package} ${ARGN})
+  if(${package}_FOUND)
+    set_property(GLOBAL APPEND PROPERTY PANONAV_FOUND_PACKAGES ${package})
+  endif()
+endmacro()
+
+# The CMake package that `find_package(panonav)` finds after an installation.
+function(panonav_install_package)
+  include(CMakePackageConfigHelpers)
+  get_property(PANONAV_FOUND_PACKAGES GLOBAL PROPERTY PANONAV_FOUND_PACKAGES)
+  list(REMOVE_DUPLICATES PANONAV_FOUND_PACKAGES)
+  string(REPLACE ";" " " PANONAV_FOUND_PACKAGES "${PANONAV_FOUND_PACKAGES}")
+  set(destination ${CMAKE_INSTALL_LIBDIR}/cmake/panonav)
+  configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/panonavConfig.cmake.in
+    ${PROJECT_BINARY_DIR}/panonavConfig.cmake INSTALL_DESTINATION ${destination})
+  write_basic_package_version_file(${PROJECT_BINARY_DIR}/panonavConfigVersion.cmake
+    COMPATIBILITY SameMinorVersion)
+  install(EXPORT panonavTargets NAMESPACE panonav:: DESTINATION ${destination})
+  install(FILES ${PROJECT_BINARY_DIR}/panonavConfig.cmake ${PROJECT_BINARY_DIR}/panonavConfigVersion.cmake
+          DESTINATION ${destination})
+endfunction()
