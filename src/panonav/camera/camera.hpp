@@ -17,8 +17,9 @@ struct PixelPoint {
   friend bool operator==(const PixelPoint&, const PixelPoint&) = default;
 };
 
-/// Hyperboloidal mirror with a single viewpoint above a perspective camera, X^2+Y^2 over a^2 minus Z^2
-/// over b^2 = -1, c^2 = a^2 + b^2 [Y03 eq. 1-4, corrected]. Valid: elevations that the mirror reflects into the lens.
+/// Hyperboloidal mirror with a single viewpoint above a perspective camera, X^2+Y^2 over a^2 minus
+/// Z^2 over b^2 = -1, c^2 = a^2 + b^2 [Y03 eq. 1-4, corrected]. Valid: elevations that the mirror
+/// reflects into the lens.
 struct HyperboloidalModel {
   double a_mm = 28.095;
   double b_mm = 23.4125;
@@ -26,8 +27,9 @@ struct HyperboloidalModel {
   friend bool operator==(const HyperboloidalModel&, const HyperboloidalModel&) = default;
 };
 
-/// Scaramuzza's general polynomial: a pixel at distance r from the centre looks along (r, f(r)) with
-/// f(r) = sum_i coefficients[i] r^i; positive f(r) looks down (the mirror stands above the camera).
+/// Scaramuzza's general polynomial: a pixel at distance r from the centre looks along (r, f(r))
+/// with f(r) = sum_i coefficients[i] r^i; positive f(r) looks down (the mirror stands above the
+/// camera).
 struct PolynomialModel {
   std::vector<double> coefficients;
   friend bool operator==(const PolynomialModel&, const PolynomialModel&) = default;
@@ -40,28 +42,29 @@ struct UnifiedModel {
   friend bool operator==(const UnifiedModel&, const UnifiedModel&) = default;
 };
 
-/// Elevation is linear in the distance from the centre: `elevation_at_inner_rad` on the inner radius,
-/// `elevation_at_rim_rad` on the rim. What is left when a mirror's shape is unknown.
+/// Elevation is linear in the distance from the centre: `elevation_at_inner_rad` on the inner
+/// radius, `elevation_at_rim_rad` on the rim. What is left when a mirror's shape is unknown.
 struct EquiangularModel {
   double elevation_at_inner_rad = 0.0;
   double elevation_at_rim_rad = 0.0;
   friend bool operator==(const EquiangularModel&, const EquiangularModel&) = default;
 };
 
-/// A 360 degree picture or a ready-made panorama: columns are azimuths, rows are elevations, both linear.
+/// A 360 degree picture or a ready-made panorama: columns are azimuths, rows are elevations, both
+/// linear.
 struct EquirectangularModel {
   double elevation_bottom_rad = -1.5707963267948966;  ///< of the picture's lower edge
   double elevation_top_rad = 1.5707963267948966;      ///< of the picture's upper edge
   friend bool operator==(const EquirectangularModel&, const EquirectangularModel&) = default;
 };
 
-using CameraModel = std::variant<HyperboloidalModel, PolynomialModel, UnifiedModel, EquiangularModel,
-                                 EquirectangularModel>;
+using CameraModel = std::variant<HyperboloidalModel, PolynomialModel, UnifiedModel,
+                                 EquiangularModel, EquirectangularModel>;
 
 enum class ColumnDirection { clockwise, counter_clockwise };
 
-/// A camera that sees all azimuths: how its pixels and the directions in the robot frame belong together.
-/// The mirror's axis is vertical. Invariant checked by `validate(const Camera&)`.
+/// A camera that sees all azimuths: how its pixels and the directions in the robot frame belong
+/// together. The mirror's axis is vertical. Invariant checked by `validate(const Camera&)`.
 struct Camera {
   CameraModel model;
   ImageSize image_size;
@@ -69,8 +72,8 @@ struct Camera {
   PixelPoint centre;
   double rim_radius_px = 0.0;    ///< nothing is seen beyond
   double inner_radius_px = 0.0;  ///< nothing is seen within (the camera's own reflection)
-  /// How azimuth runs in the picture, seen as it is shown (u right, v down). A mirror image seen from below
-  /// runs the other way than the world seen from above.
+  /// How azimuth runs in the picture, seen as it is shown (u right, v down). A mirror image seen
+  /// from below runs the other way than the world seen from above.
   ColumnDirection direction = ColumnDirection::counter_clockwise;
   /// Mirror: image angle of the robot's forward direction, counter-clockwise as shown, from +u.
   double forward_angle_rad = 0.0;

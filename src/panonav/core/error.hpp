@@ -29,10 +29,12 @@ class OptionError : public Error {
   using Error::Error;
 };
 
-/// A file is missing, unreadable, damaged, of a foreign kind, of a newer version, or cannot be written.
+/// A file is missing, unreadable, damaged, of a foreign kind, of a newer version, or cannot be
+/// written.
 class FileError : public Error {
  public:
-  /// Message "`path`: `what`". `what` names the field, the value and the allowed range where there are any.
+  /// Message "`path`: `what`". `what` names the field, the value and the allowed range where there
+  /// are any.
   FileError(std::string_view path, std::string_view what);
 };
 

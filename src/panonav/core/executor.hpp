@@ -6,14 +6,14 @@
 
 namespace panonav {
 
-/// Runs loops on a fixed number of threads. The caller owns it and passes it down; there is no global
-/// one. Work is cut into chunks whose borders depend on `count` and `chunk` alone, so a body that
-/// takes its random stream from the chunk number, and a reduction in the order of the chunk numbers,
-/// give the same bits on any number of threads.
+/// Runs loops on a fixed number of threads. The caller owns it and passes it down; there is no
+/// global one. Work is cut into chunks whose borders depend on `count` and `chunk` alone, so a body
+/// that takes its random stream from the chunk number, and a reduction in the order of the chunk
+/// numbers, give the same bits on any number of threads.
 class Executor {
  public:
-  /// `threads` 1 runs everything in the calling thread; 0 takes one thread per core. Throws ContractError
-  /// outside 0 .. 1024.
+  /// `threads` 1 runs everything in the calling thread; 0 takes one thread per core. Throws
+  /// ContractError outside 0 .. 1024.
   explicit Executor(int threads = 1);
   ~Executor();
   Executor(const Executor&) = delete;

@@ -7,8 +7,8 @@
 
 namespace panonav {
 
-/// A number that names one thing of one kind. Ids of different kinds do not convert into each other,
-/// and an id is not an index: it stays the same when other things are removed.
+/// A number that names one thing of one kind. Ids of different kinds do not convert into each
+/// other, and an id is not an index: it stays the same when other things are removed.
 template <class Tag>
 struct Id {
   std::uint32_t value = 0;

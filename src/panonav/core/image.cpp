@@ -39,8 +39,8 @@ Image to_grey(ImageView image) {
     }
     for (int u = 0; u < image.width; ++u) {
       // Integer weights of sum 65536, so that white stays 255.
-      const std::uint32_t sum = 19595U * from[3 * u] + 38470U * from[3 * u + 1] +
-                                7471U * from[3 * u + 2] + 32768U;
+      const std::uint32_t sum =
+          19595U * from[3 * u] + 38470U * from[3 * u + 1] + 7471U * from[3 * u + 2] + 32768U;
       to[u] = static_cast<std::uint8_t>(sum >> 16U);
     }
   }

@@ -8,14 +8,14 @@
 
 namespace panonav {
 
-/// What a person must know of one option. Options live once, as members of the struct of their module;
-/// the command line, TOML files and bindings are derived from `visit_options`.
+/// What a person must know of one option. Options live once, as members of the struct of their
+/// module; the command line, TOML files and bindings are derived from `visit_options`.
 struct OptionInfo {
   std::string_view name;  ///< snake_case, with its unit as in the member's name
   std::string_view help;  ///< one plain line
-  double low = -std::numeric_limits<double>::infinity();   ///< smallest allowed value
-  double high = std::numeric_limits<double>::infinity();   ///< largest allowed value
-  bool low_open = false;                                   ///< `low` itself is not allowed
+  double low = -std::numeric_limits<double>::infinity();  ///< smallest allowed value
+  double high = std::numeric_limits<double>::infinity();  ///< largest allowed value
+  bool low_open = false;                                  ///< `low` itself is not allowed
 };
 
 /// Visits the members of an options struct. Each options struct `T` has a function
@@ -32,8 +32,7 @@ class OptionVisitor {
 };
 
 /// Every value that is out of its range or not a number, one sentence each; empty when all is well.
-[[nodiscard]] std::vector<std::string> option_faults(
-    const OptionInfo& info, double value);
+[[nodiscard]] std::vector<std::string> option_faults(const OptionInfo& info, double value);
 
 namespace detail {
 class FaultCollector final : public OptionVisitor {

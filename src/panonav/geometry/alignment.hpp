@@ -6,8 +6,8 @@
 
 namespace panonav {
 
-/// The best map of one point set onto another: to ~ scale * R(rotation) * from + translation, with a
-/// mirror image first (y -> -y) when `reflected`.
+/// The best map of one point set onto another: to ~ scale * R(rotation) * from + translation, with
+/// a mirror image first (y -> -y) when `reflected`.
 struct Alignment {
   double scale = 1.0;
   double rotation_rad = 0.0;
@@ -23,20 +23,21 @@ struct AlignmentOptions {
   bool allow_reflection = false;
 };
 
-/// Least-squares alignment (Procrustes, Umeyama 1991). Throws ContractError unless both sets have the
-/// same size >= 1. Coincident points align by translation alone.
+/// Least-squares alignment (Procrustes, Umeyama 1991). Throws ContractError unless both sets have
+/// the same size >= 1. Coincident points align by translation alone.
 [[nodiscard]] Alignment align(std::span<const Point2> from, std::span<const Point2> to,
                               const AlignmentOptions& options = {});
 
-/// How much two shapes differ when translation, rotation and size do not count: mu = 1 - (s_1 + d s_2)^2
-/// with s the singular values of the product of the two centred, unit-norm sets, d = +-1 so that the best
-/// proper rotation is meant [F11 section 3.3 with the design's correction].
+/// How much two shapes differ when translation, rotation and size do not count: mu = 1 - (s_1 + d
+/// s_2)^2 with s the singular values of the product of the two centred, unit-norm sets, d = +-1 so
+/// that the best proper rotation is meant [F11 section 3.3 with the design's correction].
 struct ShapeDifference {
   double value = 0.0;            ///< 0 (same shape) .. 1
   double with_reflection = 0.0;  ///< the same when a mirror image is allowed
 };
 
 /// Throws ContractError unless both sets have the same size >= 2 and neither is a single point.
-[[nodiscard]] ShapeDifference shape_difference(std::span<const Point2> a, std::span<const Point2> b);
+[[nodiscard]] ShapeDifference shape_difference(std::span<const Point2> a,
+                                               std::span<const Point2> b);
 
 }  // namespace panonav

@@ -13,7 +13,9 @@ double wrap_angle(double angle_rad) {
   return wrapped < -std::numbers::pi ? -std::numbers::pi : wrapped;
 }
 
-double angle_difference(double to_rad, double from_rad) { return wrap_angle(to_rad - from_rad); }
+double angle_difference(double to_rad, double from_rad) {
+  return wrap_angle(to_rad - from_rad);
+}
 
 std::optional<CircularMean> circular_mean(std::span<const double> angles_rad) {
   if (angles_rad.empty()) return std::nullopt;

@@ -11,8 +11,12 @@ namespace panonav {
 /// The smallest turn from `from_rad` to `to_rad`, in [-pi, pi).
 [[nodiscard]] double angle_difference(double to_rad, double from_rad);
 
-[[nodiscard]] constexpr double radians(double degrees) { return degrees * 0.017453292519943295; }
-[[nodiscard]] constexpr double degrees(double radians) { return radians * 57.29577951308232; }
+[[nodiscard]] constexpr double radians(double degrees) {
+  return degrees * 0.017453292519943295;
+}
+[[nodiscard]] constexpr double degrees(double radians) {
+  return radians * 57.29577951308232;
+}
 
 /// Mean direction of angles, and how well they agree.
 struct CircularMean {

@@ -44,7 +44,8 @@ struct Link {
 
 struct Match {
   ViewId view;
-  std::uint32_t dissimilarity = 0;  ///< integer L1 of packed magnitudes over the components asked for
+  std::uint32_t dissimilarity =
+      0;  ///< integer L1 of packed magnitudes over the components asked for
   friend bool operator==(const Match&, const Match&) = default;
 };
 
@@ -70,13 +71,14 @@ struct SearchResult {
 /// when `components` components have been compared.
 struct HierarchyLevel {
   int components = 0;
-  std::vector<Match> candidates;  ///< ascending (partial dissimilarity, view); nested in the level before
-  std::uint64_t bytes_read = 0;   ///< by all levels so far
+  std::vector<Match>
+      candidates;  ///< ascending (partial dissimilarity, view); nested in the level before
+  std::uint64_t bytes_read = 0;  ///< by all levels so far
 };
 
-/// The reference views that a robot remembers. Views keep their id for ever; ids grow in the order of appending.
-/// Invariant: all signatures have one shape and one full scale.
-/// Reading from several threads at once is safe; changing is not.
+/// The reference views that a robot remembers. Views keep their id for ever; ids grow in the order
+/// of appending. Invariant: all signatures have one shape and one full scale. Reading from several
+/// threads at once is safe; changing is not.
 class VisualMemory {
  public:
   /// `full_scale`: magnitude that is packed as 255. Throws ContractError.
@@ -93,7 +95,8 @@ class VisualMemory {
   [[nodiscard]] std::size_t size() const noexcept;
   [[nodiscard]] bool empty() const noexcept { return size() == 0; }
 
-  /// Throws ContractError on another shape, an empty or known name, or a pose that is not finite; the memory is then unchanged.
+  /// Throws ContractError on another shape, an empty or known name, or a pose that is not finite;
+  /// the memory is then unchanged.
   ViewId append(const PackedSignature& signature, ReferenceInfo info);
   /// Packs with the memory's full scale, then appends.
   ViewId append(const FourierSignature& signature, ReferenceInfo info);
@@ -112,22 +115,25 @@ class VisualMemory {
   [[nodiscard]] PackedSignature packed(ViewId view) const;
   [[nodiscard]] FourierSignature signature(ViewId view) const;
 
-  /// Throws ContractError unless both views exist and differ. A second link of the same two views replaces the first.
+  /// Throws ContractError unless both views exist and differ. A second link of the same two views
+  /// replaces the first.
   void link(const Link& link);
   void unlink(ViewId a, ViewId b);
   [[nodiscard]] std::span<const Link> links() const noexcept;
   [[nodiscard]] std::vector<ViewId> neighbours(ViewId view) const;
 
-  /// The nearest views by integer L1 over packed magnitudes: exactly what a full scan finds, ties by id.
-  /// Throws ContractError on another shape or options out of range.
+  /// The nearest views by integer L1 over packed magnitudes: exactly what a full scan finds, ties
+  /// by id. Throws ContractError on another shape or options out of range.
   [[nodiscard]] SearchResult search(const PackedSignature& query, const SearchOptions& options = {},
                                     const SearchMask& mask = {}) const;
 
-  /// For m = 1 .. components: the views whose partial dissimilarity is at most (1 + tolerance) times the
-  /// best full dissimilarity known so far [M04 section 2.3]. Stops early when `stop` says so after a level.
+  /// For m = 1 .. components: the views whose partial dissimilarity is at most (1 + tolerance)
+  /// times the best full dissimilarity known so far [M04 section 2.3]. Stops early when `stop` says
+  /// so after a level.
   [[nodiscard]] std::vector<HierarchyLevel> hierarchy(
       const PackedSignature& query, double tolerance, int components = 0,
-      const std::function<bool(const HierarchyLevel&)>& stop = {}, const SearchMask& mask = {}) const;
+      const std::function<bool(const HierarchyLevel&)>& stop = {},
+      const SearchMask& mask = {}) const;
 
  private:
   struct Implementation;

@@ -10,9 +10,11 @@ namespace panonav {
 struct CompassReading {
   /// heading of the query minus heading of the reference, in [-pi, pi).
   double heading_rad = 0.0;
-  /// Normalised correlation at the maximum, -1 .. 1; 1 for the same view turned. k = 0 does not count.
+  /// Normalised correlation at the maximum, -1 .. 1; 1 for the same view turned. k = 0 does not
+  /// count.
   double correlation = 0.0;
-  /// 0 .. 1: how far the maximum stands above the second highest one; 0 when another heading fits as well.
+  /// 0 .. 1: how far the maximum stands above the second highest one; 0 when another heading fits
+  /// as well.
   double distinctness = 0.0;
 };
 
@@ -27,7 +29,8 @@ struct CompassOptions {
                                                     const FourierSignature& reference,
                                                     const CompassOptions& options = {});
 
-/// S06's sequential rule [S06 eq. 40-43, sign of eq. 41 corrected], as published, kept for comparison.
+/// S06's sequential rule [S06 eq. 40-43, sign of eq. 41 corrected], as published, kept for
+/// comparison.
 [[nodiscard]] std::optional<CompassReading> sequential_compass(const FourierSignature& query,
                                                                const FourierSignature& reference,
                                                                const CompassOptions& options = {});

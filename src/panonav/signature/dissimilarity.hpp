@@ -9,17 +9,21 @@ namespace panonav {
 
 /// Sum over rows and k < components of |A^a - A^b| [M04 eq. 2, magnitudes]. components 0: all.
 /// Throws ContractError on different shapes. Sums run in a fixed order.
-[[nodiscard]] double dissimilarity_l1(const FourierSignature& a, const FourierSignature& b, int components = 0);
+[[nodiscard]] double dissimilarity_l1(const FourierSignature& a, const FourierSignature& b,
+                                      int components = 0);
 /// Square root of the sum of squares [F11 eq. 2].
-[[nodiscard]] double dissimilarity_l2(const FourierSignature& a, const FourierSignature& b, int components = 0);
-/// Sum of alpha_k |A^a - A^b| [M04 eq. 6]; one weight >= 0 per component, the first weights.size() components count.
+[[nodiscard]] double dissimilarity_l2(const FourierSignature& a, const FourierSignature& b,
+                                      int components = 0);
+/// Sum of alpha_k |A^a - A^b| [M04 eq. 6]; one weight >= 0 per component, the first weights.size()
+/// components count.
 [[nodiscard]] double dissimilarity_weighted(const FourierSignature& a, const FourierSignature& b,
                                             std::span<const double> weights);
 /// The exact integer L1 of packed magnitudes; the measure of a visual memory.
-[[nodiscard]] std::uint32_t dissimilarity_packed(const PackedSignature& a, const PackedSignature& b, int components = 0);
+[[nodiscard]] std::uint32_t dissimilarity_packed(const PackedSignature& a, const PackedSignature& b,
+                                                 int components = 0);
 
-/// Rescales dissimilarities to 0 (the largest) .. 1000 (the smallest) over the whole set [M04 eq. 3].
-/// All equal: all 1000.
+/// Rescales dissimilarities to 0 (the largest) .. 1000 (the smallest) over the whole set [M04 eq.
+/// 3]. All equal: all 1000.
 [[nodiscard]] std::vector<double> similarities(std::span<const double> dissimilarities);
 
 }  // namespace panonav

@@ -20,23 +20,29 @@ struct SignatureShape {
   friend bool operator==(const SignatureShape&, const SignatureShape&) = default;
 };
 
-/// The first Fourier components of every row of a panoramic cylinder [M04 section 2.1, S06 eq. 10-13]:
-/// I_y(phi) ~ a_0/2 + sum_k A_k cos(k phi + psi_k). Magnitudes do not change when the robot turns on
-/// the spot; phases psi_k change by k times the turn. Stored component-major (k, then y), so that the
-/// first m components are a prefix.
-/// Invariant: rows, components >= 1; magnitudes finite and >= 0; phases in [-pi, pi), 0 where the magnitude is 0.
+/// The first Fourier components of every row of a panoramic cylinder [M04 section 2.1, S06 eq.
+/// 10-13]: I_y(phi) ~ a_0/2 + sum_k A_k cos(k phi + psi_k). Magnitudes do not change when the robot
+/// turns on the spot; phases psi_k change by k times the turn. Stored component-major (k, then y),
+/// so that the first m components are a prefix. Invariant: rows, components >= 1; magnitudes finite
+/// and >= 0; phases in [-pi, pi), 0 where the magnitude is 0.
 class FourierSignature {
  public:
   /// Throws ContractError.
-  FourierSignature(SignatureShape shape, std::vector<float> magnitudes, std::vector<float> phases_rad,
-                   std::optional<ElevationBand> elevations);
+  FourierSignature(SignatureShape shape, std::vector<float> magnitudes,
+                   std::vector<float> phases_rad, std::optional<ElevationBand> elevations);
 
   [[nodiscard]] SignatureShape shape() const noexcept { return shape_; }
   [[nodiscard]] int rows() const noexcept { return shape_.rows; }
   [[nodiscard]] int components() const noexcept { return shape_.components; }
-  [[nodiscard]] const std::optional<ElevationBand>& elevations() const noexcept { return elevations_; }
-  [[nodiscard]] float magnitude(int row, int k) const noexcept { return magnitudes_[index(row, k)]; }
-  [[nodiscard]] float phase_rad(int row, int k) const noexcept { return phases_rad_[index(row, k)]; }
+  [[nodiscard]] const std::optional<ElevationBand>& elevations() const noexcept {
+    return elevations_;
+  }
+  [[nodiscard]] float magnitude(int row, int k) const noexcept {
+    return magnitudes_[index(row, k)];
+  }
+  [[nodiscard]] float phase_rad(int row, int k) const noexcept {
+    return phases_rad_[index(row, k)];
+  }
   /// Component-major: index k * rows + row.
   [[nodiscard]] std::span<const float> magnitudes() const& noexcept { return magnitudes_; }
   [[nodiscard]] std::span<const float> phases_rad() const& noexcept { return phases_rad_; }
@@ -54,15 +60,17 @@ class FourierSignature {
   std::optional<ElevationBand> elevations_;
 };
 
-/// Throws ContractError unless 1 <= components <= columns / 2. Cost O(rows * columns * components) worst case.
+/// Throws ContractError unless 1 <= components <= columns / 2. Cost O(rows * columns * components)
+/// worst case.
 [[nodiscard]] FourierSignature compute_signature(const Panorama& panorama, int components = 15);
 
-/// The signature of the same view after the robot turned by `turn_rad` counter-clockwise (exact shift theorem [M04 eq. 1]).
+/// The signature of the same view after the robot turned by `turn_rad` counter-clockwise (exact
+/// shift theorem [M04 eq. 1]).
 [[nodiscard]] FourierSignature turn(const FourierSignature& signature, double turn_rad);
 
-/// A signature in 8 + 8 bit per component and row: 19 kbit for 80 x 15 [M03 table 1]. Magnitudes are
-/// linear up to `full_scale` (kept once per memory, not here) and saturate there; phases are linear over the full turn.
-/// Component-major like FourierSignature.
+/// A signature in 8 + 8 bit per component and row: 19 kbit for 80 x 15 [M03 table 1]. Magnitudes
+/// are linear up to `full_scale` (kept once per memory, not here) and saturate there; phases are
+/// linear over the full turn. Component-major like FourierSignature.
 struct PackedSignature {
   SignatureShape shape;
   std::vector<std::uint8_t> magnitudes;

@@ -29,7 +29,8 @@ struct Material {
 
 /// Triangles of one material. `texture_coordinates` is empty or has one entry per vertex.
 struct Mesh {
-  std::string object;  ///< which object of the scene it belongs to, for moving objects ("wall", "desk 3")
+  std::string
+      object;  ///< which object of the scene it belongs to, for moving objects ("wall", "desk 3")
   int material = 0;
   std::vector<Vector3> vertices;
   std::vector<std::array<float, 2>> texture_coordinates;
@@ -41,8 +42,9 @@ struct PointLight {
   float intensity = 1.0F;
 };
 
-/// A world for the simulated robot. `floor` is what the robot may drive in: an axis-aligned rectangle, less the
-/// places where a mesh below the robot's height stands within its radius (see `FreeSpace`).
+/// A world for the simulated robot. `floor` is what the robot may drive in: an axis-aligned
+/// rectangle, less the places where a mesh below the robot's height stands within its radius (see
+/// `FreeSpace`).
 struct Scene {
   std::string name;
   std::vector<Material> materials;

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "panonav/geometry/pose2.hpp"
+
+namespace panonav {
+
+enum class SeriesStyle { lines, points, lines_and_points, bars };
+
+struct Series {
+  std::string label;  ///< "" leaves the series out of the legend
+  std::vector<double> x;
+  std::vector<double> y;
+  SeriesStyle style = SeriesStyle::lines_and_points;
+  std::vector<double> y_low;  ///< with y_high: error bars; empty for none
+  std::vector<double> y_high;
+};
+
+/// Curves over one axis. Labels carry their units: "distance [m]".
+struct LinePlot {
+  std::string title;
+  std::string x_label;
+  std::string y_label;
+  std::vector<Series> series;
+  bool log_x = false;
+  bool log_y = false;
+  std::optional<std::pair<double, double>> x_range;
+  std::optional<std::pair<double, double>> y_range;
+  std::vector<std::string> x_tick_labels;  ///< for bars: one per x value
+};
+
+/// Values on a regular grid seen from above, lowest row first.
+struct HeatMap {
+  std::string title;
+  std::string x_label = "x [m]";
+  std::string y_label = "y [m]";
+  std::string value_label;
+  int columns = 0;
+  int rows = 0;
+  Point2 first_cell;  ///< centre of cell (0, 0)
+  double spacing_m = 1.0;
+  std::vector<double> values;  ///< row-major; NaN leaves a cell empty
+  std::vector<Point2> crosses;
+};
+
+/// A map seen from above.
+struct MapLayer {
+  std::string label;
+  std::string colour = "#1f77b4";
+  std::vector<Point2> circles;
+  std::vector<Point2> crosses;
+  std::vector<std::vector<Point2>> lines;
+  std::vector<std::vector<Point2>> filled_polygons;
+};
+struct MapPlot {
+  std::string title;
+  std::vector<MapLayer> layers;  ///< drawn in this order
+};
+
+/// Writes a PNG (or, for a path ending in .svg, an SVG) through the external program gnuplot; the
+/// file appears whole or not at all. Throws Error when gnuplot is not installed, FileError when the
+/// file cannot be written, ContractError on series whose x and y differ in size.
+void write_plot(const std::filesystem::path& path, const LinePlot& plot);
+void write_plot(const std::filesystem::path& path, const HeatMap& plot);
+void write_plot(const std::filesystem::path& path, const MapPlot& plot);
+/// Several maps side by side in one picture (as in [M04] figures 9 and 10).
+void write_plot(const std::filesystem::path& path, const std::vector<MapPlot>& panels,
+                int panel_columns);
+
+}  // namespace panonav

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <utility>
+
+namespace panonav {
+
+/// Linear interpolation between order statistics; `fraction` in [0, 1]. Throws ContractError on no
+/// values.
+[[nodiscard]] double quantile(std::span<const double> values, double fraction);
+[[nodiscard]] double median(std::span<const double> values);
+[[nodiscard]] double mean(std::span<const double> values);
+
+struct Proportion {
+  double value = 0.0;
+  double low = 0.0;  ///< of the 95 % Wilson score interval
+  double high = 0.0;
+};
+/// Throws ContractError unless 0 <= successes <= trials and trials >= 1.
+[[nodiscard]] Proportion success_rate(std::size_t successes, std::size_t trials);
+
+/// 95 % percentile bootstrap interval of the median. Same seed, same bits.
+[[nodiscard]] std::pair<double, double> median_interval(std::span<const double> values,
+                                                        std::uint64_t seed, int samples = 1000);
+
+/// Spearman's rank correlation, -1 .. 1; ties share their mean rank. Throws ContractError on
+/// different sizes or fewer than 3.
+[[nodiscard]] double rank_correlation(std::span<const double> a, std::span<const double> b);
+
+}  // namespace panonav
