@@ -1,0 +1,77 @@
+#include "panonav/kernels/dispatch.hpp"
+
+#include <array>
+#include <cstddef>
+#include <cstdlib>
+#include <string>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav::kernels {
+
+namespace {
+
+struct Available {
+  std::array<Instructions, 4> sets{Instructions::scalar};
+  std::size_t count = 1;
+};
+
+Available detect() noexcept {
+  Available available;
+#ifdef PANONAV_HAS_AVX2
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
+    available.sets[available.count++] = Instructions::avx2;
+  }
+#endif
+#ifdef PANONAV_HAS_AVX512
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+      __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl")) {
+    available.sets[available.count++] = Instructions::avx512;
+  }
+#endif
+#ifdef PANONAV_HAS_NEON
+  available.sets[available.count++] = Instructions::neon;
+#endif
+  return available;
+}
+
+Instructions choose() {
+  const auto sets = available_instructions();
+  const char* const forced = std::getenv("PANONAV_INSTRUCTIONS");
+  if (forced == nullptr || *forced == '\0') return sets.back();
+  std::string allowed;
+  for (const Instructions set : sets) {
+    if (name(set) == forced) return set;
+    allowed += (allowed.empty() ? "" : ", ") + std::string(name(set));
+  }
+  throw ContractError("PANONAV_INSTRUCTIONS", std::string_view(forced),
+                      allowed + " (on this processor)");
+}
+
+}  // namespace
+
+std::string_view name(Instructions instructions) noexcept {
+  switch (instructions) {
+    case Instructions::avx2:
+      return "avx2";
+    case Instructions::avx512:
+      return "avx512";
+    case Instructions::neon:
+      return "neon";
+    case Instructions::scalar:
+      break;
+  }
+  return "scalar";
+}
+
+std::span<const Instructions> available_instructions() noexcept {
+  static const Available available = detect();
+  return {available.sets.data(), available.count};
+}
+
+Instructions chosen_instructions() {
+  static const Instructions chosen = choose();
+  return chosen;
+}
+
+}  // namespace panonav::kernels
