@@ -6,8 +6,6 @@
 
 namespace panonav {
 
-namespace {
-
 std::string range_text(const OptionInfo& info) {
   const bool has_low = std::isfinite(info.low);
   const bool has_high = std::isfinite(info.high);
@@ -17,8 +15,6 @@ std::string range_text(const OptionInfo& info) {
   if (has_high) return "<= " + to_text(info.high);
   return "any finite number";
 }
-
-}  // namespace
 
 std::vector<std::string> option_faults(const OptionInfo& info, double value) {
   const bool inside = std::isfinite(value) && value <= info.high &&
@@ -43,7 +39,7 @@ void FaultCollector::visit(const OptionInfo& info, std::span<const std::string_v
                            int& value) {
   if (value >= 0 && value < static_cast<int>(choices.size())) return;
   std::string text = std::string(info.name) + " is " + std::to_string(value) + "; allowed:";
-  for (const auto choice : choices) text += " " + std::string(choice);
+  for (const auto choice : choices) text.append(" ").append(choice);
   faults_.push_back(std::move(text));
 }
 

@@ -1,0 +1,296 @@
+#include "arguments.hpp"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <charconv>
+#include <deque>
+#include <iostream>
+#include <map>
+#include <numeric>
+#include <utility>
+
+#include "option_values.hpp"
+#include "panonav/core/error.hpp"
+
+namespace panonav::command {
+
+struct Arguments::Parser {
+  CLI::App& app;
+};
+
+struct Arguments::Implementation {
+  struct Section {
+    std::string name;
+    Visit visit;
+    std::function<void()> check;
+    OptionTexts texts;  ///< what was typed, by option name
+  };
+  CLI::App& app;
+  std::deque<Section> sections;  // a deque: the parser keeps references into it
+};
+
+namespace {
+
+/// `cell_size_m` as `--cell-size-m`.
+std::string flag_of(std::string_view name) {
+  std::string flag = "--" + std::string(name);
+  std::replace(flag.begin(), flag.end(), '_', '-');
+  return flag;
+}
+
+/// Adds a flag for each member that it visits, and remembers what is typed as text.
+class FlagDeclarer final : public OptionVisitor {
+ public:
+  FlagDeclarer(CLI::App& app, std::string group, OptionTexts& texts)
+      : app_(app), group_(std::move(group)), texts_(texts) {}
+
+  void visit(const OptionInfo& info, int& value) override {
+    declare(info, "INT", std::to_string(value), range_text(info));
+  }
+  void visit(const OptionInfo& info, double& value) override {
+    declare(info, "NUMBER", to_text(value), range_text(info));
+  }
+  void visit(const OptionInfo& info, bool& value) override {
+    declare(info, "BOOL", value ? "true" : "false", "true or false");
+  }
+  void visit(const OptionInfo& info, std::span<const std::string_view> choices,
+             int& value) override {
+    std::string all;
+    for (const auto choice : choices) all += (all.empty() ? "" : ", ") + std::string(choice);
+    declare(info, "NAME", std::string(choices[static_cast<std::size_t>(value)]), all);
+  }
+
+ private:
+  void declare(const OptionInfo& info, const std::string& type, const std::string& initial,
+               const std::string& range) {
+    auto& text = texts_[std::string(info.name)];
+    std::string help(info.help);
+    help += " (default " + initial;
+    if (range != "any finite number") help += "; " + range;
+    app_.add_option(flag_of(info.name), text, help + ")")->type_name(type)->group(group_);
+  }
+  CLI::App& app_;
+  std::string group_;
+  OptionTexts& texts_;
+};
+
+int whole_number(const std::string& flag, const std::string& text, int low) {
+  int value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || value < low) {
+    throw UsageError(flag + " is '" + text + "'; allowed: whole numbers from " +
+                     std::to_string(low));
+  }
+  return value;
+}
+
+/// The longest of a flag's forms, for messages.
+std::string long_form(const std::string& flag) {
+  return flag.substr(flag.rfind(',') + 1);
+}
+
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t changed = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({changed, row[j] + 1, row[j + 1] + 1});
+    }
+  }
+  return row.back();
+}
+
+std::string unknown_verb(std::span<const Verb> verbs, const std::string& typed) {
+  std::string message = "'" + typed + "' is no verb";
+  for (const auto& verb : verbs) {
+    if (edit_distance(typed, verb.name) <= 2) {
+      return message + "; did you mean '" + std::string(verb.name) + "'?";
+    }
+  }
+  return message;
+}
+
+std::string one_line(const CLI::ParseError& error) {
+  std::string text = error.what();
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  while (!text.empty() && (text.back() == ' ' || text.back() == '.')) text.pop_back();
+  return text;
+}
+
+}  // namespace
+
+Arguments::Arguments(Parser& parser)
+    : implementation_(std::make_unique<Implementation>(Implementation{parser.app, {}})) {}
+Arguments::~Arguments() = default;
+
+void Arguments::positional(const std::string& name, std::string& value, const std::string& help) {
+  implementation_->app.add_option(name, value, help)->required()->type_name("");
+}
+
+void Arguments::positionals(const std::string& name, std::vector<std::string>& values,
+                            const std::string& help) {
+  implementation_->app.add_option(name, values, help)->required()->type_name("");
+}
+
+void Arguments::option(const std::string& flag, std::string& value, const std::string& help) {
+  implementation_->app.add_option(flag, value, help)->type_name("TEXT");
+}
+
+void Arguments::required_option(const std::string& flag, std::string& value,
+                                const std::string& help) {
+  implementation_->app.add_option(flag, value, help)->type_name("FILE")->required();
+}
+
+void Arguments::option(const std::string& flag, std::optional<std::string>& value,
+                       const std::string& help) {
+  implementation_->app.add_option(flag, value, help)->type_name("TEXT");
+}
+
+void Arguments::option(const std::string& flag, std::optional<std::uint64_t>& value,
+                       const std::string& help) {
+  const std::string name = long_form(flag);
+  implementation_->app
+      .add_option_function<std::string>(
+          flag,
+          [&value, name](const std::string& text) {
+            std::uint64_t number = 0;
+            const auto [end, error] =
+                std::from_chars(text.data(), text.data() + text.size(), number);
+            if (error != std::errc() || end != text.data() + text.size()) {
+              throw UsageError(name + " is '" + text + "'; allowed: whole numbers from 0");
+            }
+            value = number;
+          },
+          help)
+      ->type_name("INT");
+}
+
+void Arguments::option(const std::string& flag, std::optional<double>& value,
+                       const std::string& help) {
+  const std::string name = long_form(flag);
+  implementation_->app
+      .add_option_function<std::string>(
+          flag, [&value, name](const std::string& text) { value = number_from_text(name, text); },
+          help)
+      ->type_name("NUMBER");
+}
+
+void Arguments::option(const std::string& flag, int& value, int low, const std::string& help) {
+  const std::string name = long_form(flag);
+  implementation_->app
+      .add_option_function<std::string>(
+          flag,
+          [&value, name, low](const std::string& text) { value = whole_number(name, text, low); },
+          help)
+      ->type_name("INT");
+}
+
+void Arguments::choice(const std::string& flag, std::string& value,
+                       std::vector<std::string> choices, const std::string& help) {
+  const std::string name = long_form(flag);
+  std::string all;
+  for (const auto& choice : choices) all += (all.empty() ? "" : ", ") + choice;
+  implementation_->app
+      .add_option_function<std::string>(
+          flag,
+          [&value, name, all, choices = std::move(choices)](const std::string& text) {
+            if (std::find(choices.begin(), choices.end(), text) == choices.end()) {
+              throw UsageError(name + " is '" + text + "'; allowed: " + all);
+            }
+            value = text;
+          },
+          help + " (" + all + ")")
+      ->type_name("NAME");
+}
+
+void Arguments::flag(const std::string& flag, bool& value, const std::string& help) {
+  implementation_->app.add_flag(flag, value, help);
+}
+
+void Arguments::add_section(const std::string& section, Visit visit, std::function<void()> check) {
+  auto& added = implementation_->sections.emplace_back(
+      Implementation::Section{section, std::move(visit), std::move(check), {}});
+  FlagDeclarer declarer(implementation_->app, "Options of [" + section + "]", added.texts);
+  added.visit(declarer);
+}
+
+void Arguments::resolve(const std::optional<std::string>& /*config*/) const {
+  for (const auto& section : implementation_->sections) {
+    TextApplier applier(section.texts);
+    section.visit(applier);
+    section.check();
+  }
+}
+
+std::string_view verb_in(std::span<const Verb> verbs, int argc, const char* const* argv) {
+  if (argc < 2) return {};
+  for (const auto& verb : verbs) {
+    if (verb.name == argv[1]) return verb.name;
+  }
+  return {};
+}
+
+std::optional<ParsedCommand> parse(std::span<const Verb> verbs, int argc, const char* const* argv) {
+  CLI::App app(
+      "Image-based memory for robot navigation from omnidirectional images: remembers what places "
+      "look like, and knows from that where the robot is and which way it faces.",
+      "panonav");
+  app.set_version_flag("--version", "panonav " PANONAV_VERSION, "Print the version and stop");
+  app.set_help_flag("-h,--help", "Print this help and stop");
+  app.get_formatter()->column_width(32);
+  app.footer(
+      "panonav VERB --help shows a verb's options with an example.\n"
+      "Exit codes: 0 done, 1 no answer (lost), 2 bad input, 3 fault of the program.");
+
+  if (argc >= 2 && argv[1][0] != '-' && verb_in(verbs, argc, argv).empty()) {
+    throw UsageError(unknown_verb(verbs, argv[1]));
+  }
+
+  struct Declared {
+    CLI::App* app;
+    CommonArguments common;
+    std::unique_ptr<Arguments> arguments;
+    Run run;
+  };
+  std::deque<Declared> declared;
+  for (const auto& verb : verbs) {
+    CLI::App* sub = app.add_subcommand(std::string(verb.name), std::string(verb.summary));
+    auto& entry = declared.emplace_back();
+    entry.app = sub;
+    Arguments::Parser parser{*sub};
+    entry.arguments = std::make_unique<Arguments>(parser);
+    entry.run = verb.declare(*entry.arguments);
+    sub->add_flag("--json", entry.common.json, "Results as JSON on standard output");
+    entry.arguments->option("--threads", entry.common.threads, 0,
+                            "Threads to use; 0 takes one per core (default 0)");
+    sub->add_option("--config", entry.common.config,
+                    "TOML file with a table for each group of options; flags win over it")
+        ->type_name("FILE");
+    std::string footer(verb.details);
+    if (!footer.empty()) footer += "\n\n";
+    sub->footer(footer + "Example:\n" + std::string(verb.example));
+  }
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& success) {  // --help, --version
+    app.exit(success, std::cout, std::cout);
+    return std::nullopt;
+  } catch (const CLI::ParseError& error) {
+    throw UsageError(one_line(error));
+  }
+  for (std::size_t i = 0; i < declared.size(); ++i) {
+    if (!declared[i].app->parsed()) continue;
+    const auto& entry = declared[i];
+    // The run keeps what it needs alive; the option structs that `resolve` fills belong to it.
+    entry.arguments->resolve(entry.common.config);
+    return ParsedCommand{verbs[i].name, entry.common, entry.run};
+  }
+  throw UsageError("a verb is missing");
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,97 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "panonav/core/options.hpp"
+#include "verb.hpp"
+
+namespace panonav::command {
+
+/// Wrong use of the command line. The message is one line; the caller adds where to find help.
+class UsageError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// What every verb takes.
+struct CommonArguments {
+  bool json = false;
+  int threads = 0;  ///< 0: one per core
+  std::optional<std::string> config;
+};
+
+/// The command line of one verb. Values are bound by reference and must live until the verb has
+/// run.
+class Arguments {
+ public:
+  struct Parser;  // hides the parser's header
+  explicit Arguments(Parser& parser);
+  ~Arguments();
+  Arguments(const Arguments&) = delete;
+  Arguments& operator=(const Arguments&) = delete;
+
+  /// Required, in the order of declaration.
+  void positional(const std::string& name, std::string& value, const std::string& help);
+  /// One or more; the last positional of a verb.
+  void positionals(const std::string& name, std::vector<std::string>& values,
+                   const std::string& help);
+  /// `flag` as typed, with its short form where there is one ("-o,--output").
+  void option(const std::string& flag, std::string& value, const std::string& help);
+  void required_option(const std::string& flag, std::string& value, const std::string& help);
+  void option(const std::string& flag, std::optional<std::string>& value, const std::string& help);
+  void option(const std::string& flag, std::optional<std::uint64_t>& value,
+              const std::string& help);
+  void option(const std::string& flag, std::optional<double>& value, const std::string& help);
+  /// Whole number from `low` on.
+  void option(const std::string& flag, int& value, int low, const std::string& help);
+  /// One of `choices`.
+  void choice(const std::string& flag, std::string& value, std::vector<std::string> choices,
+              const std::string& help);
+  void flag(const std::string& flag, bool& value, const std::string& help);
+
+  /// One flag for each member that visit_options shows: `cell_size_m` becomes `--cell-size-m`. The
+  /// same members are read from the table [`section`] of a --config file; flags win over the file,
+  /// the file over defaults.
+  template <class Options>
+  void options(const std::string& section, Options& values) {
+    add_section(
+        section, [&values](OptionVisitor& visitor) { visit_options(values, visitor); },
+        [&values] { validate(values); });
+  }
+
+  /// Fills the option structs once everything is typed: file first, then flags, then checks.
+  void resolve(const std::optional<std::string>& config) const;
+
+ private:
+  using Visit = std::function<void(OptionVisitor&)>;
+  void add_section(const std::string& section, Visit visit, std::function<void()> check);
+
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+/// A verb with its arguments filled in, ready to run.
+struct ParsedCommand {
+  std::string_view verb;
+  CommonArguments common;
+  Run run;
+};
+
+/// Reads the command line. Empty when --help or --version was asked for and has been printed to
+/// standard output. Throws UsageError on wrong use and panonav::Error on a wrong value.
+[[nodiscard]] std::optional<ParsedCommand> parse(std::span<const Verb> verbs, int argc,
+                                                 const char* const* argv);
+
+/// The name of the verb that the command line starts with, for messages; empty when there is none.
+[[nodiscard]] std::string_view verb_in(std::span<const Verb> verbs, int argc,
+                                       const char* const* argv);
+
+}  // namespace panonav::command

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <functional>
+#include <string_view>
+
+namespace panonav::command {
+
+class Arguments;
+class Session;
+
+/// What the program tells its caller.
+enum class ExitCode : int {
+  done = 0,
+  no_answer = 1,  ///< lost, no path; for a data set only if nothing at all was answered
+  bad_input = 2,  ///< one line on standard error says what is wrong
+  fault = 3,      ///< the program itself failed; never meant to happen
+};
+
+/// The work of a verb, once its arguments are known. Throws panonav::Error on bad input.
+using Run = std::function<ExitCode(Session&)>;
+
+/// One verb of the command line.
+struct Verb {
+  std::string_view name;
+  std::string_view summary;  ///< one plain line
+  std::string_view details;  ///< what a user must know beyond the options; may be empty
+  std::string_view example;  ///< one or more command lines that work as they stand
+  Run (*declare)(Arguments&);
+};
+
+}  // namespace panonav::command
