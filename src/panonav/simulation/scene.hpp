@@ -20,7 +20,8 @@ struct Vector3 {
 };
 
 /// How a surface looks: a colour times, where there is one, a texture that repeats every texture
-/// coordinate of 1. Linear 0 .. 1.
+/// coordinate of 1. Texture coordinate (0, 0) is the lower left corner of the picture, u runs to
+/// the right and v upwards. Linear 0 .. 1; matt, seen from both sides.
 struct Material {
   std::array<float, 3> colour{0.7F, 0.7F, 0.7F};
   std::shared_ptr<const Image> texture;  ///< null: plain colour
@@ -29,31 +30,55 @@ struct Material {
 
 /// Triangles of one material. `texture_coordinates` is empty or has one entry per vertex.
 struct Mesh {
-  std::string
-      object;  ///< which object of the scene it belongs to, for moving objects ("wall", "desk 3")
+  std::string object;  ///< which object of the scene it belongs to ("wall", "desk 3")
   int material = 0;
   std::vector<Vector3> vertices;
   std::vector<std::array<float, 2>> texture_coordinates;
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
+/// A lamp. A surface at distance d that faces it gets the light intensity / d^2, d in metres; a
+/// white surface in light 1 has the value 1.
 struct PointLight {
   Vector3 position;
   float intensity = 1.0F;
 };
 
-/// A world for the simulated robot. `floor` is what the robot may drive in: an axis-aligned
-/// rectangle, less the places where a mesh below the robot's height stands within its radius (see
-/// `FreeSpace`).
+/// Light from far away: a surface that faces it gets the light `intensity`.
+struct DirectionalLight {
+  Direction3 towards_light{0.0, 0.0, 1.0};
+  float intensity = 1.0F;
+};
+
+/// An axis-aligned rectangle of the floor.
+struct FloorArea {
+  Point2 low;
+  Point2 high;
+  friend bool operator==(const FloorArea&, const FloorArea&) = default;
+};
+
+/// A world for the simulated robot. The robot may drive in `floor_low` .. `floor_high`, and there
+/// only in the `drivable` areas if there are any, less the places where a mesh below the robot's
+/// height stands within its radius (see `FreeSpace`).
 struct Scene {
   std::string name;
   std::vector<Material> materials;
   std::vector<Mesh> meshes;
   std::vector<PointLight> lights;
-  float ambient = 0.5F;  ///< light that comes from everywhere
+  std::vector<DirectionalLight> directional_lights;
+  float ambient = 0.5F;  ///< light that comes from everywhere; less of it reaches corners
+  std::array<float, 3> background{0.75F, 0.8F, 0.85F};  ///< what a ray sees that hits nothing
   Point2 floor_low;
   Point2 floor_high;
+  std::vector<FloorArea> drivable;    ///< empty: the whole floor
+  std::vector<Point2> tour;           ///< a closed round trip through free space; may be empty
+  double camera_height_m = 0.6;       ///< viewpoint of the robot that the scene is made for
   std::vector<std::string> warnings;  ///< missing textures and the like; shown once by the command
 };
+
+/// Throws ContractError that names the mesh and what is wrong with it: an index out of range, a
+/// number of texture coordinates that is not the number of vertices, a coordinate that is not
+/// finite.
+void validate(const Scene& scene);
 
 }  // namespace panonav
