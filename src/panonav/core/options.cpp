@@ -9,7 +9,8 @@ namespace panonav {
 std::string range_text(const OptionInfo& info) {
   const bool has_low = std::isfinite(info.low);
   const bool has_high = std::isfinite(info.high);
-  const std::string low = (info.low_open ? "> " : ">= ") + to_text(info.low);
+  std::string low(info.low_open ? "> " : ">= ");
+  low += to_text(info.low);
   if (has_low && has_high) return low + " and <= " + to_text(info.high);
   if (has_low) return low;
   if (has_high) return "<= " + to_text(info.high);

@@ -1,0 +1,89 @@
+#include "panonav/core/options.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <limits>
+#include <string>
+#include <string_view>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav {
+namespace {
+
+constexpr std::array<std::string_view, 2> norms = {"l1", "l2"};
+
+struct SampleOptions {
+  int views = 3;
+  double radius_m = 0.5;
+  double tolerance = 0.0;
+  bool packed = true;
+  int norm = 0;
+};
+
+void visit_options(SampleOptions& options, OptionVisitor& visitor) {
+  visitor.visit({.name = "views", .help = "how many", .low = 1, .high = 9}, options.views);
+  visitor.visit({.name = "radius_m", .help = "how far", .low = 0, .low_open = true},
+                options.radius_m);
+  visitor.visit({.name = "tolerance", .help = "any number"}, options.tolerance);
+  visitor.visit({.name = "packed", .help = "or not"}, options.packed);
+  visitor.visit({.name = "norm", .help = "which"}, norms, options.norm);
+}
+
+std::string fault_of(const SampleOptions& options) {
+  try {
+    validate(options);
+  } catch (const OptionError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Options, DefaultsAndBordersAreValid) {
+  EXPECT_EQ(fault_of({}), "");
+  EXPECT_EQ(fault_of({.views = 1}), "");
+  EXPECT_EQ(fault_of({.views = 9}), "");
+  EXPECT_EQ(fault_of({.tolerance = -1e300}), "");
+  EXPECT_EQ(fault_of({.norm = 1}), "");
+}
+
+TEST(Options, NamesFieldValueAndRange) {
+  EXPECT_EQ(fault_of({.views = 10}), "views is 10; allowed: >= 1 and <= 9");
+  EXPECT_EQ(fault_of({.views = 0}), "views is 0; allowed: >= 1 and <= 9");
+  EXPECT_EQ(fault_of({.radius_m = 0.0}), "radius_m is 0; allowed: > 0");
+  EXPECT_EQ(fault_of({.norm = 2}), "norm is 2; allowed: l1 l2");
+  EXPECT_EQ(fault_of({.norm = -1}), "norm is -1; allowed: l1 l2");
+}
+
+TEST(Options, RefusesWhatIsNotAFiniteNumber) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(fault_of({.radius_m = infinity}), "radius_m is inf; allowed: > 0");
+  EXPECT_EQ(fault_of({.tolerance = std::numeric_limits<double>::quiet_NaN()}),
+            "tolerance is nan; allowed: any finite number");
+}
+
+TEST(Options, ReportsAllFaultsInOneLine) {
+  const std::string text = fault_of({.views = -4, .radius_m = -1.0, .norm = 7});
+  EXPECT_EQ(text,
+            "views is -4; allowed: >= 1 and <= 9; radius_m is -1; allowed: > 0; norm is 7; "
+            "allowed: l1 l2");
+  EXPECT_EQ(text.find('\n'), std::string::npos);
+}
+
+TEST(Errors, CarryOneLineWithFieldValueAndRange) {
+  EXPECT_STREQ(ContractError("rows", 0.0, ">= 1").what(), "rows is 0; allowed: >= 1");
+  EXPECT_STREQ(FileError("a/b.png", "no such file").what(), "a/b.png: no such file");
+  EXPECT_NO_THROW(require(true, "x", 1.0, "1"));
+  EXPECT_THROW(require(false, "x", 1.0, "2"), Error);
+}
+
+TEST(Errors, TextOfANumberReadsBackAsTheSameNumber) {
+  for (const double value : {0.0, 0.1, -1.0 / 3.0, 1e-300, 123456789.0, 6.02e23}) {
+    EXPECT_EQ(std::stod(to_text(value)), value);
+  }
+  EXPECT_EQ(to_text(0.5), "0.5");
+}
+
+}  // namespace
+}  // namespace panonav
