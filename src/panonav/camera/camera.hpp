@@ -1,10 +1,12 @@
 #pragma once
 
 #include <optional>
-#include <string>
 #include <variant>
-#include <vector>
 
+#include "panonav/camera/equiangular_model.hpp"
+#include "panonav/camera/hyperboloidal_model.hpp"
+#include "panonav/camera/polynomial_model.hpp"
+#include "panonav/camera/unified_model.hpp"
 #include "panonav/core/image.hpp"
 #include "panonav/geometry/pose2.hpp"
 
@@ -17,41 +19,8 @@ struct PixelPoint {
   friend bool operator==(const PixelPoint&, const PixelPoint&) = default;
 };
 
-/// Hyperboloidal mirror with a single viewpoint above a perspective camera, X^2+Y^2 over a^2 minus
-/// Z^2 over b^2 = -1, c^2 = a^2 + b^2 [Y03 eq. 1-4, corrected]. Valid: elevations that the mirror
-/// reflects into the lens.
-struct HyperboloidalModel {
-  double a_mm = 28.095;
-  double b_mm = 23.4125;
-  double focal_length_px = 500.0;
-  friend bool operator==(const HyperboloidalModel&, const HyperboloidalModel&) = default;
-};
-
-/// Scaramuzza's general polynomial: a pixel at distance r from the centre looks along (r, f(r))
-/// with f(r) = sum_i coefficients[i] r^i; positive f(r) looks down (the mirror stands above the
-/// camera).
-struct PolynomialModel {
-  std::vector<double> coefficients;
-  friend bool operator==(const PolynomialModel&, const PolynomialModel&) = default;
-};
-
-/// Unified central model (Mei): unit sphere, then perspective from a point xi above its centre.
-struct UnifiedModel {
-  double xi = 1.0;
-  double focal_length_px = 300.0;
-  friend bool operator==(const UnifiedModel&, const UnifiedModel&) = default;
-};
-
-/// Elevation is linear in the distance from the centre: `elevation_at_inner_rad` on the inner
-/// radius, `elevation_at_rim_rad` on the rim. What is left when a mirror's shape is unknown.
-struct EquiangularModel {
-  double elevation_at_inner_rad = 0.0;
-  double elevation_at_rim_rad = 0.0;
-  friend bool operator==(const EquiangularModel&, const EquiangularModel&) = default;
-};
-
 /// A 360 degree picture or a ready-made panorama: columns are azimuths, rows are elevations, both
-/// linear.
+/// linear. The width is one full turn. Valid: elevations from bottom to top.
 struct EquirectangularModel {
   double elevation_bottom_rad = -1.5707963267948966;  ///< of the picture's lower edge
   double elevation_top_rad = 1.5707963267948966;      ///< of the picture's upper edge
@@ -64,20 +33,24 @@ using CameraModel = std::variant<HyperboloidalModel, PolynomialModel, UnifiedMod
 enum class ColumnDirection { clockwise, counter_clockwise };
 
 /// A camera that sees all azimuths: how its pixels and the directions in the robot frame belong
-/// together. The mirror's axis is vertical. Invariant checked by `validate(const Camera&)`.
+/// together. The mirror's axis is vertical. Invariant checked by `validate(const Camera&)`; the
+/// functions below expect a valid camera.
 struct Camera {
   CameraModel model;
   ImageSize image_size;
   // Mirror cameras (all models but equirectangular):
-  PixelPoint centre;
+  PixelPoint centre;             ///< inside the image
   double rim_radius_px = 0.0;    ///< nothing is seen beyond
   double inner_radius_px = 0.0;  ///< nothing is seen within (the camera's own reflection)
-  /// How azimuth runs in the picture, seen as it is shown (u right, v down). A mirror image seen
-  /// from below runs the other way than the world seen from above.
-  ColumnDirection direction = ColumnDirection::counter_clockwise;
+  /// How azimuth runs in the picture as it is shown (u right, v down). Equirectangular: clockwise
+  /// means that the columns, left to right, follow a turn to the right seen from above. A camera
+  /// that looks up, at a mirror or through a fisheye lens, sees the world from below: clockwise,
+  /// unless its driver mirrors the picture. So do most 360 degree pictures.
+  ColumnDirection direction = ColumnDirection::clockwise;
   /// Mirror: image angle of the robot's forward direction, counter-clockwise as shown, from +u.
   double forward_angle_rad = 0.0;
-  /// Equirectangular: fraction of the width, between its outer edges, that looks along the heading.
+  /// Equirectangular: fraction of the width, between its outer edges, that looks along the heading;
+  /// 0 to 1.
   double forward_column = 0.5;
   friend bool operator==(const Camera&, const Camera&) = default;
 };
@@ -85,10 +58,15 @@ struct Camera {
 /// Throws ContractError that names the field, its value and its range.
 void validate(const Camera& camera);
 
-/// Where a direction in the robot frame is seen; empty where the camera does not see it.
+/// Where a direction in the robot frame is seen; empty where the camera does not see it: outside
+/// the image, outside inner radius to rim, outside the model's domain, or for a direction without
+/// length or with values that are not finite. Borders belong to the domain; rounding up to 1e-9 of
+/// the image's size beyond them is forgiven and clamped. u of an equirectangular picture is in [0,
+/// width). Cost: some ten arithmetic and four trigonometric operations; polynomials ten evaluations
+/// more.
 [[nodiscard]] std::optional<PixelPoint> project(const Camera& camera, const Direction3& direction);
 
-/// The unit direction in which a point of the image looks; empty outside the valid domain.
+/// The unit direction in which a point of the image looks; empty outside the same domain.
 [[nodiscard]] std::optional<Direction3> unproject(const Camera& camera, PixelPoint pixel);
 
 /// Lowest and highest elevation that is seen at every azimuth, in radians.
@@ -97,6 +75,8 @@ struct ElevationBand {
   double top_rad = 0.0;
   friend bool operator==(const ElevationBand&, const ElevationBand&) = default;
 };
+/// Where the frame cuts the mirror, the band ends where the cut begins. Throws ContractError when
+/// no elevation is seen at every azimuth (the frame cuts even the inner radius).
 [[nodiscard]] ElevationBand visible_elevations(const Camera& camera);
 
 }  // namespace panonav

@@ -1,0 +1,185 @@
+#include "panonav/camera/camera.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+template <class... Functions>
+struct Overloaded : Functions... {
+  using Functions::operator()...;
+};
+
+/// How far beyond a border rounding may carry a value, relative to the image's size.
+constexpr double border_tolerance = 1e-9;
+
+double tolerance_px(const Camera& camera) {
+  return border_tolerance * std::max(camera.image_size.width, camera.image_size.height);
+}
+
+/// The value within [low, high], or empty where it lies beyond by more than the tolerance (or is
+/// NaN).
+std::optional<double> within(double value, double low, double high, double tolerance) {
+  if (!(value >= low - tolerance && value <= high + tolerance)) return std::nullopt;
+  return std::clamp(value, low, high);
+}
+
+std::optional<PixelPoint> within_image(const Camera& camera, PixelPoint pixel) {
+  const double tolerance = tolerance_px(camera);
+  const auto u = within(pixel.u_px, 0, camera.image_size.width, tolerance);
+  const auto v = within(pixel.v_px, 0, camera.image_size.height, tolerance);
+  if (!u || !v) return std::nullopt;
+  return PixelPoint{*u, *v};
+}
+
+/// Elevation at a distance from the centre within [inner, rim]; mirror cameras only.
+std::optional<double> elevation_at(const Camera& camera, double radius_px) {
+  const auto r =
+      within(radius_px, camera.inner_radius_px, camera.rim_radius_px, tolerance_px(camera));
+  if (!r) return std::nullopt;
+  return std::visit(
+      Overloaded{[&](const EquiangularModel& model) -> std::optional<double> {
+                   return panonav::elevation_at(model, *r, camera.inner_radius_px,
+                                                camera.rim_radius_px);
+                 },
+                 [](const EquirectangularModel&) -> std::optional<double> { return std::nullopt; },
+                 [&](const auto& model) { return panonav::elevation_at(model, *r); }},
+      camera.model);
+}
+
+/// Distance from the centre within [inner, rim] at which an elevation is seen; mirror cameras only.
+std::optional<double> radius_at(const Camera& camera, double elevation_rad) {
+  const double inner_px = camera.inner_radius_px;
+  const double rim_px = camera.rim_radius_px;
+  const double slack_px = tolerance_px(camera);
+  const std::optional<double> r = std::visit(
+      Overloaded{[&](const EquiangularModel& model) -> std::optional<double> {
+                   return panonav::radius_at(model, elevation_rad, inner_px, rim_px);
+                 },
+                 [](const EquirectangularModel&) -> std::optional<double> { return std::nullopt; },
+                 [&](const PolynomialModel& model) {
+                   return panonav::radius_at(model, elevation_rad,
+                                             std::max(0.0, inner_px - slack_px), rim_px + slack_px);
+                 },
+                 [&](const auto& model) { return panonav::radius_at(model, elevation_rad); }},
+      camera.model);
+  if (!r) return std::nullopt;
+  return within(*r, inner_px, rim_px, slack_px);
+}
+
+/// +1 where azimuth runs counter-clockwise in the picture as shown, or rises with u; else -1.
+double turn_sign(const Camera& camera) {
+  return camera.direction == ColumnDirection::counter_clockwise ? 1.0 : -1.0;
+}
+
+void validate_mirror(const Camera& camera) {
+  const auto [width, height] = camera.image_size;
+  require(camera.centre.u_px >= 0 && camera.centre.u_px <= width, "centre.u_px", camera.centre.u_px,
+          "0 .. " + to_text(width));
+  require(camera.centre.v_px >= 0 && camera.centre.v_px <= height, "centre.v_px",
+          camera.centre.v_px, "0 .. " + to_text(height));
+  require(std::isfinite(camera.inner_radius_px) && camera.inner_radius_px >= 0, "inner_radius_px",
+          camera.inner_radius_px, "finite and at least 0");
+  require(std::isfinite(camera.rim_radius_px) && camera.rim_radius_px > camera.inner_radius_px,
+          "rim_radius_px", camera.rim_radius_px,
+          "finite and above inner_radius_px " + to_text(camera.inner_radius_px));
+  require(std::isfinite(camera.forward_angle_rad), "forward_angle_rad", camera.forward_angle_rad,
+          "finite");
+  std::visit(
+      Overloaded{[&](const PolynomialModel& model) {
+                   validate(model, camera.inner_radius_px, camera.rim_radius_px);
+                 },
+                 [](const EquirectangularModel&) {}, [](const auto& model) { validate(model); }},
+      camera.model);
+  require(elevation_at(camera, camera.rim_radius_px).has_value(), "rim_radius_px",
+          camera.rim_radius_px, "within the valid domain of the camera's model");
+}
+
+void validate_equirectangular(const Camera& camera, const EquirectangularModel& model) {
+  require(std::abs(model.elevation_bottom_rad) <= pi / 2, "elevation_bottom_rad",
+          model.elevation_bottom_rad, "-pi/2 .. pi/2");
+  require(model.elevation_top_rad > model.elevation_bottom_rad && model.elevation_top_rad <= pi / 2,
+          "elevation_top_rad", model.elevation_top_rad, "above elevation_bottom_rad, at most pi/2");
+  require(camera.forward_column >= 0 && camera.forward_column <= 1, "forward_column",
+          camera.forward_column, "0 .. 1");
+}
+
+}  // namespace
+
+void validate(const Camera& camera) {
+  require(camera.image_size.width >= 1, "image_size.width", camera.image_size.width, "at least 1");
+  require(camera.image_size.height >= 1, "image_size.height", camera.image_size.height,
+          "at least 1");
+  if (const auto* model = std::get_if<EquirectangularModel>(&camera.model)) {
+    validate_equirectangular(camera, *model);
+  } else {
+    validate_mirror(camera);
+  }
+}
+
+std::optional<PixelPoint> project(const Camera& camera, const Direction3& direction) {
+  const double length = std::hypot(direction.x, direction.y, direction.z);
+  if (!std::isfinite(length) || length == 0) return std::nullopt;
+  const double azimuth_rad = direction.azimuth_rad();
+  const double elevation_rad = direction.elevation_rad();
+  if (const auto* model = std::get_if<EquirectangularModel>(&camera.model)) {
+    const double height = camera.image_size.height;
+    const double width = camera.image_size.width;
+    const double v_px = (model->elevation_top_rad - elevation_rad) /
+                        (model->elevation_top_rad - model->elevation_bottom_rad) * height;
+    const auto v = within(v_px, 0, height, tolerance_px(camera));
+    if (!v) return std::nullopt;
+    double turns = camera.forward_column + turn_sign(camera) * azimuth_rad / (2 * pi);
+    turns -= std::floor(turns);
+    const double u_px = turns * width;
+    return PixelPoint{u_px < width ? u_px : 0.0, *v};
+  }
+  const auto radius_px = radius_at(camera, elevation_rad);
+  if (!radius_px) return std::nullopt;
+  const double angle_rad = camera.forward_angle_rad + turn_sign(camera) * azimuth_rad;
+  return within_image(camera, {camera.centre.u_px + *radius_px * std::cos(angle_rad),
+                               camera.centre.v_px - *radius_px * std::sin(angle_rad)});
+}
+
+std::optional<Direction3> unproject(const Camera& camera, PixelPoint pixel) {
+  const auto inside = within_image(camera, pixel);
+  if (!inside) return std::nullopt;
+  if (const auto* model = std::get_if<EquirectangularModel>(&camera.model)) {
+    const double t = inside->v_px / camera.image_size.height;
+    const double elevation_rad =
+        model->elevation_top_rad * (1 - t) + model->elevation_bottom_rad * t;
+    const double turns = inside->u_px / camera.image_size.width - camera.forward_column;
+    return Direction3::from_angles(turn_sign(camera) * turns * 2 * pi, elevation_rad);
+  }
+  const double right_px = inside->u_px - camera.centre.u_px;
+  const double up_px = camera.centre.v_px - inside->v_px;
+  const auto elevation_rad = elevation_at(camera, std::hypot(right_px, up_px));
+  if (!elevation_rad) return std::nullopt;
+  const double angle_rad = std::atan2(up_px, right_px);
+  return Direction3::from_angles(turn_sign(camera) * (angle_rad - camera.forward_angle_rad),
+                                 *elevation_rad);
+}
+
+ElevationBand visible_elevations(const Camera& camera) {
+  if (const auto* model = std::get_if<EquirectangularModel>(&camera.model)) {
+    return {model->elevation_bottom_rad, model->elevation_top_rad};
+  }
+  const auto [width, height] = camera.image_size;
+  const double outer_px =
+      std::min({camera.rim_radius_px, camera.centre.u_px, width - camera.centre.u_px,
+                camera.centre.v_px, height - camera.centre.v_px});
+  require(outer_px > camera.inner_radius_px, "distance from the centre to the frame", outer_px,
+          "above inner_radius_px " + to_text(camera.inner_radius_px));
+  const double at_inner_rad = elevation_at(camera, camera.inner_radius_px).value();
+  const double at_outer_rad = elevation_at(camera, outer_px).value();
+  return {std::min(at_inner_rad, at_outer_rad), std::max(at_inner_rad, at_outer_rad)};
+}
+
+}  // namespace panonav

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <optional>
+
+namespace panonav {
+
+/// Hyperboloidal mirror with a single viewpoint above a perspective camera [Y03 eq. 1-4,
+/// corrected]. The mirror is the sheet Z > 0 of (X^2 + Y^2) / a^2 - Z^2 / b^2 = -1; its focus (0,
+/// 0, c) with c^2 = a^2 + b^2 is the viewpoint, the lens lies in the other focus (0, 0, -c) and
+/// looks up. Only the ratio of a and b changes the picture. Valid: distances from the centre in [0,
+/// focal_length_px * a / b), elevations in [-pi/2, atan(b / a)).
+struct HyperboloidalModel {
+  double a_mm = 28.095;            ///< > 0
+  double b_mm = 23.4125;           ///< > 0
+  double focal_length_px = 500.0;  ///< > 0, of the perspective camera
+  friend bool operator==(const HyperboloidalModel&, const HyperboloidalModel&) = default;
+};
+
+/// Throws ContractError that names the field, its value and its range.
+void validate(const HyperboloidalModel& model);
+
+/// Elevation (up is positive) in which a point of the image `radius_px` from the centre looks
+/// [Y03 eq. 3 with gamma = atan(f / r), the angle between the lens's ray and the image plane].
+/// Empty outside the valid domain.
+[[nodiscard]] std::optional<double> elevation_at(const HyperboloidalModel& model, double radius_px);
+
+/// Distance from the centre at which an elevation is seen; the inverse of `elevation_at`. On the
+/// horizon it is [Y03 eq. 4] for a far point: a^2 f / (2 b c). Empty outside the valid domain.
+[[nodiscard]] std::optional<double> radius_at(const HyperboloidalModel& model,
+                                              double elevation_rad);
+
+}  // namespace panonav
