@@ -47,7 +47,10 @@ void FaultCollector::visit(const OptionInfo& info, std::span<const std::string_v
 void FaultCollector::finish() const {
   if (faults_.empty()) return;
   std::string text;
-  for (const auto& fault : faults_) text += (text.empty() ? "" : "; ") + fault;
+  for (const auto& fault : faults_) {
+    if (!text.empty()) text += "; ";
+    text += fault;
+  }
   throw OptionError(text);
 }
 
