@@ -1,0 +1,125 @@
+#include "command_runner.hpp"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <sstream>
+#include <stdexcept>
+
+namespace panonav::testing {
+
+namespace {
+
+struct Pipe {
+  std::array<int, 2> ends{-1, -1};
+  Pipe() {
+    if (pipe2(ends.data(), O_CLOEXEC) != 0) throw std::runtime_error("no pipe");
+  }
+};
+
+[[noreturn]] void become_panonav(const std::vector<std::string>& arguments,
+                                 const CommandOptions& options, int out, int err) {
+  dup2(out, STDOUT_FILENO);
+  dup2(err, STDERR_FILENO);
+  if (options.file_size_limit_bytes) {
+    const rlimit limit{*options.file_size_limit_bytes, *options.file_size_limit_bytes};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  std::vector<char*> argv;
+  std::string program = PANONAV_COMMAND;
+  argv.push_back(program.data());
+  for (const auto& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
+  argv.push_back(nullptr);
+  execv(program.c_str(), argv.data());
+  _exit(127);
+}
+
+}  // namespace
+
+CommandResult run_panonav(const std::vector<std::string>& arguments,
+                          const CommandOptions& options) {
+  Pipe out;
+  Pipe err;
+  const pid_t child = fork();
+  if (child < 0) throw std::runtime_error("no process");
+  if (child == 0) become_panonav(arguments, options, out.ends[1], err.ends[1]);
+  close(out.ends[1]);
+  close(err.ends[1]);
+
+  CommandResult result;
+  const auto start = std::chrono::steady_clock::now();
+  bool killed = false;
+  std::array<pollfd, 2> polled{pollfd{out.ends[0], POLLIN, 0}, pollfd{err.ends[0], POLLIN, 0}};
+  std::array<std::string*, 2> texts{&result.out, &result.err};
+  int open_ends = 2;
+  while (open_ends > 0) {
+    poll(polled.data(), polled.size(), 2);
+    for (std::size_t i = 0; i < polled.size(); ++i) {
+      if (polled[i].fd < 0 || polled[i].revents == 0) continue;
+      std::array<char, 65536> buffer{};
+      const auto count = read(polled[i].fd, buffer.data(), buffer.size());
+      if (count > 0) {
+        texts[i]->append(buffer.data(), static_cast<std::size_t>(count));
+      } else {
+        close(polled[i].fd);
+        polled[i].fd = -1;
+        --open_ends;
+      }
+    }
+    const auto elapsed = std::chrono::steady_clock::now() - start;
+    if (options.kill_after_ms && !killed &&
+        elapsed >= std::chrono::milliseconds(*options.kill_after_ms)) {
+      kill(child, SIGKILL);
+      killed = true;
+    }
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  if (WIFEXITED(status)) result.exit_code = WEXITSTATUS(status);
+  if (WIFSIGNALED(status)) result.signal = WTERMSIG(status);
+  return result;
+}
+
+std::string refusal(const std::vector<std::string>& arguments, const CommandOptions& options) {
+  const auto result = run_panonav(arguments, options);
+  EXPECT_EQ(result.exit_code, 2) << result.out << result.err;
+  const auto said = lines(result.err);
+  EXPECT_EQ(said.size(), 1U) << result.err;
+  return said.empty() ? std::string() : said.front();
+}
+
+std::vector<std::string> lines(const std::string& text) {
+  std::vector<std::string> found;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) found.push_back(line);
+  return found;
+}
+
+TemporaryFolder::TemporaryFolder() {
+  std::string pattern = (std::filesystem::temp_directory_path() / "panonav-test-XXXXXX").string();
+  if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no temporary folder");
+  path_ = pattern;
+}
+
+TemporaryFolder::~TemporaryFolder() {
+  std::error_code ignored;
+  std::filesystem::remove_all(path_, ignored);
+}
+
+std::optional<std::filesystem::path> real_data(const std::string& folder) {
+  const char* root = std::getenv("PANONAV_DATA");
+  if (root == nullptr) return std::nullopt;
+  const auto path = std::filesystem::path(root) / folder;
+  if (!std::filesystem::is_directory(path)) return std::nullopt;
+  return path;
+}
+
+}  // namespace panonav::testing
