@@ -1,0 +1,236 @@
+#include "panonav/io/image_file.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "io/picture_samples.hpp"
+#include "io/temporary_folder.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/io/atomic_file.hpp"
+
+namespace panonav {
+namespace {
+
+using test::make_jpeg;
+using test::make_png;
+using test::message_of;
+using test::random_image;
+using test::smooth_image;
+using test::TemporaryFolder;
+
+using Bytes = std::vector<std::uint8_t>;
+
+TEST(ImageFile, PngComesBackAsItWasWritten) {
+  Random random(1);
+  const TemporaryFolder folder;
+  for (const int channels : {1, 3}) {
+    for (const ImageSize size : {ImageSize{1, 1}, ImageSize{7, 3}, ImageSize{640, 48}}) {
+      const Image image = random_image(random, size.width, size.height, channels);
+      const auto path = folder / "picture.png";
+      write_png(path, image.view());
+      EXPECT_EQ(read_image(path), image);
+      EXPECT_EQ(read_image_size(path), size);
+    }
+  }
+}
+
+TEST(ImageFile, StrideOfAViewIsRespected) {
+  Random random(2);
+  const Image image = random_image(random, 20, 10, 3);
+  const ImageView part{image.view().data + 3 * 3, 5, 10, 3, image.view().stride};
+  const Image back = decode_image(encode_png(part), "part");
+  ASSERT_EQ(back.size(), (ImageSize{5, 10}));
+  for (int v = 0; v < 10; ++v) {
+    for (int u = 0; u < 5; ++u) {
+      for (int c = 0; c < 3; ++c) ASSERT_EQ(back.at(u, v, c), image.at(u + 3, v, c));
+    }
+  }
+}
+
+TEST(ImageFile, PngOfAnyDepthAndColourType) {
+  // 10 pixels 1010001101, one bit each.
+  const Image bits =
+      decode_image(make_png(10, 1, PNG_COLOR_TYPE_GRAY, 1, {{0b10100011, 0b01000000}}), "1");
+  EXPECT_EQ(bits, Image(10, 1, 1, Bytes{255, 0, 255, 0, 0, 0, 255, 255, 0, 255}));
+  const Image nibbles = decode_image(make_png(2, 1, PNG_COLOR_TYPE_GRAY, 4, {{0x0F}}), "4");
+  EXPECT_EQ(nibbles, Image(2, 1, 1, Bytes{0, 255}));
+  // 0x0000, 0x7FFF, 0xFFFF scale to 0, 127 or 128, 255.
+  const Image deep = decode_image(
+      make_png(3, 1, PNG_COLOR_TYPE_GRAY, 16, {{0x00, 0x00, 0x7F, 0xFF, 0xFF, 0xFF}}), "16");
+  EXPECT_EQ(deep.at(0, 0), 0);
+  EXPECT_NEAR(deep.at(1, 0), 127.5, 0.6);
+  EXPECT_EQ(deep.at(2, 0), 255);
+  const Image palette = decode_image(
+      make_png(3, 1, PNG_COLOR_TYPE_PALETTE, 2, {{0b00011000}}, {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}}),
+      "palette");
+  EXPECT_EQ(palette, Image(3, 1, 3, Bytes{1, 2, 3, 4, 5, 6, 7, 8, 9}));
+  // The colour under a transparent pixel stays.
+  const Image alpha = decode_image(
+      make_png(2, 1, PNG_COLOR_TYPE_RGB_ALPHA, 8, {{9, 8, 7, 0, 6, 5, 4, 255}}), "alpha");
+  EXPECT_EQ(alpha, Image(2, 1, 3, Bytes{9, 8, 7, 6, 5, 4}));
+  const Image grey_alpha =
+      decode_image(make_png(2, 1, PNG_COLOR_TYPE_GRAY_ALPHA, 8, {{9, 0, 6, 255}}), "grey alpha");
+  EXPECT_EQ(grey_alpha, Image(2, 1, 1, Bytes{9, 6}));
+}
+
+TEST(ImageFile, InterlacedPngIsTheSamePicture) {
+  Random random(3);
+  const Image image = random_image(random, 33, 17, 1);
+  std::vector<Bytes> rows;
+  for (int v = 0; v < 17; ++v) {
+    const auto row = image.pixels().subspan(static_cast<std::size_t>(v) * 33, 33);
+    rows.emplace_back(row.begin(), row.end());
+  }
+  EXPECT_EQ(decode_image(make_png(33, 17, PNG_COLOR_TYPE_GRAY, 8, rows, {}, PNG_INTERLACE_ADAM7),
+                         "adam7"),
+            image);
+}
+
+TEST(ImageFile, JpegIsNearTheSource) {
+  for (const int channels : {1, 3}) {
+    for (const bool progressive : {false, true}) {
+      const Image image = smooth_image(61, 35, channels);
+      const Bytes bytes = make_jpeg(image, 95, progressive);
+      const Image back = decode_image(bytes, "smooth");
+      ASSERT_EQ(back.size(), image.size());
+      ASSERT_EQ(back.channels(), channels);
+      double difference = 0.0;
+      for (std::size_t i = 0; i < image.pixels().size(); ++i) {
+        difference += std::abs(image.pixels()[i] - back.pixels()[i]);
+      }
+      EXPECT_LT(difference / static_cast<double>(image.pixels().size()), 2.0);
+    }
+  }
+}
+
+std::vector<Bytes> sample_files(Random& random) {
+  const Image noise = random_image(random, 40, 30, 1);
+  const Image smooth = smooth_image(40, 30, 3);
+  return {encode_png(noise.view()), encode_png(smooth.view()), make_jpeg(smooth, 90, false),
+          make_jpeg(smooth_image(40, 30, 1), 90, true)};
+}
+
+// Whatever the bytes: a picture or one FileError of one line, never anything else.
+std::size_t decode_and_count_errors(const Bytes& bytes) {
+  try {
+    const Image image = decode_image(bytes, "fuzz");
+    EXPECT_GE(image.width(), 1);
+    return 0;
+  } catch (const FileError& error) {
+    const std::string message = error.what();
+    EXPECT_EQ(message.rfind("fuzz: ", 0), 0U) << message;
+    EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+    return 1;
+  }
+}
+
+TEST(ImageFile, CutFilesAreRefused) {
+  Random random(4);
+  const std::vector<Bytes> files = sample_files(random);
+  for (const Bytes& file : files) {
+    ASSERT_EQ(decode_and_count_errors(file), 0U);
+    // The last two bytes of a JPEG are its end marker, which readers may do without.
+    for (std::size_t size = 0; size + 2 < file.size(); size += 1 + size / 64) {
+      EXPECT_EQ(
+          decode_and_count_errors({file.begin(), file.begin() + static_cast<std::ptrdiff_t>(size)}),
+          1U)
+          << size << " of " << file.size();
+    }
+  }
+}
+
+TEST(ImageFile, DamagedBytesNeverCrash) {
+  Random random(5);
+  const std::vector<Bytes> files = sample_files(random);
+  std::size_t refused = 0;
+  for (const Bytes& file : files) {
+    for (int trial = 0; trial < 500; ++trial) {
+      Bytes damaged = file;
+      const auto changes = 1 + random.index(8);
+      for (std::uint64_t i = 0; i < changes; ++i) {
+        damaged[random.index(damaged.size())] = static_cast<std::uint8_t>(random.index(256));
+      }
+      refused += decode_and_count_errors(damaged);
+    }
+  }
+  EXPECT_GT(refused, 100U);
+  for (int trial = 0; trial < 300; ++trial) {
+    Bytes noise = trial % 2 == 0 ? Bytes{0x89, 'P', 'N', 'G', 0x0D, 0x0A, 0x1A, 0x0A}
+                                 : Bytes{0xFF, 0xD8, 0xFF};
+    const auto size = random.index(300);
+    for (std::uint64_t i = 0; i < size; ++i)
+      noise.push_back(static_cast<std::uint8_t>(random.index(256)));
+    EXPECT_EQ(decode_and_count_errors(noise), 1U);
+  }
+}
+
+TEST(ImageFile, SizesAreBounded) {
+  // Only the head is changed: a small file that promises an enormous picture.
+  Bytes file = make_jpeg(smooth_image(16, 16, 1), 90, false);
+  const Bytes start_of_frame{0xFF, 0xC0};
+  const auto at =
+      std::search(file.begin(), file.end(), start_of_frame.begin(), start_of_frame.end());
+  ASSERT_NE(at, file.end());
+  for (int i = 5; i < 9; ++i) *(at + i) = 0xFD;
+  EXPECT_NE(message_of<FileError>([&] {
+              (void)decode_image(file, "huge.jpg");
+            }).find("huge.jpg: picture is 65021 x 65021 px; allowed:"),
+            std::string::npos);
+}
+
+TEST(ImageFile, ClearLinesForWhatIsNoPicture) {
+  const TemporaryFolder folder;
+  EXPECT_NE(message_of<FileError>([&] {
+              (void)read_image(folder / "none.png");
+            }).find("none.png: cannot be read: No such file"),
+            std::string::npos);
+  EXPECT_NE(message_of<FileError>([&] { (void)read_image(folder.path()); }).find("is a folder"),
+            std::string::npos);
+  EXPECT_NE(message_of<FileError>([&] {
+              (void)read_image(folder.write("empty.png", ""));
+            }).find("is empty"),
+            std::string::npos);
+  EXPECT_NE(message_of<FileError>([&] {
+              (void)read_image(folder.write("text.png", "hello"));
+            }).find("allowed: PNG, JPEG"),
+            std::string::npos);
+}
+
+TEST(AtomicFile, ReplacesWholeAndLeavesNothingBehind) {
+  const TemporaryFolder folder;
+  const auto path = folder / "a.txt";
+  write_file(path, "first");
+  write_file(path, "second, longer");
+  const auto bytes = read_file(path, 100);
+  EXPECT_EQ(std::string(bytes.begin(), bytes.end()), "second, longer");
+  EXPECT_THROW((void)read_file(path, 3), FileError);
+  std::filesystem::create_symlink("a.txt", folder / "link");
+  write_file(folder / "link", "third");
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
+  EXPECT_EQ(read_file(path, 100).size(), 5U);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 2);
+}
+
+TEST(AtomicFile, AFailureLeavesTheOldFile) {
+  const TemporaryFolder folder;
+  EXPECT_THROW(write_file(folder / "no" / "a.txt", "x"), FileError);
+  EXPECT_THROW(write_file(folder.path(), "x"), FileError);
+  write_file("/dev/null", "x");
+  EXPECT_FALSE(std::filesystem::is_regular_file("/dev/null"));
+}
+
+TEST(ImageFile, RealPictures) {
+  const char* data = std::getenv("PANONAV_DATA");
+  if (data == nullptr) GTEST_SKIP() << "PANONAV_DATA is not set: no real pictures to read";
+  const std::filesystem::path root(data);
+  EXPECT_EQ(read_image(root / "mirror_raw" / "KaidanOmni1.jpg").size(), (ImageSize{640, 480}));
+  const Image plants = read_image(root / "gantry_plants" / "im_001_001_001.png");
+  EXPECT_EQ(plants.size(), (ImageSize{90, 7}));
+  for (const std::uint8_t value : plants.pixels()) ASSERT_TRUE(value == 0 || value == 255);
+}
+
+}  // namespace
+}  // namespace panonav
