@@ -1,0 +1,105 @@
+#include "panonav/motion/odometry.hpp"
+
+#include <array>
+#include <cmath>
+
+namespace panonav {
+
+std::vector<Pose2> steps_between(std::span<const Pose2> world_from_robot) {
+  std::vector<Pose2> steps;
+  for (std::size_t i = 1; i < world_from_robot.size(); ++i) {
+    steps.push_back(inverse(world_from_robot[i - 1]) * world_from_robot[i]);
+  }
+  return steps;
+}
+
+std::vector<Pose2> accumulate_steps(const Pose2& start, std::span<const Pose2> steps) {
+  std::vector<Pose2> poses{start};
+  poses.reserve(steps.size() + 1);
+  for (const Pose2& step : steps) poses.push_back(poses.back() * step);
+  return poses;
+}
+
+void visit_options(OdometryNoise& options, OptionVisitor& visitor) {
+  constexpr std::array<std::string_view, 2> drives{"differential", "holonomic"};
+  int drive = static_cast<int>(options.drive);
+  visitor.visit({.name = "drive", .help = "how the robot moves"}, drives, drive);
+  options.drive = static_cast<DriveKind>(drive);
+  const auto deviation = [&visitor](std::string_view name, std::string_view help, double& value) {
+    visitor.visit({.name = name, .help = help, .low = 0.0, .high = 10.0}, value);
+  };
+  deviation("translation_from_translation", "standard deviation of travel after 1 m, in m",
+            options.translation_from_translation);
+  deviation("translation_from_rotation", "standard deviation of travel after a turn by 1 rad, in m",
+            options.translation_from_rotation);
+  deviation("rotation_from_translation", "standard deviation of the heading after 1 m, in rad",
+            options.rotation_from_translation);
+  deviation("rotation_from_rotation",
+            "standard deviation of the heading after a turn by 1 rad, in rad",
+            options.rotation_from_rotation);
+  deviation("translation_scale_error",
+            "standard deviation of the relative error of travel in a run",
+            options.translation_scale_error);
+  deviation("rotation_scale_error", "standard deviation of the relative error of turns in a run",
+            options.rotation_scale_error);
+}
+
+Pose2 sample_step(const Pose2& step, const OdometryNoise& noise, Random& random) {
+  const double travel = std::hypot(step.x_m, step.y_m);
+  const double turn = std::abs(step.heading_rad);
+  const auto deviation = [travel, turn](double per_metre, double per_radian) {
+    return std::sqrt(per_metre * per_metre * travel + per_radian * per_radian * turn);
+  };
+  const double translation_sd =
+      deviation(noise.translation_from_translation, noise.translation_from_rotation);
+  const double rotation_sd =
+      deviation(noise.rotation_from_translation, noise.rotation_from_rotation);
+  const double first = random.normal(0.0, translation_sd);
+  const double second = random.normal(0.0, translation_sd);
+  const double turn_error = random.normal(0.0, rotation_sd);
+  const double heading = wrap_angle(step.heading_rad + turn_error);
+  if (noise.drive == DriveKind::holonomic) {
+    return {step.x_m + first, step.y_m + second, heading};
+  }
+  const double middle = 0.5 * step.heading_rad;
+  const double x = step.x_m + first * std::cos(middle);
+  const double y = step.y_m + first * std::sin(middle);
+  const double c = std::cos(0.5 * turn_error);
+  const double s = std::sin(0.5 * turn_error);
+  return {c * x - s * y, s * x + c * y, heading};
+}
+
+SimulatedOdometry::SimulatedOdometry(const OdometryNoise& noise, std::uint64_t seed)
+    : noise_(noise), random_(seed) {
+  validate(noise_);
+  translation_scale_ = random_.normal(1.0, noise_.translation_scale_error);
+  rotation_scale_ = random_.normal(1.0, noise_.rotation_scale_error);
+}
+
+Pose2 SimulatedOdometry::advance(const Pose2& step) {
+  Pose2 measured = sample_step(step, noise_, random_);
+  // The chord turns with half the heading, as in sample_step, so that wheels still do not slip.
+  const double extra_turn = (rotation_scale_ - 1.0) * measured.heading_rad;
+  const double half = noise_.drive == DriveKind::differential ? 0.5 * extra_turn : 0.0;
+  const double c = translation_scale_ * std::cos(half);
+  const double s = translation_scale_ * std::sin(half);
+  measured = {c * measured.x_m - s * measured.y_m, s * measured.x_m + c * measured.y_m,
+              wrap_angle(measured.heading_rad + extra_turn)};
+  odometry_from_robot_ = odometry_from_robot_ * measured;
+  return odometry_from_robot_;
+}
+
+std::vector<Pose2> simulate_odometry(std::span<const Pose2> world_from_robot,
+                                     const OdometryNoise& noise, std::uint64_t seed) {
+  SimulatedOdometry odometry(noise, seed);
+  std::vector<Pose2> readings;
+  readings.reserve(world_from_robot.size());
+  for (std::size_t i = 0; i < world_from_robot.size(); ++i) {
+    readings.push_back(
+        i == 0 ? odometry.pose()
+               : odometry.advance(inverse(world_from_robot[i - 1]) * world_from_robot[i]));
+  }
+  return readings;
+}
+
+}  // namespace panonav

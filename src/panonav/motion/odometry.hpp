@@ -1,0 +1,79 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "panonav/core/options.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/geometry/pose2.hpp"
+
+namespace panonav {
+
+/// An odometry step is `robot_old_from_robot_new`: the pose of the robot after the step in the
+/// frame of the robot before it. It does not depend on any world frame.
+
+/// The steps between consecutive poses; one fewer than poses, none for fewer than two.
+[[nodiscard]] std::vector<Pose2> steps_between(std::span<const Pose2> world_from_robot);
+
+/// The poses reached from `start` after each step; the first is `start` itself.
+[[nodiscard]] std::vector<Pose2> accumulate_steps(const Pose2& start, std::span<const Pose2> steps);
+
+/// How a robot moves, and so which errors its odometry can make.
+enum class DriveKind {
+  differential,  ///< cannot move sideways: travel errors lie along the heading at the middle of the
+                 ///< step
+  holonomic,     ///< moves in every direction: travel errors are alike in x and y
+};
+
+/// Error of odometry. The random part is a random walk: its variance grows with the distance and
+/// the turn, not with the number of steps, so a path cut into more steps is not less certain. The
+/// systematic part is a wrong scale (wheel radius, wheel base) that stays the same during a run.
+/// The defaults are the order of size of small wheeled robots on flat floors without slip; measure
+/// your own.
+struct OdometryNoise {
+  DriveKind drive = DriveKind::differential;
+  /// Standard deviation of travel after 1 m (m); of each of x and y for a holonomic robot.
+  double translation_from_translation = 0.03;
+  /// Standard deviation of travel after turning by 1 rad (m).
+  double translation_from_rotation = 0.005;
+  /// Standard deviation of the heading after 1 m (rad).
+  double rotation_from_translation = 0.02;
+  /// Standard deviation of the heading after turning by 1 rad (rad).
+  double rotation_from_rotation = 0.03;
+  /// Standard deviation, from run to run, of the constant relative error of travel.
+  double translation_scale_error = 0.02;
+  /// Standard deviation, from run to run, of the constant relative error of turns.
+  double rotation_scale_error = 0.01;
+};
+void visit_options(OdometryNoise& options, OptionVisitor& visitor);
+
+/// One draw of what truly happened when odometry says `step`, or of what odometry says when `step`
+/// truly happened (the random part only; zero mean in travel and turn). Differential drive: the
+/// chord of the step keeps its angle to the heading at the middle of the step, as wheels without
+/// slip demand. Three normal draws from `random`, whatever the parameters. `noise` must be valid.
+[[nodiscard]] Pose2 sample_step(const Pose2& step, const OdometryNoise& noise, Random& random);
+
+/// What the odometry of one run shows: an absolute pose in the odometry frame, which is the robot's
+/// frame at the start of the run. The scale errors are drawn once, at construction.
+class SimulatedOdometry {
+ public:
+  /// Throws OptionError.
+  SimulatedOdometry(const OdometryNoise& noise, std::uint64_t seed);
+
+  /// The robot truly moved by `step`; returns odometry_from_robot afterwards.
+  Pose2 advance(const Pose2& step);
+  [[nodiscard]] const Pose2& pose() const noexcept { return odometry_from_robot_; }
+
+ private:
+  OdometryNoise noise_;
+  Random random_;
+  double translation_scale_ = 1.0;
+  double rotation_scale_ = 1.0;
+  Pose2 odometry_from_robot_;
+};
+
+/// Odometry along true poses, one reading per pose, the first one zero. Throws OptionError.
+[[nodiscard]] std::vector<Pose2> simulate_odometry(std::span<const Pose2> world_from_robot,
+                                                   const OdometryNoise& noise, std::uint64_t seed);
+
+}  // namespace panonav

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "panonav/core/random.hpp"
+#include "panonav/geometry/pose2.hpp"
+
+namespace panonav {
+
+/// Length of the polyline through the positions; 0 for fewer than two.
+[[nodiscard]] double path_length_m(std::span<const Pose2> path);
+[[nodiscard]] double path_length_m(std::span<const Point2> path);
+
+/// Poses every `spacing_m` along the polyline through the positions, starting with the first;
+/// headings are interpolated. The end is included only where it falls on the spacing. Empty for an
+/// empty path. Throws ContractError unless spacing_m > 0.
+[[nodiscard]] std::vector<Pose2> resample(std::span<const Pose2> path, double spacing_m);
+
+struct SmoothPathOptions {
+  double spacing_m = 0.1;  ///< > 0, between poses along the curve
+  bool closed = false;     ///< the curve returns to the first way point
+};
+
+/// A smooth curve through way points as poses at equal spacing, heading along the tangent: a
+/// centripetal Catmull-Rom spline, which has neither cusps nor loops between way points (Yuksel et
+/// al. 2011). Way points that coincide with the one before are left out; the last pose lies on
+/// the last way point only where the length is a multiple of the spacing. Throws ContractError for
+/// fewer than two different way points (three when closed), a number that is not finite, or a
+/// spacing not above 0.
+[[nodiscard]] std::vector<Pose2> smooth_path(std::span<const Point2> way_points,
+                                             const SmoothPathOptions& options = {});
+
+/// A place of a regular grid: column i along x, row j along y.
+struct GridPosition {
+  int i = 0;
+  int j = 0;
+  Point2 position;
+  friend bool operator==(const GridPosition&, const GridPosition&) = default;
+};
+
+enum class GridOrder {
+  raster,  ///< every row from low x to high x
+  zigzag,  ///< every second row backwards, as a robot would drive it [M04 section 4]
+};
+
+/// The grid of `spacing_m` that fits into the rectangle, centred in it, rows from low y to high y.
+/// Throws ContractError unless low <= high and spacing_m > 0.
+[[nodiscard]] std::vector<GridPosition> grid_positions(Point2 low, Point2 high, double spacing_m,
+                                                       GridOrder order = GridOrder::raster);
+
+/// Says whether a robot may stand at a place.
+using FreePredicate = std::function<bool(Point2)>;
+
+struct RandomWalkOptions {
+  int poses = 100;                  ///< >= 1
+  double step_m = 0.1;              ///< > 0
+  double turn_deviation_rad = 0.2;  ///< standard deviation of the turn at each step, >= 0
+};
+
+/// A walk of straight steps with small random turns; where the next step would leave the free
+/// places, the robot turns to a random direction instead. Headings are along the step that led to a
+/// pose. Stops early when it is boxed in. Throws ContractError when `start` is not free or an
+/// option is out of range.
+[[nodiscard]] std::vector<Pose2> random_walk(const Pose2& start, const FreePredicate& is_free,
+                                             const RandomWalkOptions& options, Random& random);
+
+}  // namespace panonav

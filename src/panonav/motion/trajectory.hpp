@@ -1,0 +1,48 @@
+#pragma once
+
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "panonav/geometry/pose2.hpp"
+
+namespace panonav {
+
+struct StampedPose {
+  double stamp_s = 0.0;
+  Pose2 pose;
+  friend bool operator==(const StampedPose&, const StampedPose&) = default;
+};
+
+/// The pose at `fraction` of the way from a to b: position on the straight line, heading along the
+/// shorter turn. Fractions outside 0 .. 1 extrapolate.
+[[nodiscard]] Pose2 interpolate(const Pose2& a, const Pose2& b, double fraction);
+
+/// Poses over time. Invariant: all values finite, stamps strictly ascending.
+class Trajectory {
+ public:
+  Trajectory() = default;
+  /// Throws ContractError that names the first offending pose.
+  explicit Trajectory(std::vector<StampedPose> poses);
+
+  [[nodiscard]] std::span<const StampedPose> poses() const& noexcept { return poses_; }
+  std::span<const StampedPose> poses() const&& = delete;  // would dangle
+  [[nodiscard]] std::size_t size() const noexcept { return poses_.size(); }
+  [[nodiscard]] bool empty() const noexcept { return poses_.empty(); }
+
+  /// Throws ContractError unless the pose is finite and later than the last one.
+  void append(const StampedPose& pose);
+
+  /// Interpolated between the two poses around `stamp_s`; empty before the first and after the last
+  /// pose, and where those two are more than `longest_gap_s` apart. O(log n).
+  [[nodiscard]] std::optional<Pose2> at(
+      double stamp_s, double longest_gap_s = std::numeric_limits<double>::infinity()) const;
+
+  friend bool operator==(const Trajectory&, const Trajectory&) = default;
+
+ private:
+  std::vector<StampedPose> poses_;
+};
+
+}  // namespace panonav
