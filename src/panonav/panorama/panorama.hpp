@@ -59,7 +59,13 @@ class Panorama {
 /// I'(phi) = I(phi + delta), so column c of the result is column c + columns_turned.
 [[nodiscard]] Panorama turn_columns(const Panorama& panorama, int columns_turned);
 
-/// As a picture for people: clockwise, forward in the middle, 0..1 as 0..255 (clamped).
+/// As a picture for people: clockwise, forward in the middle, 0..1 as 0..255 (clamped). No column
+/// is mixed with another: column 0 becomes the picture's column columns / 2, so that reading the
+/// picture back with `picture_forward_column` gives the same panorama but for the rounding to 8
+/// bit.
 [[nodiscard]] Image to_picture(const Panorama& panorama);
+
+/// Where `to_picture` puts the forward direction: a fraction of the width, between its outer edges.
+[[nodiscard]] double picture_forward_column(int columns) noexcept;
 
 }  // namespace panonav

@@ -10,11 +10,11 @@ namespace panonav {
 struct CompassReading {
   /// heading of the query minus heading of the reference, in [-pi, pi).
   double heading_rad = 0.0;
-  /// Normalised correlation at the maximum, -1 .. 1; 1 for the same view turned. k = 0 does not
+  /// Normalised correlation at this heading, -1 .. 1; 1 for the same view turned. k = 0 does not
   /// count.
   double correlation = 0.0;
-  /// 0 .. 1: how far the maximum stands above the second highest one; 0 when another heading fits
-  /// as well.
+  /// 0 .. 1: how far the correlation stands above its next highest maximum, as a fraction of
+  /// itself; 0 when another heading fits as well or better, 1 when no other fits at all.
   double distinctness = 0.0;
 };
 
@@ -23,14 +23,28 @@ struct CompassOptions {
 };
 
 /// Heading of `query` relative to `reference`: the global maximum of
-/// C(sigma) = sum_{y,k} A^q A^r cos(psi^q - psi^r - k sigma) [S06 eq. 33], refined below a column.
-/// Empty when neither view has any structure. Throws ContractError on different rows.
+/// C(sigma) = sum_{y,k} A^q A^r cos(psi^q - psi^r - k sigma) [S06 eq. 33], exact to rounding
+/// between columns. The rows are summed first, which leaves a trigonometric polynomial: it is
+/// evaluated at eight points per period of its highest frequency and each maximum that may be the
+/// highest is refined by Newton's rule. So no component needs to be good, the first one least of
+/// all. Empty when a view has no structure: no component k >= 1 above the rounding of its
+/// computation. Throws ContractError on different rows, or components outside 0, 2 .. those of both
+/// signatures. Cost: a few microseconds for 80 x 15.
 [[nodiscard]] std::optional<CompassReading> compass(const FourierSignature& query,
                                                     const FourierSignature& reference,
                                                     const CompassOptions& options = {});
 
+/// The same from packed signatures, without unpacking; the full scale cancels. Phases in steps of 2
+/// pi / 256 change the heading by a few thousandths of a radian at most.
+[[nodiscard]] std::optional<CompassReading> compass(const PackedSignature& query,
+                                                    const PackedSignature& reference,
+                                                    const CompassOptions& options = {});
+
 /// S06's sequential rule [S06 eq. 40-43, sign of eq. 41 corrected], as published, kept for
-/// comparison.
+/// comparison: each component refines the estimate of those before. When the first is weak (its
+/// weight below a tenth of the mean) a second estimate starts at the opposite heading and the one
+/// of higher correlation is taken. The paper has one row; with more, the phase difference and
+/// weight of a component are those of its sum over the rows.
 [[nodiscard]] std::optional<CompassReading> sequential_compass(const FourierSignature& query,
                                                                const FourierSignature& reference,
                                                                const CompassOptions& options = {});

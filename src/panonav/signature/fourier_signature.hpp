@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "panonav/kernels/row_transform.hpp"
 #include "panonav/panorama/panorama.hpp"
 
 namespace panonav {
@@ -60,17 +61,24 @@ class FourierSignature {
   std::optional<ElevationBand> elevations_;
 };
 
-/// Throws ContractError unless 1 <= components <= columns / 2. Cost O(rows * columns * components)
-/// worst case.
+/// Throws ContractError unless 1 <= components <= columns / 2. Cost: rows * columns * components /
+/// 4 multiplications (an odd number of columns: / 2).
 [[nodiscard]] FourierSignature compute_signature(const Panorama& panorama, int components = 15);
+
+/// The same with the tables of the transform made once, for many panoramas of the same width.
+/// Throws ContractError when the panorama has another number of columns.
+[[nodiscard]] FourierSignature compute_signature(const Panorama& panorama,
+                                                 const kernels::RowTransform& transform);
 
 /// The signature of the same view after the robot turned by `turn_rad` counter-clockwise (exact
 /// shift theorem [M04 eq. 1]).
 [[nodiscard]] FourierSignature turn(const FourierSignature& signature, double turn_rad);
 
 /// A signature in 8 + 8 bit per component and row: 19 kbit for 80 x 15 [M03 table 1]. Magnitudes
-/// are linear up to `full_scale` (kept once per memory, not here) and saturate there; phases are
-/// linear over the full turn. Component-major like FourierSignature.
+/// are linear up to `full_scale` (kept once per memory, not here) and saturate there; below, the
+/// error is at most full_scale / 510. Phases count steps of 2 pi / 256, modulo 256: the error is at
+/// most pi / 256. Where a magnitude is packed as 0 its phase is too. Component-major like
+/// FourierSignature. Both vectors have shape.size() entries.
 struct PackedSignature {
   SignatureShape shape;
   std::vector<std::uint8_t> magnitudes;
@@ -78,8 +86,10 @@ struct PackedSignature {
   friend bool operator==(const PackedSignature&, const PackedSignature&) = default;
 };
 
-/// Throws ContractError unless full_scale > 0.
+/// Throws ContractError unless full_scale is finite and > 0.
 [[nodiscard]] PackedSignature pack(const FourierSignature& signature, float full_scale);
+/// pack(unpack(p)) == p. Throws ContractError unless full_scale is finite and > 0 and the vectors
+/// fit the shape.
 [[nodiscard]] FourierSignature unpack(const PackedSignature& packed, float full_scale,
                                       std::optional<ElevationBand> elevations);
 

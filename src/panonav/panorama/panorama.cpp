@@ -1,0 +1,92 @@
+#include "panonav/panorama/panorama.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+
+namespace panonav {
+
+namespace {
+
+std::size_t checked_size(int rows, int columns) {
+  require(rows >= 1, "panorama rows", rows, ">= 1");
+  require(columns >= 4, "panorama columns", columns, ">= 4");
+  return static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns);
+}
+
+}  // namespace
+
+Panorama::Panorama(int rows, int columns, std::optional<ElevationBand> elevations)
+    : Panorama(rows, columns, elevations, std::vector<float>(checked_size(rows, columns))) {}
+
+Panorama::Panorama(int rows, int columns, std::optional<ElevationBand> elevations,
+                   std::vector<float> values)
+    : rows_(rows), columns_(columns), elevations_(elevations), values_(std::move(values)) {
+  const std::size_t size = checked_size(rows, columns);
+  require(values_.size() == size, "number of panorama values", static_cast<double>(values_.size()),
+          to_text(static_cast<double>(size)));
+  if (elevations_) {
+    constexpr double zenith = std::numbers::pi / 2.0 + 1e-9;
+    require(elevations_->bottom_rad >= -zenith && elevations_->bottom_rad < elevations_->top_rad,
+            "elevations bottom_rad", elevations_->bottom_rad, "-pi/2 .. below top_rad");
+    require(elevations_->top_rad <= zenith, "elevations top_rad", elevations_->top_rad,
+            "above bottom_rad .. pi/2");
+  }
+  // 0 times anything finite is 0, and anything else makes the sum NaN: quicker than asking each.
+  float sum = 0.0F;
+  for (const float value : values_) sum += value * 0.0F;
+  require(sum == 0.0F, "panorama value", static_cast<double>(sum), "finite");
+}
+
+double Panorama::elevation_rad(int row) const noexcept {
+  if (!elevations_) return 0.0;
+  const double band = elevations_->top_rad - elevations_->bottom_rad;
+  return elevations_->top_rad - band * (row + 0.5) / rows_;
+}
+
+std::optional<int> Panorama::horizon_row() const noexcept {
+  if (!elevations_ || elevations_->bottom_rad > 0.0 || elevations_->top_rad < 0.0) return {};
+  const double band = elevations_->top_rad - elevations_->bottom_rad;
+  const int row = static_cast<int>(std::floor(elevations_->top_rad / band * rows_));
+  return std::clamp(row, 0, rows_ - 1);
+}
+
+double Panorama::azimuth_rad(int column) const noexcept {
+  return wrap_angle(2.0 * std::numbers::pi * column / columns_);
+}
+
+Panorama turn_columns(const Panorama& panorama, int columns_turned) {
+  const int columns = panorama.columns();
+  const int shift = (columns_turned % columns + columns) % columns;
+  Panorama turned = panorama;
+  const auto values = turned.values();
+  for (int y = 0; y < panorama.rows(); ++y) {
+    const auto row = values.subspan(static_cast<std::size_t>(y) * columns, columns);
+    std::rotate(row.begin(), row.begin() + shift, row.end());
+  }
+  return turned;
+}
+
+Image to_picture(const Panorama& panorama) {
+  const int columns = panorama.columns();
+  Image picture(columns, panorama.rows());
+  for (int y = 0; y < panorama.rows(); ++y) {
+    for (int u = 0; u < columns; ++u) {
+      const int column = (columns / 2 - u + columns) % columns;
+      const float value = std::clamp(panorama.at(y, column), 0.0F, 1.0F);
+      picture.at(u, y) = static_cast<std::uint8_t>(std::lround(value * 255.0F));
+    }
+  }
+  return picture;
+}
+
+double picture_forward_column(int columns) noexcept {
+  return (columns / 2 + 0.5) / columns;
+}
+
+}  // namespace panonav

@@ -1,0 +1,140 @@
+#include "panonav/panorama/picture.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav {
+
+namespace {
+
+/// Keys' cubic convolution kernel, a = -1/2: exact on parabolas.
+double cubic(double x) {
+  x = std::abs(x);
+  if (x < 1.0) return (1.5 * x - 2.5) * x * x + 1.0;
+  if (x < 2.0) return ((-0.5 * x + 2.5) * x - 4.0) * x + 2.0;
+  return 0.0;
+}
+
+/// One new sample as a weighted sum of old ones, which follow each other from `first`.
+struct Sample {
+  int first = 0;
+  std::vector<float> weights;
+};
+
+/// `position`: where the new sample lies, in old samples (the centre of old sample i is i). `step`:
+/// distance of new samples, in old ones.
+Sample make_sample(double position, double step) {
+  const double width = std::max(1.0, step);
+  // Positions are computed from angles; a rounding error must not keep a copy from being exact.
+  const double nearest = std::round(position);
+  if (std::abs(position - nearest) < 1e-9) position = nearest;
+  Sample sample;
+  sample.first = static_cast<int>(std::floor(position - 2.0 * width)) + 1;
+  const int last = static_cast<int>(std::ceil(position + 2.0 * width)) - 1;
+  std::vector<double> weights;
+  double sum = 0.0;
+  for (int i = sample.first; i <= last; ++i) {
+    weights.push_back(cubic((i - position) / width));
+    sum += weights.back();
+  }
+  for (const double weight : weights) sample.weights.push_back(static_cast<float>(weight / sum));
+  return sample;
+}
+
+void check(const PictureLayout& layout) {
+  require(layout.forward_column >= 0.0 && layout.forward_column <= 1.0, "forward_column",
+          layout.forward_column, "0 .. 1 (a fraction of the width)");
+  const auto check_band = [](const ElevationBand& band, const char* name, double low, double high) {
+    constexpr double rounding = 1e-9;
+    require(band.bottom_rad >= low - rounding && band.bottom_rad < band.top_rad, name,
+            band.bottom_rad, to_text(low) + " rad .. below the top");
+    require(band.top_rad <= high + rounding, name, band.top_rad,
+            "above the bottom .. " + to_text(high) + " rad");
+  };
+  constexpr double zenith = std::numbers::pi / 2.0;
+  if (layout.elevations) check_band(*layout.elevations, "elevations", -zenith, zenith);
+  if (layout.kept_elevations) {
+    if (!layout.elevations) {
+      throw ContractError("kept_elevations", "given",
+                          "only where the picture's own elevations are known");
+    }
+    check_band(*layout.kept_elevations, "kept_elevations", layout.elevations->bottom_rad,
+               layout.elevations->top_rad);
+  }
+}
+
+}  // namespace
+
+Panorama panorama_from_picture(ImageView picture, const PictureLayout& layout,
+                               PanoramaShape shape) {
+  check(layout);
+  require(picture.width >= 4, "picture width", picture.width, ">= 4");
+  require(picture.height >= 1, "picture height", picture.height, ">= 1");
+  require(shape.rows >= 0, "rows", shape.rows, ">= 0");
+  require(shape.columns == 0 || shape.columns >= 4, "columns", shape.columns, "0 or >= 4");
+
+  // The part of the rows that is kept, as fractions of the height from the top.
+  double top = 0.0;
+  double bottom = 1.0;
+  std::optional<ElevationBand> band = layout.elevations;
+  if (layout.kept_elevations) {
+    const double full = layout.elevations->top_rad - layout.elevations->bottom_rad;
+    top =
+        std::clamp((layout.elevations->top_rad - layout.kept_elevations->top_rad) / full, 0.0, 1.0);
+    bottom = std::clamp((layout.elevations->top_rad - layout.kept_elevations->bottom_rad) / full,
+                        0.0, 1.0);
+    band = layout.kept_elevations;
+  }
+  const double kept_rows = (bottom - top) * picture.height;
+  const int rows =
+      shape.rows > 0 ? shape.rows : std::max(1, static_cast<int>(std::lround(kept_rows)));
+  const int columns = shape.columns > 0 ? shape.columns : picture.width;
+
+  Image grey_copy(1, 1);
+  if (picture.channels != 1) {
+    grey_copy = to_grey(picture);
+    picture = grey_copy.view();
+  }
+
+  const double column_step = static_cast<double>(picture.width) / columns;
+  const double sign = layout.direction == ColumnDirection::clockwise ? -1.0 : 1.0;
+  std::vector<Sample> across;
+  for (int c = 0; c < columns; ++c) {
+    Sample sample = make_sample(
+        layout.forward_column * picture.width + sign * c * column_step - 0.5, column_step);
+    sample.first = (sample.first % picture.width + picture.width) % picture.width;
+    across.push_back(std::move(sample));
+  }
+  const double row_step = kept_rows / rows;
+
+  // Rows first: it leaves fewer of them. Weights that fall outside the picture count for its edge.
+  std::vector<float> values(static_cast<std::size_t>(rows) * columns);
+  std::vector<float> line(static_cast<std::size_t>(picture.width));
+  for (int y = 0; y < rows; ++y) {
+    const Sample down = make_sample(top * picture.height + (y + 0.5) * row_step - 0.5, row_step);
+    std::fill(line.begin(), line.end(), 0.0F);
+    for (std::size_t i = 0; i < down.weights.size(); ++i) {
+      const int v = std::clamp(down.first + static_cast<int>(i), 0, picture.height - 1);
+      const std::uint8_t* from = picture.data + v * picture.stride;
+      for (int u = 0; u < picture.width; ++u) line[u] += down.weights[i] * from[u];
+    }
+    for (int c = 0; c < columns; ++c) {
+      float sum = 0.0F;
+      int u = across[c].first;
+      for (const float weight : across[c].weights) {
+        sum += weight * line[u];
+        if (++u == picture.width) u = 0;
+      }
+      values[static_cast<std::size_t>(y) * columns + c] =
+          std::clamp(sum * (1.0F / 255.0F), 0.0F, 1.0F);
+    }
+  }
+  return {rows, columns, band, std::move(values)};
+}
+
+}  // namespace panonav

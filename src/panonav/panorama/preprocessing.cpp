@@ -1,0 +1,101 @@
+#include "panonav/panorama/preprocessing.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr double target_deviation = 0.25;
+constexpr double least_deviation = 0.25 / 255.0;
+
+/// Sums are taken row by row in double precision, so that a turn changes them by rounding only.
+struct Moments {
+  double mean = 0.0;
+  double deviation = 0.0;
+};
+
+Moments moments(const Panorama& panorama, int first_row, int end_row) {
+  const double count = static_cast<double>(end_row - first_row) * panorama.columns();
+  double sum = 0.0;
+  for (int y = first_row; y < end_row; ++y) {
+    for (const float value : panorama.row(y)) sum += value;
+  }
+  const double mean = sum / count;
+  double squares = 0.0;
+  for (int y = first_row; y < end_row; ++y) {
+    for (const float value : panorama.row(y)) squares += (value - mean) * (value - mean);
+  }
+  return {mean, std::sqrt(squares / count)};
+}
+
+void replace_by_gradients(Panorama& panorama, int first_row, int end_row) {
+  const int columns = panorama.columns();
+  std::vector<float> above(panorama.row(first_row).begin(), panorama.row(first_row).end());
+  std::vector<float> here = above;
+  for (int y = first_row; y < end_row; ++y) {
+    const auto below = panorama.row(std::min(y + 1, end_row - 1));
+    std::vector<float> next(below.begin(), below.end());
+    for (int c = 0; c < columns; ++c) {
+      const float across = here[(c + 1) % columns] - here[(c + columns - 1) % columns];
+      panorama.at(y, c) = 0.5F * std::hypot(across, next[c] - above[c]);
+    }
+    above = std::exchange(here, std::move(next));
+  }
+}
+
+}  // namespace
+
+void visit_options(PreprocessingOptions& options, OptionVisitor& visitor) {
+  visitor.visit({.name = "masked_rows_top",
+                 .help = "rows at the upper edge that count for nothing",
+                 .low = 0},
+                options.masked_rows_top);
+  visitor.visit({.name = "masked_rows_bottom",
+                 .help = "rows at the lower edge that count for nothing",
+                 .low = 0},
+                options.masked_rows_bottom);
+  visitor.visit(
+      {.name = "edge_channel", .help = "take the length of the grey gradient instead of grey"},
+      options.edge_channel);
+  visitor.visit({.name = "remove_mean", .help = "subtract the mean of the view"},
+                options.remove_mean);
+  visitor.visit({.name = "normalise_gain",
+                 .help = "scale the contrast of every view to the same standard deviation"},
+                options.normalise_gain);
+}
+
+Panorama preprocess(Panorama panorama, const PreprocessingOptions& options) {
+  validate(options);
+  const int first = options.masked_rows_top;
+  const int end = panorama.rows() - options.masked_rows_bottom;
+  if (first >= end) {
+    throw ContractError("masked_rows_top + masked_rows_bottom",
+                        to_text(static_cast<double>(first) + options.masked_rows_bottom),
+                        "below " + std::to_string(panorama.rows()) + " (the rows of the panorama)");
+  }
+  const auto values = panorama.values();
+  const auto columns = static_cast<std::size_t>(panorama.columns());
+  const auto kept = values.subspan(first * columns, (end - first) * columns);
+  std::fill(values.begin(), values.begin() + first * columns, 0.0F);
+  std::fill(values.begin() + end * columns, values.end(), 0.0F);
+
+  if (options.edge_channel) replace_by_gradients(panorama, first, end);
+  if (options.remove_mean || options.normalise_gain) {
+    const Moments found = moments(panorama, first, end);
+    const double offset = options.remove_mean ? found.mean : 0.0;
+    const double gain = options.normalise_gain && found.deviation >= least_deviation
+                            ? target_deviation / found.deviation
+                            : 1.0;
+    for (float& value : kept) value = static_cast<float>((value - offset) * gain);
+  }
+  return panorama;
+}
+
+}  // namespace panonav

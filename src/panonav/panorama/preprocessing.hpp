@@ -1,0 +1,34 @@
+#pragma once
+
+#include "panonav/core/options.hpp"
+#include "panonav/panorama/panorama.hpp"
+
+namespace panonav {
+
+/// What is done to a panorama before its signature is taken. Every step is indifferent to a turn of
+/// the robot: a turned view preprocessed is the preprocessed view turned. Steps run in the order of
+/// the members. There is no low-pass step: taking the first components of a signature is one.
+struct PreprocessingOptions {
+  /// Rows at the upper and lower edge that are set to 0 and count for nothing: a mirror's rim, the
+  /// robot's body.
+  int masked_rows_top = 0;
+  int masked_rows_bottom = 0;
+  /// Replaces each value by the length of the gradient of grey there (central differences, per row
+  /// and column). Less sensitive to light that changes slowly over the view, more to noise and to
+  /// the distance moved.
+  bool edge_channel = false;
+  /// Subtracts the mean over all rows that are not masked.
+  bool remove_mean = false;
+  /// Scales all values so that their standard deviation over all rows that are not masked is 0.25:
+  /// what exposure and the brightness of the light multiply cancels. A view of one colour (standard
+  /// deviation below a quarter of an 8-bit grey level) has no contrast to scale and stays as it is.
+  bool normalise_gain = false;
+  friend bool operator==(const PreprocessingOptions&, const PreprocessingOptions&) = default;
+};
+
+void visit_options(PreprocessingOptions& options, OptionVisitor& visitor);
+
+/// Throws ContractError when the masks leave no row; OptionError on options out of range.
+[[nodiscard]] Panorama preprocess(Panorama panorama, const PreprocessingOptions& options);
+
+}  // namespace panonav

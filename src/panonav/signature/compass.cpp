@@ -1,0 +1,328 @@
+#include "panonav/signature/compass.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <cstdint>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+/// C(sigma) = Re sum_k terms[k] exp(-j k sigma), k = 1 .. terms.size() - 1; terms[0] is 0.
+struct CrossSpectrum {
+  std::vector<std::complex<double>> terms;
+  double norm = 0.0;  ///< the correlation of a view with itself, geometric mean of both views
+
+  [[nodiscard]] int highest() const { return static_cast<int>(terms.size()) - 1; }
+};
+
+int components_used(SignatureShape query, SignatureShape reference, int components) {
+  require(query.rows == reference.rows, "rows of the query", query.rows,
+          std::to_string(reference.rows) + " (as the reference)");
+  const int common = std::min(query.components, reference.components);
+  require(components == 0 || (components >= 2 && components <= common), "components", components,
+          "0 (all) or 2 .. " + std::to_string(common));
+  return components == 0 ? common : components;
+}
+
+struct SineCosine {
+  float sine, cosine;
+};
+
+/// |angle| <= 4 pi; absolute error below 1e-6. Branch-free, so that the compiler can do several at
+/// once.
+inline SineCosine sine_cosine(float angle_rad) {
+  const float quarters = angle_rad * static_cast<float>(2.0 / pi);
+  const int quadrant = static_cast<int>(quarters + 8.5F) - 8;
+  const float x = (quarters - static_cast<float>(quadrant)) * static_cast<float>(pi / 2.0);
+  const float z = x * x;
+  const float s = x * (1.0F + z * (-1.0F / 6 + z * (1.0F / 120 + z * (-1.0F / 5040))));
+  const float c = 1.0F + z * (-0.5F + z * (1.0F / 24 + z * (-1.0F / 720 + z * (1.0F / 40320))));
+  const float sine = (quadrant & 1) != 0 ? c : s;
+  const float cosine = (quadrant & 1) != 0 ? s : c;
+  return {(quadrant & 2) != 0 ? -sine : sine, ((quadrant + 1) & 2) != 0 ? -cosine : cosine};
+}
+
+std::optional<CrossSpectrum> cross_spectrum(const FourierSignature& query,
+                                            const FourierSignature& reference,
+                                            const CompassOptions& options) {
+  const int components = components_used(query.shape(), reference.shape(), options.components);
+  const auto rows = static_cast<std::size_t>(query.rows());
+  CrossSpectrum spectrum;
+  spectrum.terms.resize(static_cast<std::size_t>(components));
+  std::vector<float> cosines(rows);
+  std::vector<float> sines(rows);
+  double query_energy = 0.0;
+  double reference_energy = 0.0;
+  for (int k = 1; k < components; ++k) {
+    const float* const query_magnitudes = query.magnitudes().data() + k * rows;
+    const float* const reference_magnitudes = reference.magnitudes().data() + k * rows;
+    const float* const query_phases = query.phases_rad().data() + k * rows;
+    const float* const reference_phases = reference.phases_rad().data() + k * rows;
+    for (std::size_t y = 0; y < rows; ++y) {
+      const float weight = query_magnitudes[y] * reference_magnitudes[y];
+      const SineCosine turn = sine_cosine(query_phases[y] - reference_phases[y]);
+      cosines[y] = weight * turn.cosine;
+      sines[y] = weight * turn.sine;
+    }
+    double real = 0.0;
+    double imaginary = 0.0;
+    for (std::size_t y = 0; y < rows; ++y) {
+      real += cosines[y];
+      imaginary += sines[y];
+      query_energy += static_cast<double>(query_magnitudes[y]) * query_magnitudes[y];
+      reference_energy += static_cast<double>(reference_magnitudes[y]) * reference_magnitudes[y];
+    }
+    spectrum.terms[k] = {real, imaginary};
+  }
+  // Views are of the order of 1, so a transform in single precision leaves less than this of
+  // nothing.
+  constexpr double rounding = 1e-6;
+  const double least = rounding * rounding * static_cast<double>(rows);
+  if (!(query_energy > least && reference_energy > least)) return {};
+  spectrum.norm = std::sqrt(query_energy) * std::sqrt(reference_energy);
+  return spectrum;
+}
+
+std::optional<CrossSpectrum> cross_spectrum(const PackedSignature& query,
+                                            const PackedSignature& reference,
+                                            const CompassOptions& options) {
+  const int components = components_used(query.shape, reference.shape, options.components);
+  for (const PackedSignature* packed : {&query, &reference}) {
+    require(packed->magnitudes.size() == packed->shape.size() &&
+                packed->phases.size() == packed->shape.size(),
+            "bytes of a packed signature", static_cast<double>(packed->phases.size()),
+            to_text(static_cast<double>(packed->shape.size())));
+  }
+  // Integer sums: exact, in any order. 14 bits keep a term within 32 bits.
+  struct Turn {
+    std::int32_t cosine, sine;
+  };
+  static const auto turns = [] {
+    std::array<Turn, 256> table{};
+    for (int i = 0; i < 256; ++i) {
+      table[i] = {static_cast<std::int32_t>(std::lround(16384.0 * std::cos(pi * i / 128.0))),
+                  static_cast<std::int32_t>(std::lround(16384.0 * std::sin(pi * i / 128.0)))};
+    }
+    return table;
+  }();
+  const auto rows = static_cast<std::size_t>(query.shape.rows);
+  CrossSpectrum spectrum;
+  spectrum.terms.resize(static_cast<std::size_t>(components));
+  std::uint64_t query_energy = 0;
+  std::uint64_t reference_energy = 0;
+  for (int k = 1; k < components; ++k) {
+    std::int64_t real = 0;
+    std::int64_t imaginary = 0;
+    for (std::size_t i = k * rows; i < (k + 1) * rows; ++i) {
+      const std::int32_t a = query.magnitudes[i];
+      const std::int32_t b = reference.magnitudes[i];
+      const Turn turn = turns[static_cast<std::uint8_t>(query.phases[i] - reference.phases[i])];
+      real += a * b * turn.cosine;
+      imaginary += a * b * turn.sine;
+      query_energy += static_cast<std::uint64_t>(a * a);
+      reference_energy += static_cast<std::uint64_t>(b * b);
+    }
+    spectrum.terms[k] = {static_cast<double>(real) / 16384.0,
+                         static_cast<double>(imaginary) / 16384.0};
+  }
+  if (query_energy == 0 || reference_energy == 0) return {};
+  spectrum.norm = std::sqrt(static_cast<double>(query_energy)) *
+                  std::sqrt(static_cast<double>(reference_energy));
+  return spectrum;
+}
+
+/// C and its first two derivatives at one heading.
+struct Point {
+  double value = 0.0;
+  double slope = 0.0;
+  double curvature = 0.0;
+};
+
+Point evaluate(const CrossSpectrum& spectrum, double heading_rad) {
+  const std::complex<double> step = std::polar(1.0, -heading_rad);
+  std::complex<double> turn = 1.0;
+  Point point;
+  for (int k = 1; k <= spectrum.highest(); ++k) {
+    turn = {turn.real() * step.real() - turn.imag() * step.imag(),
+            turn.real() * step.imag() + turn.imag() * step.real()};
+    const auto& term = spectrum.terms[k];
+    const double cosine = term.real() * turn.real() - term.imag() * turn.imag();
+    const double sine = term.real() * turn.imag() + term.imag() * turn.real();
+    point.value += cosine;
+    point.slope += k * sine;
+    point.curvature -= static_cast<double>(k) * k * cosine;
+  }
+  return point;
+}
+
+struct Peak {
+  double heading_rad = 0.0;
+  double value = 0.0;
+};
+
+/// The maximum between `low` and `high`, where the slope changes from rising to falling: Newton's
+/// rule, halving the interval where that would leave it.
+Peak refine(const CrossSpectrum& spectrum, double low, double high) {
+  double heading = 0.5 * (low + high);
+  Point point = evaluate(spectrum, heading);
+  for (int iteration = 0; iteration < 60; ++iteration) {
+    (point.slope > 0.0 ? low : high) = heading;
+    double next = point.curvature < 0.0 ? heading - point.slope / point.curvature : low;
+    if (!(next > low && next < high)) next = 0.5 * (low + high);
+    const double change = std::abs(next - heading);
+    heading = next;
+    point = evaluate(spectrum, heading);
+    if (change < 1e-9) break;
+  }
+  return {wrap_angle(heading), point.value};
+}
+
+/// The maxima of C, highest first: all that may be the highest or the second highest.
+std::vector<Peak> highest_peaks(const CrossSpectrum& spectrum) {
+  const int highest = spectrum.highest();
+  int count = 16;
+  while (count < 8 * highest) count *= 2;
+
+  // Horner's rule for all points of the grid at once. Single precision is enough to choose among
+  // maxima that are refined below.
+  const auto size = static_cast<std::size_t>(count);
+  std::vector<float> buffer(4 * size);
+  float* const cosine = buffer.data();
+  float* const sine = cosine + size;
+  float* const real = sine + size;
+  float* const imaginary = real + size;
+  const std::complex<double> step = std::polar(1.0, 2.0 * pi / count);
+  std::complex<double> turn = 1.0;
+  for (std::size_t i = 0; i < size; ++i) {
+    cosine[i] = static_cast<float>(turn.real());
+    sine[i] = static_cast<float>(turn.imag());
+    turn = {turn.real() * step.real() - turn.imag() * step.imag(),
+            turn.real() * step.imag() + turn.imag() * step.real()};
+  }
+  const double scale = 1.0 / spectrum.norm;
+  for (int k = highest; k >= 1; --k) {
+    const auto term_real = static_cast<float>(spectrum.terms[k].real() * scale);
+    const auto term_imaginary = static_cast<float>(spectrum.terms[k].imag() * scale);
+    for (std::size_t i = 0; i < size; ++i) {
+      // (sum + term) * exp(-j sigma)
+      const float a = real[i] + term_real;
+      const float b = imaginary[i] + term_imaginary;
+      real[i] = a * cosine[i] + b * sine[i];
+      imaginary[i] = b * cosine[i] - a * sine[i];
+    }
+  }
+
+  struct Candidate {
+    float value;
+    std::size_t index;
+  };
+  std::vector<Candidate> candidates;
+  for (std::size_t i = 0; i < size; ++i) {
+    const float before = real[(i + size - 1) % size];
+    const float after = real[(i + 1) % size];
+    if (real[i] > before && real[i] >= after) candidates.push_back({real[i], i});
+  }
+  std::ranges::sort(candidates, [](const Candidate& a, const Candidate& b) {
+    return a.value != b.value ? a.value > b.value : a.index < b.index;
+  });
+  // By Bernstein's inequality C rises by at most (highest * half a step)^2 / 2 <= 0.08 of its
+  // maximum between a maximum and the nearest point of the grid.
+  std::vector<Peak> peaks;
+  const double grid_step = 2.0 * pi / count;
+  const float margin = candidates.empty() ? 0.0F : 0.1F * candidates.front().value;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    if (i >= 2 && candidates[i].value + margin < candidates[1].value) break;
+    const double centre = grid_step * static_cast<double>(candidates[i].index);
+    peaks.push_back(refine(spectrum, centre - grid_step, centre + grid_step));
+  }
+  std::ranges::stable_sort(peaks, [](const Peak& a, const Peak& b) { return a.value > b.value; });
+  return peaks;
+}
+
+double distinctness(double value, double other) {
+  return value > 0.0 ? std::clamp((value - other) / value, 0.0, 1.0) : 0.0;
+}
+
+std::optional<CompassReading> read_compass(const std::optional<CrossSpectrum>& spectrum) {
+  if (!spectrum) return {};
+  const std::vector<Peak> peaks = highest_peaks(*spectrum);
+  if (peaks.empty()) return {};  // the views have no component in common
+  const double other = peaks.size() > 1 ? peaks[1].value : 0.0;
+  return CompassReading{peaks[0].heading_rad,
+                        std::clamp(peaks[0].value / spectrum->norm, -1.0, 1.0),
+                        distinctness(peaks[0].value, other)};
+}
+
+}  // namespace
+
+std::optional<CompassReading> compass(const FourierSignature& query,
+                                      const FourierSignature& reference,
+                                      const CompassOptions& options) {
+  return read_compass(cross_spectrum(query, reference, options));
+}
+
+std::optional<CompassReading> compass(const PackedSignature& query,
+                                      const PackedSignature& reference,
+                                      const CompassOptions& options) {
+  return read_compass(cross_spectrum(query, reference, options));
+}
+
+std::optional<CompassReading> sequential_compass(const FourierSignature& query,
+                                                 const FourierSignature& reference,
+                                                 const CompassOptions& options) {
+  const auto spectrum = cross_spectrum(query, reference, options);
+  if (!spectrum) return {};
+  const int highest = spectrum->highest();
+
+  double weight_sum = 0.0;
+  for (int k = 1; k <= highest; ++k) weight_sum += std::abs(spectrum->terms[k]) * k * k;
+  if (!(weight_sum > 0.0)) return {};
+
+  // [S06 eq. 40-43] from a given first estimate.
+  const auto refine_from = [&](double first_rad) {
+    double heading = first_rad;
+    double weights = std::abs(spectrum->terms[1]);
+    for (int k = 2; k <= highest; ++k) {
+      const double difference = std::arg(spectrum->terms[k]);
+      const double turns = std::nearbyint((k * heading - difference) / (2.0 * pi));
+      const double of_component = (difference + 2.0 * pi * turns) / k;
+      const double weight = std::abs(spectrum->terms[k]) * k * k;
+      if (weight > 0.0) {
+        heading = (weights * heading + weight * of_component) / (weights + weight);
+        weights += weight;
+      }
+    }
+    return wrap_angle(heading);
+  };
+  const double first = std::arg(spectrum->terms[1]);
+  double heading = refine_from(first);
+  double value = evaluate(*spectrum, heading).value;
+  if (std::abs(spectrum->terms[1]) < 0.1 * weight_sum / highest) {
+    const double opposite = refine_from(first + pi);
+    const double opposite_value = evaluate(*spectrum, opposite).value;
+    if (opposite_value > value) {
+      heading = opposite;
+      value = opposite_value;
+    }
+  }
+  double other = 0.0;
+  for (const Peak& peak : highest_peaks(*spectrum)) {
+    const bool same = std::abs(angle_difference(peak.heading_rad, heading)) < pi / highest;
+    if (!same) other = std::max(other, peak.value);
+  }
+  return CompassReading{heading, std::clamp(value / spectrum->norm, -1.0, 1.0),
+                        distinctness(value, other)};
+}
+
+}  // namespace panonav

@@ -1,0 +1,262 @@
+#include "panonav/signature/compass.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numbers>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "signature/random_views.hpp"
+
+namespace panonav {
+namespace {
+
+using testing_views::random_signature;
+
+double correlation_at(const FourierSignature& query, const FourierSignature& reference,
+                      double heading_rad) {
+  double sum = 0.0;
+  for (int k = 1; k < query.components(); ++k) {
+    for (int y = 0; y < query.rows(); ++y) {
+      sum += static_cast<double>(query.magnitude(y, k)) * reference.magnitude(y, k) *
+             std::cos(static_cast<double>(query.phase_rad(y, k)) - reference.phase_rad(y, k) -
+                      k * heading_rad);
+    }
+  }
+  return sum;
+}
+
+double heading_error(const CompassReading& reading, double expected_rad) {
+  return std::abs(angle_difference(reading.heading_rad, expected_rad));
+}
+
+TEST(Compass, ReadsAnyTurnOfTheSameView) {
+  Random random(1);
+  for (int trial = 0; trial < 200; ++trial) {
+    const SignatureShape shape{1 + static_cast<int>(random.index(20)),
+                               2 + static_cast<int>(random.index(30))};
+    const FourierSignature reference = random_signature(random, shape);
+    const double turned = random.uniform(-10.0, 10.0);
+    const auto reading = compass(turn(reference, turned), reference);
+    ASSERT_TRUE(reading);
+    EXPECT_LT(heading_error(*reading, turned), 2e-5) << "trial " << trial;
+    EXPECT_NEAR(reading->correlation, 1.0, 1e-5);
+    EXPECT_GE(reading->heading_rad, -std::numbers::pi);
+    EXPECT_LT(reading->heading_rad, std::numbers::pi);
+  }
+}
+
+TEST(Compass, FindsTheGlobalMaximumOfUnrelatedViews) {
+  // Many maxima of similar height: against a search over 20,000 headings.
+  Random random(2);
+  for (int trial = 0; trial < 60; ++trial) {
+    const SignatureShape shape{1 + static_cast<int>(random.index(4)),
+                               3 + static_cast<int>(random.index(20))};
+    const FourierSignature query = random_signature(random, shape);
+    const FourierSignature reference = random_signature(random, shape);
+    double best = -1e9;
+    for (int i = 0; i < 20000; ++i) {
+      best = std::max(best, correlation_at(query, reference, 2.0 * std::numbers::pi * i / 20000));
+    }
+    const auto reading = compass(query, reference);
+    ASSERT_TRUE(reading);
+    const double at_reading = correlation_at(query, reference, reading->heading_rad);
+    EXPECT_GE(at_reading, best * (1.0 - 1e-6));
+    EXPECT_GT(best, 0.0);
+  }
+}
+
+TEST(Compass, IsAntisymmetricAndAddsUp) {
+  Random random(3);
+  const FourierSignature a = random_signature(random, {10, 15});
+  const FourierSignature b = random_signature(random, {10, 15});
+  const auto ab = compass(a, b);
+  const auto ba = compass(b, a);
+  ASSERT_TRUE(ab && ba);
+  EXPECT_LT(heading_error(*ab, -ba->heading_rad), 1e-5);
+  EXPECT_NEAR(ab->correlation, ba->correlation, 1e-6);
+  EXPECT_LT(ab->correlation, 0.9);  // they are different views
+  const auto turned = compass(turn(a, 0.7), turn(b, -0.4));
+  ASSERT_TRUE(turned);
+  EXPECT_LT(heading_error(*turned, ab->heading_rad + 1.1), 1e-5);
+}
+
+TEST(Compass, HoldsTheSignConventionOnPanoramas) {
+  // I'(phi) = I(phi + delta): turning the robot counter-clockwise by three columns.
+  Random random(4);
+  std::vector<float> values(6 * 64);
+  for (float& value : values) value = static_cast<float>(random.uniform());
+  const Panorama view(6, 64, std::nullopt, values);
+  const auto reading = compass(compute_signature(turn_columns(view, 3)), compute_signature(view));
+  ASSERT_TRUE(reading);
+  EXPECT_LT(heading_error(*reading, 2.0 * std::numbers::pi * 3 / 64), 1e-5);
+}
+
+TEST(Compass, ReadsBetweenColumnsOfBandLimitedViews) {
+  // 24 columns are 15 degrees apart; the view has frequencies up to 7 only.
+  Random random(5);
+  const int columns = 24;
+  const int rows = 5;
+  struct Wave {
+    double magnitude, phase;
+  };
+  std::vector<Wave> waves(static_cast<std::size_t>(rows) * 8);
+  for (Wave& wave : waves) wave = {random.uniform(0.02, 0.1), random.uniform(-3.0, 3.0)};
+  const auto view_at = [&](double heading_rad) {
+    Panorama view(rows, columns, std::nullopt);
+    for (int y = 0; y < rows; ++y) {
+      for (int c = 0; c < columns; ++c) {
+        double value = 0.5;
+        for (int k = 1; k < 8; ++k) {
+          const Wave& wave = waves[static_cast<std::size_t>(y) * 8 + k];
+          value += wave.magnitude *
+                   std::cos(k * (2.0 * std::numbers::pi * c / columns + heading_rad) + wave.phase);
+        }
+        view.at(y, c) = static_cast<float>(value);
+      }
+    }
+    return compute_signature(view, 8);
+  };
+  const FourierSignature reference = view_at(0.0);
+  for (int trial = 0; trial < 50; ++trial) {
+    const double turned = random.uniform(-std::numbers::pi, std::numbers::pi);
+    const auto reading = compass(view_at(turned), reference);
+    ASSERT_TRUE(reading);
+    EXPECT_LT(heading_error(*reading, turned), 1e-4) << "a column is 0.26 rad";
+  }
+}
+
+TEST(Compass, NeedsNoFirstComponent) {
+  Random random(6);
+  FourierSignature with = random_signature(random, {4, 15});
+  std::vector<float> magnitudes(with.magnitudes().begin(), with.magnitudes().end());
+  std::vector<float> phases(with.phases_rad().begin(), with.phases_rad().end());
+  for (int i = 0; i < 2 * 4; ++i) magnitudes[i] = phases[i] = 0.0F;
+  const FourierSignature without(with.shape(), magnitudes, phases, std::nullopt);
+  const auto reading = compass(turn(without, 2.0), without);
+  ASSERT_TRUE(reading);
+  EXPECT_LT(heading_error(*reading, 2.0), 1e-5);
+}
+
+TEST(Compass, SaysWhenAnotherHeadingFitsAsWell) {
+  // Only even components: the view looks the same after half a turn.
+  Random random(7);
+  const FourierSignature view = random_signature(random, {4, 9});
+  std::vector<float> magnitudes(view.magnitudes().begin(), view.magnitudes().end());
+  std::vector<float> phases(view.phases_rad().begin(), view.phases_rad().end());
+  for (int k = 1; k < 9; k += 2) {
+    for (int y = 0; y < 4; ++y) magnitudes[k * 4 + y] = phases[k * 4 + y] = 0.0F;
+  }
+  const FourierSignature symmetric(view.shape(), magnitudes, phases, std::nullopt);
+  const auto same = compass(symmetric, symmetric);
+  ASSERT_TRUE(same);
+  EXPECT_LT(same->distinctness, 1e-5);
+  const auto distinct = compass(view, view);
+  ASSERT_TRUE(distinct);
+  EXPECT_GT(distinct->distinctness, 0.3);
+  EXPECT_LE(distinct->distinctness, 1.0);
+}
+
+TEST(Compass, HasNoAnswerWithoutStructure) {
+  Random random(8);
+  const FourierSignature view = random_signature(random, {3, 15});
+  const FourierSignature flat =
+      compute_signature(Panorama(3, 512, std::nullopt, std::vector<float>(3 * 512, 0.7F)));
+  EXPECT_FALSE(compass(flat, view));
+  EXPECT_FALSE(compass(view, flat));
+  EXPECT_FALSE(compass(flat, flat));
+  EXPECT_FALSE(sequential_compass(flat, view));
+  EXPECT_FALSE(compass(pack(flat, 2.0F), pack(view, 2.0F)));
+  EXPECT_TRUE(compass(view, view));
+  // Only the mean: nothing to take a heading from.
+  const FourierSignature mean_only = random_signature(random, {3, 1});
+  EXPECT_FALSE(compass(mean_only, mean_only));
+  EXPECT_FALSE(sequential_compass(mean_only, mean_only));
+}
+
+TEST(Compass, PackedAgreesWithFloat) {
+  Random random(9);
+  int compared = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    const FourierSignature reference = random_signature(random, {40, 15});
+    const double turned = random.uniform(-3.0, 3.0);
+    const FourierSignature query = turn(reference, turned);
+    const auto packed = compass(pack(query, 1.0F), pack(reference, 1.0F));
+    ASSERT_TRUE(packed);
+    EXPECT_LT(heading_error(*packed, turned), 2e-3);
+    EXPECT_GT(packed->correlation, 0.999);
+    ++compared;
+  }
+  EXPECT_EQ(compared, 100);
+}
+
+TEST(Compass, UsesTheComponentsAskedFor) {
+  Random random(10);
+  const FourierSignature query = random_signature(random, {4, 15});
+  const FourierSignature reference = random_signature(random, {4, 15});
+  const auto cut = [](const FourierSignature& full, int components) {
+    const auto count = static_cast<std::size_t>(components) * full.rows();
+    return FourierSignature(
+        {full.rows(), components}, {full.magnitudes().begin(), full.magnitudes().begin() + count},
+        {full.phases_rad().begin(), full.phases_rad().begin() + count}, std::nullopt);
+  };
+  const auto asked = compass(query, reference, {.components = 5});
+  const auto of_cut = compass(cut(query, 5), cut(reference, 5));
+  const auto of_one_cut = compass(cut(query, 5), reference);
+  ASSERT_TRUE(asked && of_cut && of_one_cut);
+  EXPECT_EQ(asked->heading_rad, of_cut->heading_rad);
+  EXPECT_EQ(asked->heading_rad, of_one_cut->heading_rad);
+  EXPECT_THROW(static_cast<void>(compass(query, reference, {.components = 16})), ContractError);
+  EXPECT_THROW(static_cast<void>(compass(query, reference, {.components = 1})), ContractError);
+  EXPECT_THROW(static_cast<void>(compass(query, reference, {.components = -1})), ContractError);
+  EXPECT_THROW(static_cast<void>(compass(query, random_signature(random, {5, 15}))), ContractError);
+}
+
+TEST(SequentialCompass, ReadsTurnsOfTheSameView) {
+  // [S06 eq. 40-43]; one row, as in the paper, and several.
+  Random random(11);
+  for (const int rows : {1, 7}) {
+    for (int trial = 0; trial < 100; ++trial) {
+      const FourierSignature reference = random_signature(random, {rows, 11});
+      const double turned = random.uniform(-3.1, 3.1);
+      const auto reading = sequential_compass(turn(reference, turned), reference);
+      ASSERT_TRUE(reading);
+      EXPECT_LT(heading_error(*reading, turned), 1e-4);
+      EXPECT_NEAR(reading->correlation, 1.0, 1e-5);
+    }
+  }
+}
+
+TEST(SequentialCompass, TriesTheOppositeStartWhenTheFirstComponentIsWeak) {
+  // The first component is weak and says the opposite. The rule as printed without the second start
+  // fails.
+  const int components = 6;
+  std::vector<float> magnitudes(components, 0.2F);
+  std::vector<float> phases(components, 0.0F);
+  magnitudes[1] = 0.002F;
+  const FourierSignature reference({1, components}, magnitudes, phases, std::nullopt);
+  phases[1] = -std::numbers::pi_v<float>;
+  const FourierSignature query({1, components}, magnitudes, phases, std::nullopt);
+  const auto reading = sequential_compass(turn(query, 0.4), reference);
+  ASSERT_TRUE(reading);
+  EXPECT_LT(heading_error(*reading, 0.4), 1e-3);
+
+  // A strong first component that is wrong is believed: that is the rule, and why compass() is
+  // global.
+  magnitudes[1] = 0.5F;
+  const FourierSignature strong_reference({1, components}, magnitudes,
+                                          std::vector<float>(components, 0.0F), std::nullopt);
+  const FourierSignature strong_query({1, components}, magnitudes, phases, std::nullopt);
+  const auto misled = sequential_compass(turn(strong_query, 0.4), strong_reference);
+  const auto global = compass(turn(strong_query, 0.4), strong_reference);
+  ASSERT_TRUE(misled && global);
+  EXPECT_LE(misled->correlation, global->correlation + 1e-9);
+}
+
+}  // namespace
+}  // namespace panonav
