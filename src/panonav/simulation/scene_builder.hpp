@@ -1,0 +1,76 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "panonav/core/random.hpp"
+#include "panonav/simulation/scene.hpp"
+#include "panonav/simulation/scenes.hpp"
+#include "panonav/simulation/texture.hpp"
+
+namespace panonav {
+
+/// Where a piece of furniture stands: its middle on the floor and how it is turned.
+struct Footing {
+  Point2 centre;
+  double turn_rad = 0.0;
+};
+
+/// Puts a built-in scene together. Random numbers come in two streams: one for what the scene is,
+/// one for which objects have moved, so that moving objects changes nothing else.
+class SceneBuilder {
+ public:
+  SceneBuilder(std::string name, const SceneVariation& variation);
+
+  [[nodiscard]] Random& random() noexcept { return random_; }
+  [[nodiscard]] Scene& scene() noexcept { return scene_; }
+
+  int plain(Colour colour, float emission = 0.0F);
+  int textured(Image image, float emission = 0.0F);
+
+  /// A flat quadrilateral with corners a b c d; the texture's lower edge runs from a to b and it
+  /// repeats `repeat_u` by `repeat_v` times.
+  void quadrilateral(const std::string& object, int material, Vector3 a, Vector3 b, Vector3 c,
+                     Vector3 d, double repeat_u = 1.0, double repeat_v = 1.0);
+
+  /// A box of `size` whose bottom centre is at `at` in the frame of `footing`. Side faces show one
+  /// copy of the texture each `tile_m` metres; 0 shows one copy a face.
+  void box(const std::string& object, int sides, int top, const Footing& footing, Vector3 at,
+           Vector3 size, double tile_m = 0.0);
+
+  void cylinder(const std::string& object, int material, Point2 centre, double bottom_m,
+                double top_m, double radius_m, int facets = 16, double bottom_radius_factor = 1.0);
+
+  /// A wall from a to b, seen from both sides, with the texture repeating every `tile_m`.
+  void wall(const std::string& object, int material, Point2 from, Point2 to, double height_m,
+            double tile_m, double bottom_m = 0.0);
+
+  /// A picture, window or door on the wall from `from` to `to`, `along_m` from its start, 1 cm
+  /// before it on the left-hand side.
+  void on_wall(const std::string& object, int material, Point2 from, Point2 to, double along_m,
+               double width_m, double bottom_m, double top_m);
+
+  void floor(int material, Point2 low, Point2 high, double tile_m, double height_m = 0.0);
+  void ceiling(int material, Point2 low, Point2 high, double height_m, double tile_m);
+
+  /// The place of a movable object that would stand at `wanted` and covers a disc of `radius_m`:
+  /// moved by up to 0.8 m with the variation's share, but never into a drivable area or out of the
+  /// floor's surroundings `room`.
+  Footing movable(const Footing& wanted, double radius_m, const FloorArea& room);
+
+  void lamp(Vector3 position, float intensity);
+  /// Applies the light of the variation and checks the scene.
+  [[nodiscard]] Scene finish();
+
+ private:
+  Mesh& mesh_of(const std::string& object, int material);
+
+  SceneVariation variation_;
+  Random random_;
+  Random moved_;
+  Scene scene_;
+};
+
+}  // namespace panonav

@@ -1,0 +1,35 @@
+#include "panonav/simulation/scenes.hpp"
+
+#include <array>
+#include <string>
+
+#include "panonav/core/error.hpp"
+#include "panonav/simulation/built_in_scenes.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr std::array<std::string_view, 4> kNames{"office", "hall", "hall_periodic", "lab"};
+
+}  // namespace
+
+std::span<const std::string_view> scene_names() {
+  return kNames;
+}
+
+Scene make_scene(std::string_view name, const SceneVariation& variation) {
+  require(variation.moved_objects >= 0.0 && variation.moved_objects <= 1.0, "moved_objects",
+          variation.moved_objects, "0 .. 1");
+  require(variation.light > 0.0 && variation.light <= 100.0, "light", variation.light,
+          "> 0 and <= 100");
+  if (name == "office") return make_office(variation);
+  if (name == "hall") return make_hall(variation, false);
+  if (name == "hall_periodic") return make_hall(variation, true);
+  if (name == "lab") return make_lab(variation);
+  std::string known;
+  for (const auto& each : kNames) known += (known.empty() ? "" : ", ") + std::string(each);
+  throw ContractError("scene", name, known);
+}
+
+}  // namespace panonav
