@@ -138,6 +138,7 @@ Scene make_hall(const SceneVariation& variation, bool periodic) {
   builder.ceiling(builder.plain({0.85F, 0.85F, 0.83F}), room.low, room.high, kHeight, 1.0);
   const int plaster = builder.textured(noise_texture(random, 128, {0.7F, 0.68F, 0.62F}, 0.05));
   const int poster = builder.textured(poster_texture(random, 128));
+  const int door = builder.textured(door_texture(random, 128, {0.45F, 0.3F, 0.2F}));
   const int stone = builder.textured(noise_texture(random, 128, {0.4F, 0.38F, 0.35F}, 0.1));
   const std::array<Point2, 4> corners{room.low, Point2{room.high.x_m, room.low.y_m}, room.high,
                                       Point2{room.low.x_m, room.high.y_m}};
@@ -148,7 +149,12 @@ Scene make_hall(const SceneVariation& variation, bool periodic) {
     builder.wall(wall, plaster, from, to, kHeight, 2.0);
     const double length = distance(from, to);
     for (double along = 0.5; along + 1.0 < length; along += 2.0) {
-      builder.on_wall(wall + " picture", poster, from, to, along, 0.9, 0.6, 1.8);
+      const bool is_door = i == 0 && std::abs(along - 4.5) < 1e-9;
+      if (is_door) {
+        builder.on_wall("door", door, from, to, along, 0.9, 0.0, 2.1);
+      } else {
+        builder.on_wall(wall + " picture", poster, from, to, along, 0.9, 0.6, 1.8);
+      }
       const double share = (along + 1.45) / length;
       const Point2 at{from.x_m + share * (to.x_m - from.x_m),
                       from.y_m + share * (to.y_m - from.y_m)};
@@ -156,8 +162,6 @@ Scene make_hall(const SceneVariation& variation, bool periodic) {
                   1.0);
     }
   }
-  builder.on_wall("door", builder.textured(door_texture(random, 128, {0.45F, 0.3F, 0.2F})),
-                  corners[0], corners[1], 4.0, 1.0, 0.0, 2.1);
   builder.on_wall("clock", builder.textured(poster_texture(random, 64)), corners[2], corners[3],
                   5.6, 0.6, 2.0, 2.6);
   add_lamps(builder, room, kHeight, 3.0);
