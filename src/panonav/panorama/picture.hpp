@@ -21,6 +21,7 @@ struct PictureLayout {
   std::optional<ElevationBand> elevations = std::nullopt;
   /// The part to keep, within `elevations`; empty: all. Needs `elevations`.
   std::optional<ElevationBand> kept_elevations = std::nullopt;
+  friend bool operator==(const PictureLayout&, const PictureLayout&) = default;
 };
 
 /// Rows and columns wanted; 0 keeps the size of the picture (of the part that is kept).

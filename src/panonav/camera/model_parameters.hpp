@@ -1,0 +1,62 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <variant>
+
+#include "panonav/camera/camera.hpp"
+
+namespace panonav {
+
+/// The name of each alternative of CameraModel, in its order; files use these.
+inline constexpr std::array<std::string_view, std::variant_size_v<CameraModel>> camera_model_names{
+    "hyperboloidal", "polynomial", "unified", "equiangular", "equirectangular"};
+
+[[nodiscard]] inline std::string_view model_name(const CameraModel& model) {
+  return camera_model_names[model.index()];
+}
+
+/// The model of that name with default parameters; empty when there is none.
+[[nodiscard]] inline std::optional<CameraModel> model_of_name(std::string_view name) {
+  std::optional<CameraModel> found;
+  [&]<std::size_t... i>(std::index_sequence<i...>) {
+    ((camera_model_names[i] == name ? void(found.emplace(std::in_place_index<i>)) : void()), ...);
+  }
+  (std::make_index_sequence<camera_model_names.size()>());
+  return found;
+}
+
+/// Calls `visit(name, value)` for each parameter of the model; `value` is a double or, for the
+/// coefficients of the polynomial, a vector of doubles. The one list from which files are written
+/// and read. `Model` is CameraModel, const or not.
+template <class Model, class Visit>
+void visit_parameters(Model& model, Visit&& visit) {
+  std::visit(
+      [&](auto& m) {
+        using Kind = std::remove_cvref_t<decltype(m)>;
+        if constexpr (std::is_same_v<Kind, HyperboloidalModel>) {
+          visit("a_mm", m.a_mm);
+          visit("b_mm", m.b_mm);
+          visit("focal_length_px", m.focal_length_px);
+        } else if constexpr (std::is_same_v<Kind, PolynomialModel>) {
+          visit("coefficients", m.coefficients);
+        } else if constexpr (std::is_same_v<Kind, UnifiedModel>) {
+          visit("xi", m.xi);
+          visit("focal_length_px", m.focal_length_px);
+        } else if constexpr (std::is_same_v<Kind, EquiangularModel>) {
+          visit("elevation_at_inner_rad", m.elevation_at_inner_rad);
+          visit("elevation_at_rim_rad", m.elevation_at_rim_rad);
+        } else {
+          static_assert(std::is_same_v<Kind, EquirectangularModel>);
+          visit("elevation_bottom_rad", m.elevation_bottom_rad);
+          visit("elevation_top_rad", m.elevation_top_rad);
+        }
+      },
+      model);
+}
+
+}  // namespace panonav

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/memory/visual_memory.hpp"
+#include "panonav/panorama/picture_source.hpp"
+
+namespace panonav {
+
+/// One picture of a data set and what is known of it.
+struct DatasetEntry {
+  std::string file;            ///< as the data set names it, relative to its folder; unique
+  std::filesystem::path path;  ///< where it lies
+  std::optional<double> stamp_s;
+  std::optional<ReferencePose> pose;  ///< in the world frame
+  std::optional<Pose2> odometry;      ///< in the odometry frame
+  friend bool operator==(const DatasetEntry&, const DatasetEntry&) = default;
+};
+
+/// A recording: pictures in order, and how they become panoramic cylinders. Pictures are read when
+/// they are needed (PanoramaReader).
+struct Dataset {
+  std::filesystem::path folder;
+  PictureSource source;
+  std::vector<DatasetEntry> entries;
+};
+
+/// Reads `folder`/dataset.toml and the table that it names (docs/formats.md). Throws FileError with
+/// one line that names the file, the row or field, the value and what is allowed: wrong or missing
+/// fields, numbers that are not finite, a name that stands twice, a picture that is not there, no
+/// picture at all.
+[[nodiscard]] Dataset read_dataset(const std::filesystem::path& folder);
+
+/// A folder of PNG and JPEG pictures without dataset.toml, in natural order of their names
+/// ("view_9" before "view_10"). Throws FileError when there is none.
+[[nodiscard]] Dataset read_picture_folder(const std::filesystem::path& folder,
+                                          PictureSource source);
+
+/// One picture as a data set.
+[[nodiscard]] Dataset single_picture(const std::filesystem::path& file, PictureSource source);
+
+/// Writes dataset.toml, the table (poses.csv, or images.csv when no position is known) and, for
+/// mirror pictures, camera.toml into `dataset.folder`; the pictures are the caller's. The table
+/// comes before dataset.toml, so that a data set with a dataset.toml is whole. Only the columns
+/// that every entry has can be written: throws ContractError when some entries have a value and
+/// others have not.
+void write_dataset(const Dataset& dataset);
+
+}  // namespace panonav

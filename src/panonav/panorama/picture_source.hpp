@@ -1,0 +1,32 @@
+#pragma once
+
+#include <optional>
+
+#include "panonav/camera/camera.hpp"
+#include "panonav/core/image.hpp"
+#include "panonav/panorama/picture.hpp"
+
+namespace panonav {
+
+/// What the pictures of a recording show.
+enum class PictureKind {
+  panorama,         ///< ready-made panoramic cylinders
+  equirectangular,  ///< 360 degree pictures, the whole sphere
+  mirror            ///< raw images of a mirror or fisheye camera with a vertical axis
+};
+
+/// How the pictures of a recording become panoramic cylinders: everything that is known of the
+/// camera.
+struct PictureSource {
+  PictureKind kind = PictureKind::panorama;
+  /// Panorama and equirectangular: how columns and rows lie. Mirror: only `kept_elevations` counts,
+  /// the band that is unwarped (empty: all that the camera sees at every azimuth).
+  PictureLayout layout;
+  std::optional<Camera> camera;  ///< mirror, and only there
+  /// Mirror: grey, of the camera's size; pixels of value 0 show the robot itself and are read as
+  /// black.
+  std::optional<Image> mask;
+  friend bool operator==(const PictureSource&, const PictureSource&) = default;
+};
+
+}  // namespace panonav
