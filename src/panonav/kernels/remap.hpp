@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "panonav/kernels/dispatch.hpp"
+
+// Looking up the pixels of an image by a table. All of it is integer arithmetic until the last
+// scaling, so every instruction set gives the same bits.
+
+namespace panonav::kernels {
+
+/// A rectangle of an 8-bit image of one channel.
+struct Pixels {
+  const std::uint8_t* data = nullptr;
+  int width = 0;
+  int height = 0;
+  std::ptrdiff_t stride = 0;
+};
+
+/// Half the width and height (odd ones are rounded down): each new pixel is the mean of 2 x 2 old
+/// ones, halves rounded up. `halved` has room for (width / 2) * (height / 2) bytes, without gaps.
+void halve(Pixels pixels, std::uint8_t* halved, Instructions instructions);
+
+/// Puts every pixel beside the one below: pair v * width + u holds pixel (u, v) in the low byte and
+/// (u, v + 1) in the high one; v = 0 .. height - 2. Then the four pixels around any point lie in 32
+/// consecutive bits.
+void pair_rows(Pixels pixels, std::uint16_t* pairs, Instructions instructions);
+
+/// The four weights of a tap: bytes for (u, v), (u, v + 1), (u + 1, v), (u + 1, v + 1), from the
+/// low byte on. They add up to this.
+inline constexpr int tap_weight_sum = 127;
+
+/// values[i] = scale * sum over t < taps of the weighted mean at pair positions[t * values.size() +
+/// i], times tap_weight_sum. Throws ContractError when the tables do not hold taps * values.size()
+/// entries. The caller guarantees that each position and the next lie within `pairs`, and that the
+/// bytes of a weight add up to at most tap_weight_sum.
+void remap(std::span<const std::uint16_t> pairs, std::span<const std::uint32_t> positions,
+           std::span<const std::uint32_t> weights, int taps, float scale, std::span<float> values,
+           Instructions instructions);
+
+}  // namespace panonav::kernels
