@@ -10,7 +10,10 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/memory/comparison.hpp"
+#include "panonav/memory/exact_search.hpp"
 #include "panonav/memory/link_set.hpp"
+#include "panonav/memory/sketch_index.hpp"
 #include "panonav/memory/view_store.hpp"
 
 namespace panonav {
@@ -18,24 +21,6 @@ namespace panonav {
 namespace {
 
 using Row = ViewStore::Row;
-
-std::string shape_text(SignatureShape shape) {
-  return std::to_string(shape.rows) + " rows x " + std::to_string(shape.components) + " components";
-}
-
-void require_shape(SignatureShape found, SignatureShape wanted) {
-  if (!(found == wanted)) {
-    throw ContractError("signature shape", shape_text(found), shape_text(wanted));
-  }
-}
-
-void require_signature(const PackedSignature& signature, SignatureShape wanted) {
-  require_shape(signature.shape, wanted);
-  require(signature.magnitudes.size() == wanted.size(), "number of packed magnitudes",
-          static_cast<double>(signature.magnitudes.size()), std::to_string(wanted.size()));
-  require(signature.phases.size() == wanted.size(), "number of packed phases",
-          static_cast<double>(signature.phases.size()), std::to_string(wanted.size()));
-}
 
 void require_pose(const std::optional<ReferencePose>& pose) {
   if (!pose) return;
@@ -50,16 +35,22 @@ void require_pose(const std::optional<ReferencePose>& pose) {
 
 struct VisualMemory::Implementation {
   Implementation(SignatureShape shape_, float full_scale_, std::optional<ElevationBand> elevations_)
-      : shape(shape_), full_scale(full_scale_), elevations(elevations_), store(shape_) {}
+      : shape(shape_),
+        full_scale(full_scale_),
+        elevations(elevations_),
+        store(shape_),
+        index(shape_) {}
 
   Implementation(const Implementation& other)
       : shape(other.shape),
         full_scale(other.full_scale),
         elevations(other.elevations),
         store(other.store),
+        index(other.index),
         records(other.records),
         views(other.views),
         rows(other.rows),
+        view_of_row(other.view_of_row),
         links(other.links),
         next_id(other.next_id) {
     names.reserve(views.size());
@@ -85,14 +76,20 @@ struct VisualMemory::Implementation {
   void require_view(ViewId view) const { static_cast<void>(position(view)); }
   [[nodiscard]] Row row(ViewId view) const { return rows[position(view)]; }
 
+  [[nodiscard]] SearchedViews searched() const {
+    return {shape, store, index, views, rows, view_of_row};
+  }
+
   SignatureShape shape;
   float full_scale;
   std::optional<ElevationBand> elevations;
   ViewStore store;
+  SketchIndex index;
   std::deque<ReferenceInfo>
       records;                // by row of the store; a deque, so that names stay where they are
   std::vector<ViewId> views;  // ascending
   std::vector<Row> rows;      // of `views`
+  std::vector<ViewId> view_of_row;
   std::unordered_map<std::string_view, ViewId> names;  // the text belongs to `records`
   LinkSet links;
   std::uint64_t next_id = 0;
@@ -102,10 +99,10 @@ VisualMemory::VisualMemory(SignatureShape shape, float full_scale,
                            std::optional<ElevationBand> elevations) {
   require(shape.rows >= 1, "rows", shape.rows, ">= 1");
   require(shape.components >= 1, "components", shape.components, ">= 1");
-  // Sums of absolute differences of bytes then fit into 32 bits.
-  constexpr double most_bytes = 1 << 24;
+  // Sums of differences, and of sums over blocks with their rounding, then stay far below 2^30.
+  constexpr double most_bytes = 1 << 20;
   require(static_cast<double>(shape.rows) * shape.components < most_bytes, "rows x components",
-          static_cast<double>(shape.rows) * shape.components, "< 2^24");
+          static_cast<double>(shape.rows) * shape.components, "< 2^20");
   require(std::isfinite(full_scale) && full_scale > 0.0F, "full_scale", full_scale, "finite, > 0");
   implementation_ = std::make_unique<Implementation>(shape, full_scale, elevations);
 }
@@ -161,12 +158,15 @@ void VisualMemory::append_as(ViewId id, const PackedSignature& signature, Refere
   const Row row = memory.store.add(signature);
   if (row == memory.records.size()) {
     memory.records.push_back(std::move(info));
+    memory.view_of_row.push_back(id);
   } else {
     memory.records[row] = std::move(info);
+    memory.view_of_row[row] = id;
   }
   memory.names.emplace(memory.records[row].name, id);
   memory.views.push_back(id);
   memory.rows.push_back(row);
+  memory.index.insert(memory.store, row);
   memory.next_id = std::uint64_t{id.value} + 1;
 }
 
@@ -177,6 +177,7 @@ void VisualMemory::remove(ViewId view) {
   memory.links.erase_all_of(view);
   memory.names.erase(memory.records[row].name);
   memory.records[row] = {};
+  memory.index.erase(row);
   memory.store.free(row);
   memory.views.erase(memory.views.begin() + static_cast<std::ptrdiff_t>(position));
   memory.rows.erase(memory.rows.begin() + static_cast<std::ptrdiff_t>(position));
@@ -238,117 +239,17 @@ std::vector<ViewId> VisualMemory::neighbours(ViewId view) const {
   return implementation_->links.neighbours(view);
 }
 
-namespace {
-
-/// What a search compares: the first `components` components of the rows that count.
-struct Comparison {
-  std::vector<std::uint8_t> query;
-  std::vector<std::uint8_t> mask;  // 255 where a byte counts
-};
-
-std::uint32_t masked_difference(const std::uint8_t* view, const Comparison& comparison,
-                                std::size_t begin, std::size_t end) {
-  std::uint32_t sum = 0;
-  for (std::size_t i = begin; i < end; ++i) {
-    sum += static_cast<std::uint32_t>(std::abs(int{view[i]} - int{comparison.query[i]}) &
-                                      int{comparison.mask[i]});
-  }
-  return sum;
-}
-
-bool before(const Match& a, const Match& b) {
-  return std::pair(a.dissimilarity, a.view) < std::pair(b.dissimilarity, b.view);
-}
-
-int checked_components(int components, SignatureShape shape) {
-  require(components >= 0 && components <= shape.components, "components", components,
-          "0 .. " + std::to_string(shape.components));
-  return components == 0 ? shape.components : components;
-}
-
-Comparison make_comparison(const PackedSignature& query, SignatureShape shape,
-                           const SearchMask& mask) {
-  require_signature(query, shape);
-  const auto rows = static_cast<std::size_t>(shape.rows);
-  require(mask.allowed_rows.empty() || mask.allowed_rows.size() == rows, "number of allowed rows",
-          static_cast<double>(mask.allowed_rows.size()), "0 or " + std::to_string(rows));
-  Comparison comparison{query.magnitudes, std::vector<std::uint8_t>(shape.size(), 255)};
-  if (!mask.allowed_rows.empty()) {
-    for (std::size_t i = 0; i < shape.size(); ++i) {
-      if (mask.allowed_rows[i % rows] == 0) comparison.mask[i] = 0;
-    }
-  }
-  return comparison;
-}
-
-}  // namespace
-
 SearchResult VisualMemory::search(const PackedSignature& query, const SearchOptions& options,
                                   const SearchMask& mask) const {
-  const Implementation& memory = *implementation_;
-  require(options.top >= 1, "top", options.top, ">= 1");
-  const int components = checked_components(options.components, memory.shape);
-  const Comparison comparison = make_comparison(query, memory.shape, mask);
-  const std::size_t bytes = static_cast<std::size_t>(components) * memory.shape.rows;
-  std::vector<ViewId> excluded(mask.excluded_views.begin(), mask.excluded_views.end());
-  std::ranges::sort(excluded);
-
-  SearchResult result;
-  for (std::size_t i = 0; i < memory.views.size(); ++i) {
-    if (std::ranges::binary_search(excluded, memory.views[i])) continue;
-    result.matches.push_back(
-        {memory.views[i],
-         masked_difference(memory.store.magnitudes(memory.rows[i]), comparison, 0, bytes)});
-  }
-  result.views_in_full = result.matches.size();
-  result.bytes_read = result.views_in_full * bytes;
-  result.bytes_in_full = result.bytes_read;
-  const std::size_t top = std::min(result.matches.size(), static_cast<std::size_t>(options.top));
-  std::partial_sort(result.matches.begin(),
-                    result.matches.begin() + static_cast<std::ptrdiff_t>(top), result.matches.end(),
-                    before);
-  result.matches.resize(top);
-  return result;
+  return exact_search(implementation_->searched(), query, options, mask,
+                      kernels::chosen_instructions());
 }
 
 std::vector<HierarchyLevel> VisualMemory::hierarchy(
     const PackedSignature& query, double tolerance, int components,
     const std::function<bool(const HierarchyLevel&)>& stop, const SearchMask& mask) const {
-  const Implementation& memory = *implementation_;
-  require(std::isfinite(tolerance) && tolerance >= 0.0, "tolerance", tolerance, "finite, >= 0");
-  components = checked_components(components, memory.shape);
-  const Comparison comparison = make_comparison(query, memory.shape, mask);
-  const auto rows = static_cast<std::size_t>(memory.shape.rows);
-  std::vector<ViewId> excluded(mask.excluded_views.begin(), mask.excluded_views.end());
-  std::ranges::sort(excluded);
-
-  std::vector<Match> candidates;
-  for (const ViewId view : memory.views) {
-    if (!std::ranges::binary_search(excluded, view)) candidates.push_back({view, 0});
-  }
-  std::vector<HierarchyLevel> levels;
-  std::uint64_t bytes_read = 0;
-  double best_full = std::numeric_limits<double>::infinity();
-  for (int m = 1; m <= components && !candidates.empty(); ++m) {
-    const std::size_t begin = (m - 1) * rows;
-    for (Match& match : candidates) {
-      match.dissimilarity += masked_difference(memory.store.magnitudes(memory.row(match.view)),
-                                               comparison, begin, begin + rows);
-    }
-    bytes_read += candidates.size() * rows;
-    std::ranges::sort(candidates, before);
-    const Match& leader = candidates.front();
-    const std::uint32_t full =
-        leader.dissimilarity + masked_difference(memory.store.magnitudes(memory.row(leader.view)),
-                                                 comparison, begin + rows, components * rows);
-    bytes_read += (components - m) * rows;
-    best_full = std::min(best_full, static_cast<double>(full));
-    const double limit = (1.0 + tolerance) * best_full;
-    std::erase_if(candidates, [&](const Match& match) { return match.dissimilarity > limit; });
-    levels.push_back({m, candidates, bytes_read});
-    if (stop && stop(levels.back())) break;
-  }
-  return levels;
+  return hierarchical_search(implementation_->searched(), query, tolerance, components, stop, mask,
+                             kernels::chosen_instructions());
 }
 
 }  // namespace panonav

@@ -71,9 +71,10 @@ struct SearchResult {
 /// when `components` components have been compared.
 struct HierarchyLevel {
   int components = 0;
-  std::vector<Match>
-      candidates;  ///< ascending (partial dissimilarity, view); nested in the level before
+  /// Ascending (partial dissimilarity, view); nested in the level before.
+  std::vector<Match> candidates;
   std::uint64_t bytes_read = 0;  ///< by all levels so far
+  double limit = 0.0;  ///< the candidates are all views whose partial dissimilarity is at most this
 };
 
 /// The reference views that a robot remembers. Views keep their id for ever; ids grow in the order

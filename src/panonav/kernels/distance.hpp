@@ -1,0 +1,33 @@
+#pragma once
+
+#include "panonav/kernels/dispatch.hpp"
+#include "panonav/kernels/distance_targets.hpp"
+
+namespace panonav::kernels {
+
+/// The integer loops of the search in a visual memory, for one instruction set. All sets give the
+/// same numbers. None of them allocates or throws.
+struct DistanceKernels {
+  /// Sum of |(a & mask) - (b & mask)| over `count` bytes; any count below 2^22, any alignment.
+  uint32_t (*masked_l1)(const uint8_t* a, const uint8_t* b, const uint8_t* mask, size_t count);
+
+  /// For each view v of 8 * octets views: bounds[v] = max(0, constant + sum_g steps[g] *
+  /// L1(sketch of v & mask, values)[group g] - min(slacks[v], largest_slack)), and the smallest of
+  /// them. The sketches of 8 views are interleaved: first group of views 0 .. 7, second group of
+  /// views 0 .. 7, .. The caller guarantees that each bound stays below 2^31 and octets >= 1.
+  uint32_t (*sketch_bounds)(const uint8_t* sketches, const int32_t* slacks, size_t octets,
+                            const SketchQuery& query, uint32_t* bounds);
+
+  /// The same for one view whose groups lie one after the other. query.groups is a multiple of 8.
+  uint32_t (*sketch_bound)(const uint8_t* sketch, int32_t slack, const SketchQuery& query);
+
+  /// Writes the positions of the values <= limit, ascending, and returns their number. `indices`
+  /// has room for `count` entries and 16 more.
+  size_t (*collect_at_most)(const uint32_t* values, size_t count, uint32_t limit,
+                            uint32_t* indices);
+};
+
+/// The bodies for one of `available_instructions()`; for any other set the scalar ones.
+[[nodiscard]] const DistanceKernels& distance_kernels(Instructions instructions);
+
+}  // namespace panonav::kernels

@@ -1,0 +1,153 @@
+#include "panonav/kernels/distance.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <vector>
+
+#include "panonav/core/random.hpp"
+
+namespace panonav::kernels {
+namespace {
+
+std::vector<std::uint8_t> random_bytes(Random& random, std::size_t count) {
+  std::vector<std::uint8_t> bytes(count);
+  for (auto& byte : bytes) byte = static_cast<std::uint8_t>(random.next());
+  return bytes;
+}
+
+std::vector<std::uint8_t> random_mask(Random& random, std::size_t count) {
+  std::vector<std::uint8_t> mask(count);
+  for (auto& byte : mask) byte = random.index(4) == 0 ? 0 : 255;
+  return mask;
+}
+
+class Distance : public testing::TestWithParam<Instructions> {
+ protected:
+  const DistanceKernels& kernels = distance_kernels(GetParam());
+  const DistanceKernels& scalar = distance_kernels(Instructions::scalar);
+};
+
+TEST_P(Distance, MaskedL1IsTheSumOfDifferencesForEveryLengthAndOffset) {
+  Random random(11);
+  for (std::size_t count = 0; count <= 300; ++count) {
+    const std::size_t offset = random.index(64);
+    const auto a = random_bytes(random, count + offset);
+    const auto b = random_bytes(random, count + offset);
+    const auto mask = random_mask(random, count + offset);
+    std::uint32_t expected = 0;
+    for (std::size_t i = offset; i < offset + count; ++i) {
+      if (mask[i] != 0) expected += static_cast<std::uint32_t>(std::abs(a[i] - b[i]));
+    }
+    EXPECT_EQ(kernels.masked_l1(a.data() + offset, b.data() + offset, mask.data() + offset, count),
+              expected)
+        << count << " bytes";
+  }
+}
+
+TEST_P(Distance, MaskedL1DoesNotOverflow) {
+  const std::size_t count = (std::size_t{1} << 22U) - 1;
+  const std::vector<std::uint8_t> zeros(count, 0);
+  const std::vector<std::uint8_t> full(count, 255);
+  EXPECT_EQ(kernels.masked_l1(zeros.data(), full.data(), full.data(), count), 255U * count);
+}
+
+struct SketchCase {
+  std::vector<std::uint8_t> sketches, values, mask;
+  std::vector<std::uint64_t> steps;
+  std::vector<std::int32_t> slacks;
+  SketchQuery query{};
+};
+
+SketchCase random_case(Random& random, std::size_t octets, std::size_t groups,
+                       std::size_t stored_groups) {
+  SketchCase made;
+  made.sketches = random_bytes(random, octets * stored_groups * 64);
+  made.values = random_bytes(random, stored_groups * 8);
+  made.mask = random_mask(random, stored_groups * 8);
+  for (std::size_t i = 0; i < made.values.size(); ++i) made.values[i] &= made.mask[i];
+  for (std::size_t i = 0; i < stored_groups; ++i) made.steps.push_back(1 + random.index(200));
+  for (std::size_t i = 0; i < octets * 8; ++i) {
+    const bool no_view = random.index(10) == 0;
+    made.slacks.push_back(no_view ? -(1 << 30) : static_cast<std::int32_t>(random.index(100000)));
+  }
+  const auto constant = static_cast<std::int32_t>(random.index(200000)) - 100000;
+  const auto largest = static_cast<std::int32_t>(random.index(100000));
+  made.query = {made.values.data(), made.mask.data(), made.steps.data(), groups, stored_groups,
+                constant,           largest};
+  return made;
+}
+
+TEST_P(Distance, SketchBoundsFollowTheirDefinition) {
+  Random random(12);
+  int above_zero = 0;
+  for (std::size_t groups = 1; groups <= 17; ++groups) {
+    const std::size_t octets = 1 + random.index(9);
+    const std::size_t stored = groups + random.index(3);
+    const SketchCase made = random_case(random, octets, groups, stored);
+    std::vector<std::uint32_t> bounds(octets * 8);
+    const std::uint32_t smallest = kernels.sketch_bounds(made.sketches.data(), made.slacks.data(),
+                                                         octets, made.query, bounds.data());
+    EXPECT_EQ(smallest, *std::ranges::min_element(bounds));
+    for (std::size_t view = 0; view < bounds.size(); ++view) {
+      std::int64_t expected =
+          made.query.constant - std::min(made.slacks[view], made.query.largest_slack);
+      for (std::size_t i = 0; i < groups * 8; ++i) {
+        if (made.mask[i] == 0) continue;
+        const std::uint8_t code =
+            made.sketches[view / 8 * stored * 64 + i / 8 * 64 + view % 8 * 8 + i % 8];
+        expected += static_cast<std::int64_t>(made.steps[i / 8]) * std::abs(code - made.values[i]);
+      }
+      expected = std::max<std::int64_t>(expected, 0);
+      EXPECT_EQ(bounds[view], expected) << groups << " groups, view " << view;
+      above_zero += expected > 0 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(above_zero, 100);
+}
+
+TEST_P(Distance, SketchBoundOfOneViewIsThatOfTheInterleavedOnes) {
+  Random random(13);
+  for (std::size_t groups = 8; groups <= 40; groups += 8) {
+    const SketchCase made = random_case(random, 1, groups, groups);
+    std::vector<std::uint32_t> bounds(8);
+    scalar.sketch_bounds(made.sketches.data(), made.slacks.data(), 1, made.query, bounds.data());
+    for (std::size_t view = 0; view < 8; ++view) {
+      std::vector<std::uint8_t> alone;
+      for (std::size_t group = 0; group < groups; ++group) {
+        const auto from = made.sketches.begin() + static_cast<long>((group * 8 + view) * 8);
+        alone.insert(alone.end(), from, from + 8);
+      }
+      EXPECT_EQ(kernels.sketch_bound(alone.data(), made.slacks[view], made.query), bounds[view]);
+    }
+  }
+}
+
+TEST_P(Distance, CollectFindsAllValuesUpToTheLimit) {
+  Random random(14);
+  std::size_t collected = 0;
+  for (std::size_t count = 0; count <= 100; ++count) {
+    std::vector<std::uint32_t> values(count);
+    for (auto& value : values) value = static_cast<std::uint32_t>(random.index(10));
+    if (count > 3) values[2] = 0xFFFFFFFFU;
+    const auto limit = static_cast<std::uint32_t>(random.index(10));
+    std::vector<std::uint32_t> expected;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (values[i] <= limit) expected.push_back(static_cast<std::uint32_t>(i));
+    }
+    std::vector<std::uint32_t> found(count + 16);
+    found.resize(kernels.collect_at_most(values.data(), count, limit, found.data()));
+    EXPECT_EQ(found, expected) << count << " values";
+    collected += found.size();
+  }
+  EXPECT_GT(collected, 500U);
+}
+
+INSTANTIATE_TEST_SUITE_P(EachInstructionSet, Distance,
+                         testing::ValuesIn(available_instructions().begin(),
+                                           available_instructions().end()),
+                         [](const auto& instance) { return std::string(name(instance.param)); });
+
+}  // namespace
+}  // namespace panonav::kernels
