@@ -12,8 +12,8 @@ long long load_group(const uint8_t* from) {
 
 // _mm512_reduce_add_epi64 and some conversions make gcc 12 warn of uninitialised values.
 int64_t sum_of_lanes(__m512i x) {
-  const __m256i four =
-      _mm256_add_epi64(_mm512_castsi512_si256(x), _mm512_maskz_extracti64x4_epi64(0xF, x, 1));
+  const __m256i four = _mm256_add_epi64(_mm512_maskz_extracti64x4_epi64(0xF, x, 0),
+                                        _mm512_maskz_extracti64x4_epi64(0xF, x, 1));
   const __m128i two =
       _mm_add_epi64(_mm256_castsi256_si128(four), _mm256_extracti128_si256(four, 1));
   return _mm_cvtsi128_si64(two) + _mm_extract_epi64(two, 1);
