@@ -1,0 +1,320 @@
+#include "panonav/panorama/unwarp_table.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/kernels/remap.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+/// The upper left one of four pixels of a halved image, and the weights of all four.
+struct Tap {
+  int level = 0;
+  int u = -1;  // -1: nothing is seen there
+  int v = -1;
+  std::uint32_t weights = 0;
+  [[nodiscard]] bool is_seen() const { return u >= 0; }
+};
+
+/// Taps of one row: tap t of column c at t * columns + c.
+using Taps = std::vector<Tap>;
+
+/// Four weights that add up to kernels::tap_weight_sum exactly; what rounding leaves goes where it
+/// cut off most.
+std::uint32_t pack_weights(double fraction_u, double fraction_v) {
+  const std::array<double, 4> exact = {(1 - fraction_u) * (1 - fraction_v),
+                                       (1 - fraction_u) * fraction_v, fraction_u * (1 - fraction_v),
+                                       fraction_u * fraction_v};
+  std::array<std::uint32_t, 4> weights{};
+  std::array<double, 4> cut_off{};
+  int left = kernels::tap_weight_sum;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double scaled = exact[i] * kernels::tap_weight_sum;
+    weights[i] = static_cast<std::uint32_t>(scaled);
+    cut_off[i] = scaled - weights[i];
+    left -= static_cast<int>(weights[i]);
+  }
+  for (; left > 0; --left) {
+    const auto most = static_cast<std::size_t>(std::ranges::max_element(cut_off) - cut_off.begin());
+    ++weights[most];
+    cut_off[most] = -1.0;
+  }
+  return weights[0] | weights[1] << 8U | weights[2] << 16U | weights[3] << 24U;
+}
+
+double distance_px(const PixelPoint& a, const PixelPoint& b) {
+  return std::hypot(a.u_px - b.u_px, a.v_px - b.v_px);
+}
+
+/// Makes the taps of one row after the other.
+class RowSampler {
+ public:
+  RowSampler(const Camera& camera, int rows, int columns, const ElevationBand& band)
+      : camera_(camera),
+        columns_(columns),
+        top_rad_(band.top_rad),
+        column_rad_(2.0 * pi / columns),
+        row_rad_((band.top_rad - band.bottom_rad) / rows) {}
+
+  [[nodiscard]] Taps sample(int row) const {
+    const double elevation_rad = top_rad_ - row_rad_ * (row + 0.5);
+    const Spacing spacing = measure(elevation_rad);
+    const int smaller_side = std::min(camera_.image_size.width, camera_.image_size.height);
+    int level = static_cast<int>(
+        std::lround(std::log2(std::max(1.0, std::min(spacing.across_px, spacing.down_px)))));
+    while (level > 0 && (smaller_side >> level) < 4) --level;
+    for (;; --level) {
+      Placement placement = place(elevation_rad, spacing, level);
+      if (level == 0 || !placement.crosses_border) return std::move(placement.taps);
+    }
+  }
+
+ private:
+  /// Distances of neighbouring values in the image.
+  struct Spacing {
+    double across_px = 0.0;
+    double down_px = 0.0;
+  };
+  struct Placement {
+    Taps taps;
+    /// Some taps had to be moved inward to stay clear of the mirror's border.
+    bool crosses_border = false;
+  };
+
+  [[nodiscard]] std::optional<PixelPoint> look(double azimuth_rad, double elevation_rad) const {
+    return project(camera_, Direction3::from_angles(azimuth_rad, elevation_rad));
+  }
+
+  struct RadiusRange {
+    double low_px, high_px;
+  };
+
+  /// Distances from the centre at which all four pixels of a tap lie within the mirror, corners
+  /// included. An inner radius of 0 is no border.
+  [[nodiscard]] RadiusRange usable_radii(double pixel) const {
+    const double reach_px = 1.5 * std::numbers::sqrt2 * pixel;
+    const double inner_px = camera_.inner_radius_px;
+    const double middle_px = 0.5 * (inner_px + camera_.rim_radius_px);
+    return {inner_px > 0.0 ? std::min(inner_px + reach_px, middle_px) : 0.0,
+            std::max(camera_.rim_radius_px - reach_px, middle_px)};
+  }
+
+  /// Means over some azimuths; 0 where nothing is seen.
+  [[nodiscard]] Spacing measure(double elevation_rad) const {
+    Spacing sum;
+    int across_count = 0;
+    int down_count = 0;
+    constexpr int probes = 32;
+    for (int probe = 0; probe < probes; ++probe) {
+      const double azimuth_rad = 2.0 * pi * probe / probes;
+      const auto centre = look(azimuth_rad, elevation_rad);
+      if (!centre) continue;
+      if (const auto beside = look(azimuth_rad + column_rad_ / 2, elevation_rad)) {
+        sum.across_px += 2.0 * distance_px(*centre, *beside);
+        ++across_count;
+      }
+      for (const double half_rad : {row_rad_ / 2, -row_rad_ / 2}) {
+        if (const auto below = look(azimuth_rad, elevation_rad - half_rad)) {
+          sum.down_px += 2.0 * distance_px(*centre, *below);
+          ++down_count;
+        }
+      }
+    }
+    return {sum.across_px / std::max(1, across_count), sum.down_px / std::max(1, down_count)};
+  }
+
+  [[nodiscard]] Placement place(double elevation_rad, const Spacing& spacing, int level) const {
+    const double pixel = 1 << level;
+    const int across = std::max(1, static_cast<int>(std::lround(spacing.across_px / pixel)));
+    const int down = std::max(1, static_cast<int>(std::lround(spacing.down_px / pixel)));
+    const int width = camera_.image_size.width >> level;
+    const int height = camera_.image_size.height >> level;
+    const RadiusRange range = usable_radii(pixel);
+    Placement placement;
+    placement.taps.resize(static_cast<std::size_t>(across) * down * columns_);
+    auto tap = placement.taps.begin();
+    for (int i = 0; i < down; ++i) {
+      const double tap_elevation_rad = elevation_rad + row_rad_ * (0.5 - (i + 0.5) / down);
+      for (int j = 0; j < across; ++j) {
+        for (int c = 0; c < columns_; ++c, ++tap) {
+          auto point = look(column_rad_ * (c + (j + 0.5) / across - 0.5), tap_elevation_rad);
+          if (!point) continue;
+          const double radius_px = distance_px(*point, camera_.centre);
+          const double usable_px = std::clamp(radius_px, range.low_px, range.high_px);
+          placement.crosses_border |= usable_px != radius_px;
+          if (usable_px != radius_px) {
+            const double inward = usable_px / radius_px;
+            point->u_px = camera_.centre.u_px + inward * (point->u_px - camera_.centre.u_px);
+            point->v_px = camera_.centre.v_px + inward * (point->v_px - camera_.centre.v_px);
+          }
+          const double u = std::clamp(point->u_px / pixel - 0.5, 0.0, width - 1.0);
+          const double v = std::clamp(point->v_px / pixel - 0.5, 0.0, height - 1.0);
+          tap->level = level;
+          tap->u = std::min(static_cast<int>(u), width - 2);
+          tap->v = std::min(static_cast<int>(v), height - 2);
+          tap->weights = pack_weights(u - tap->u, v - tap->v);
+        }
+      }
+    }
+    return placement;
+  }
+
+  const Camera& camera_;
+  int columns_;
+  double top_rad_, column_rad_, row_rad_;
+};
+
+/// Values of which some taps are seen take those for the others. Returns which columns are seen.
+std::vector<std::uint8_t> complete_columns(Taps& taps, int columns) {
+  std::vector<std::uint8_t> seen(static_cast<std::size_t>(columns), 0);
+  const int count = static_cast<int>(taps.size()) / columns;
+  for (int c = 0; c < columns; ++c) {
+    std::optional<Tap> instead;
+    for (int t = 0; t < count && !instead; ++t) {
+      const Tap& tap = taps[static_cast<std::size_t>(t) * columns + c];
+      if (tap.is_seen()) instead = tap;
+    }
+    if (!instead) continue;
+    seen[c] = 1;
+    for (int t = 0; t < count; ++t) {
+      Tap& tap = taps[static_cast<std::size_t>(t) * columns + c];
+      if (!tap.is_seen()) tap = *instead;
+    }
+  }
+  return seen;
+}
+
+void copy_column(const Taps& from, int from_column, Taps& to, int to_column, int columns) {
+  const std::size_t from_count = from.size() / columns;
+  for (std::size_t t = 0; t < to.size() / columns; ++t) {
+    to[t * columns + to_column] = from[t % from_count * columns + from_column];
+  }
+}
+
+/// The first index for which holds(index) is true, in the order start, start - 1, start + 1, start
+/// - 2, ..
+template <class Predicate>
+std::optional<int> nearest(int start, int count, bool wraps, Predicate holds) {
+  for (int distance = 0; distance < count; ++distance) {
+    for (const int sign : {-1, 1}) {
+      int index = start + sign * distance;
+      if (wraps) index = (index + count) % count;
+      if (index >= 0 && index < count && holds(index)) return index;
+    }
+  }
+  return {};
+}
+
+/// What is not seen looks where the nearest row seen in the same column looks; a column in which
+/// nothing is seen looks as the nearest column does.
+void fill_unseen(std::vector<Taps>& rows, const std::vector<std::vector<std::uint8_t>>& seen,
+                 int columns) {
+  const int count = static_cast<int>(rows.size());
+  std::vector<std::uint8_t> column_seen(static_cast<std::size_t>(columns), 0);
+  for (const auto& row : seen) {
+    for (int c = 0; c < columns; ++c) column_seen[c] |= row[c];
+  }
+  if (std::ranges::count(column_seen, 0) == columns) {
+    throw ContractError("elevations", "out of sight", "a band of which the camera sees something");
+  }
+  const std::vector<Taps> original = rows;
+  for (int y = 0; y < count; ++y) {
+    // A row of which nothing is seen is as fine as the one whose columns it takes.
+    if (std::ranges::count(seen[y], 0) == columns) {
+      const auto like = nearest(
+          y, count, false, [&](int row) { return std::ranges::count(seen[row], 0) < columns; });
+      rows[y].assign(original[*like].size(), Tap{});
+    }
+    for (int c = 0; c < columns; ++c) {
+      if (seen[y][c] != 0) continue;
+      const int column =
+          *nearest(c, columns, true, [&](int other) { return column_seen[other] != 0; });
+      const int row =
+          *nearest(y, count, false, [&](int other) { return seen[other][column] != 0; });
+      copy_column(original[row], column, rows[y], c, columns);
+    }
+  }
+}
+
+/// Which parts of which halved images are needed, and where they lie in their buffers.
+void place_levels(const std::vector<Taps>& rows, UnwarpTable& table) {
+  int highest = 0;
+  for (const Taps& taps : rows) {
+    for (const Tap& tap : taps) highest = std::max(highest, tap.level);
+  }
+  table.levels.resize(static_cast<std::size_t>(highest) + 1);
+  for (UnwarpTable::Level& level : table.levels) {
+    level.left = level.top = level.pair_left = level.pair_top = std::numeric_limits<int>::max();
+  }
+  for (const Taps& taps : rows) {
+    for (const Tap& tap : taps) {
+      UnwarpTable::Level& level = table.levels[static_cast<std::size_t>(tap.level)];
+      level.pair_left = std::min(level.pair_left, tap.u);
+      level.pair_top = std::min(level.pair_top, tap.v);
+      level.pair_right = std::max(level.pair_right, tap.u + 2);
+      level.pair_bottom = std::max(level.pair_bottom, tap.v + 1);  // a pair reaches one row further
+    }
+  }
+  for (int i = highest; i >= 0; --i) {
+    UnwarpTable::Level& level = table.levels[static_cast<std::size_t>(i)];
+    if (level.has_pairs()) {
+      level.left = std::min(level.left, level.pair_left);
+      level.top = std::min(level.top, level.pair_top);
+      level.right = std::max(level.right, level.pair_right);
+      level.bottom = std::max(level.bottom, level.pair_bottom + 1);
+      level.pairs_at = table.pairs_size;
+      table.pairs_size += static_cast<std::size_t>(level.pair_right - level.pair_left) *
+                          (level.pair_bottom - level.pair_top);
+    }
+    if (i == 0) break;
+    level.halved_at = table.halved_size;
+    table.halved_size +=
+        static_cast<std::size_t>(level.right - level.left) * (level.bottom - level.top);
+    UnwarpTable::Level& finer = table.levels[static_cast<std::size_t>(i) - 1];
+    finer.left = std::min(finer.left, 2 * level.left);
+    finer.top = std::min(finer.top, 2 * level.top);
+    finer.right = std::max(finer.right, 2 * level.right);
+    finer.bottom = std::max(finer.bottom, 2 * level.bottom);
+  }
+}
+
+}  // namespace
+
+UnwarpTable make_unwarp_table(const Camera& camera, int rows, int columns,
+                              const ElevationBand& band) {
+  const RowSampler sampler(camera, rows, columns, band);
+  std::vector<Taps> taps_of_rows;
+  std::vector<std::vector<std::uint8_t>> seen;
+  for (int y = 0; y < rows; ++y) {
+    taps_of_rows.push_back(sampler.sample(y));
+    seen.push_back(complete_columns(taps_of_rows.back(), columns));
+  }
+  fill_unseen(taps_of_rows, seen, columns);
+
+  UnwarpTable table;
+  place_levels(taps_of_rows, table);
+  for (const Taps& taps : taps_of_rows) {
+    table.rows.push_back({static_cast<int>(taps.size()) / columns, table.positions.size()});
+    for (const Tap& tap : taps) {
+      const UnwarpTable::Level& level = table.levels[static_cast<std::size_t>(tap.level)];
+      const auto width = static_cast<std::size_t>(level.pair_right - level.pair_left);
+      table.positions.push_back(static_cast<std::uint32_t>(
+          level.pairs_at + (tap.v - level.pair_top) * width + (tap.u - level.pair_left)));
+      table.weights.push_back(tap.weights);
+    }
+  }
+  for (const auto& row : seen) table.seen.insert(table.seen.end(), row.begin(), row.end());
+  return table;
+}
+
+}  // namespace panonav

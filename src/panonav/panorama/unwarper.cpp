@@ -1,0 +1,162 @@
+#include "panonav/panorama/unwarper.hpp"
+
+#include <algorithm>
+#include <array>
+#include <numbers>
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "panonav/core/error.hpp"
+#include "panonav/kernels/remap.hpp"
+#include "panonav/panorama/picture.hpp"
+
+namespace panonav {
+
+namespace {
+
+ElevationBand checked_band(const Camera& camera, const UnwarperOptions& options) {
+  validate(camera);
+  validate(options);
+  constexpr double zenith = std::numbers::pi / 2.0;
+  const ElevationBand band = options.elevations ? *options.elevations : visible_elevations(camera);
+  double bottom = -zenith;
+  double top = zenith;
+  if (const auto* picture = std::get_if<EquirectangularModel>(&camera.model)) {
+    bottom = picture->elevation_bottom_rad;
+    top = picture->elevation_top_rad;
+  }
+  require(band.bottom_rad >= bottom && band.bottom_rad < band.top_rad, "elevations bottom_rad",
+          band.bottom_rad, to_text(bottom) + " .. below top_rad");
+  require(band.top_rad <= top, "elevations top_rad", band.top_rad,
+          "above bottom_rad .. " + to_text(top));
+  return band;
+}
+
+Panorama unwrap_picture(const Camera& camera, ImageView image, const ElevationBand& kept, int rows,
+                        int columns) {
+  const auto& model = std::get<EquirectangularModel>(camera.model);
+  return panorama_from_picture(
+      image,
+      {camera.direction, camera.forward_column,
+       ElevationBand{model.elevation_bottom_rad, model.elevation_top_rad}, kept},
+      {rows, columns});
+}
+
+}  // namespace
+
+void visit_options(UnwarperOptions& options, OptionVisitor& visitor) {
+  visitor.visit({.name = "rows", .help = "rows of the panoramic cylinder", .low = 1, .high = 4096},
+                options.rows);
+  visitor.visit(
+      {.name = "columns", .help = "columns of the panoramic cylinder", .low = 4, .high = 16384},
+      options.columns);
+}
+
+Unwarper::Unwarper(const Camera& camera, const UnwarperOptions& options)
+    : camera_(camera),
+      rows_(options.rows),
+      columns_(options.columns),
+      elevations_(checked_band(camera, options)) {
+  if (!std::holds_alternative<EquirectangularModel>(camera_.model)) {
+    table_ = make_unwarp_table(camera_, rows_, columns_, elevations_);
+  }
+}
+
+void Unwarper::check(ImageView image) const {
+  const auto text = [](ImageSize size) {
+    return std::to_string(size.width) + " x " + std::to_string(size.height);
+  };
+  if (image.size() != camera_.image_size) {
+    throw ContractError("image size", text(image.size()),
+                        text(camera_.image_size) + " (as the camera's calibration)");
+  }
+}
+
+void Unwarper::prepare(ImageView image, Workspace& workspace) const {
+  const kernels::Instructions instructions = kernels::chosen_instructions();
+  workspace.halved.resize(table_.halved_size);
+  workspace.pairs.resize(table_.pairs_size);
+  // The part of the level before that is there: its first pixel is (left, top).
+  struct Part {
+    const std::uint8_t* data;
+    std::ptrdiff_t stride;
+    int left, top;
+    [[nodiscard]] const std::uint8_t* at(int u, int v) const {
+      return data + (v - top) * stride + (u - left);
+    }
+  };
+  Part part{image.data, image.stride, 0, 0};
+  for (std::size_t i = 0; i < table_.levels.size(); ++i) {
+    const UnwarpTable::Level& level = table_.levels[i];
+    if (i > 0) {
+      const int width = level.right - level.left;
+      const int height = level.bottom - level.top;
+      std::uint8_t* const halved = workspace.halved.data() + level.halved_at;
+      kernels::halve({part.at(2 * level.left, 2 * level.top), 2 * width, 2 * height, part.stride},
+                     halved, instructions);
+      part = {halved, width, level.left, level.top};
+    }
+    if (level.has_pairs()) {
+      kernels::pair_rows(
+          {part.at(level.pair_left, level.pair_top), level.pair_right - level.pair_left,
+           level.pair_bottom - level.pair_top + 1, part.stride},
+          workspace.pairs.data() + level.pairs_at, instructions);
+    }
+  }
+}
+
+void Unwarper::look_up(std::span<const std::uint16_t> pairs, int row,
+                       std::span<float> values) const {
+  const UnwarpTable::Row& entry = table_.rows[static_cast<std::size_t>(row)];
+  const std::size_t count = static_cast<std::size_t>(entry.taps) * columns_;
+  const float scale = 1.0F / static_cast<float>(255 * kernels::tap_weight_sum * entry.taps);
+  kernels::remap(pairs, std::span(table_.positions).subspan(entry.first_entry, count),
+                 std::span(table_.weights).subspan(entry.first_entry, count), entry.taps, scale,
+                 values, kernels::chosen_instructions());
+}
+
+Panorama Unwarper::unwrap(ImageView image) const {
+  Workspace workspace;
+  return unwrap(image, workspace);
+}
+
+Panorama Unwarper::unwrap(ImageView image, Workspace& workspace) const {
+  std::vector<float> values(static_cast<std::size_t>(rows_) * columns_);
+  unwrap_blocks(image, workspace, [&](int first_row, std::span<const float> block) {
+    std::ranges::copy(block, values.begin() + static_cast<std::ptrdiff_t>(first_row) * columns_);
+  });
+  return {rows_, columns_, elevations_, std::move(values)};
+}
+
+void Unwarper::unwrap_blocks(ImageView image, Workspace& workspace,
+                             const std::function<void(int, std::span<const float>)>& take) const {
+  check(image);
+  constexpr int rows_per_block = 4;
+  if (std::holds_alternative<EquirectangularModel>(camera_.model)) {
+    const Panorama panorama = unwrap_picture(camera_, image, elevations_, rows_, columns_);
+    for (int y = 0; y < rows_; y += rows_per_block) {
+      const int count = std::min(rows_per_block, rows_ - y);
+      take(y, panorama.values().subspan(static_cast<std::size_t>(y) * columns_,
+                                        static_cast<std::size_t>(count) * columns_));
+    }
+    return;
+  }
+  std::optional<Image> grey;
+  if (image.channels != 1) {
+    grey = to_grey(image);
+    image = grey->view();
+  }
+  prepare(image, workspace);
+  std::vector<float> block(static_cast<std::size_t>(rows_per_block) * columns_);
+  for (int y = 0; y < rows_; y += rows_per_block) {
+    const int count = std::min(rows_per_block, rows_ - y);
+    for (int i = 0; i < count; ++i) {
+      look_up(workspace.pairs, y + i,
+              std::span(block).subspan(static_cast<std::size_t>(i) * columns_, columns_));
+    }
+    take(y, std::span<const float>(block).first(static_cast<std::size_t>(count) * columns_));
+  }
+}
+
+}  // namespace panonav

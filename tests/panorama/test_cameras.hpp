@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <vector>
+
+#include "panonav/camera/camera.hpp"
+
+namespace panonav::testing_cameras {
+
+/// 640 x 480, the mirror off the middle, so that nothing is symmetric by chance. Looks from -60 to
+/// +30 degrees.
+inline Camera mirror_camera() {
+  Camera camera;
+  camera.model = EquiangularModel{radians(-60.0), radians(30.0)};
+  camera.image_size = {640, 480};
+  camera.centre = {317.3, 243.8};
+  camera.rim_radius_px = 230.0;
+  camera.inner_radius_px = 45.0;
+  camera.direction = ColumnDirection::clockwise;
+  camera.forward_angle_rad = 0.7;
+  return camera;
+}
+
+/// The image of a world whose grey level (0 .. 1) depends on the direction; black where the mirror
+/// ends. Each pixel is the mean of samples x samples points.
+inline Image render(const Camera& camera, const std::function<double(double, double)>& world,
+                    int samples = 4) {
+  Image image(camera.image_size.width, camera.image_size.height);
+  for (int v = 0; v < image.height(); ++v) {
+    for (int u = 0; u < image.width(); ++u) {
+      double sum = 0.0;
+      for (int i = 0; i < samples; ++i) {
+        for (int j = 0; j < samples; ++j) {
+          const auto direction =
+              unproject(camera, {u + (i + 0.5) / samples, v + (j + 0.5) / samples});
+          if (direction) sum += world(direction->azimuth_rad(), direction->elevation_rad());
+        }
+      }
+      image.at(u, v) = static_cast<std::uint8_t>(std::lround(255.0 * sum / (samples * samples)));
+    }
+  }
+  return image;
+}
+
+}  // namespace panonav::testing_cameras
