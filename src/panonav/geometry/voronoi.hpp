@@ -23,7 +23,7 @@ struct Circle {
 /// expected (Welzl 1991, with a fixed order of visiting).
 [[nodiscard]] Circle smallest_enclosing_circle(std::span<const Point2> points);
 
-/// Voronoi cells of positions, clipped at half the spacing [design section 4, M04 figures 9 and
+/// Voronoi cells of positions, clipped at half the spacing [M04 figures 9 and
 /// 10].
 ///
 /// Positions that coincide share one site. A cell is the part of the plane that is nearer to its
