@@ -10,7 +10,8 @@ namespace panonav {
 
 namespace {
 
-constexpr std::array<std::string_view, 4> kNames{"office", "hall", "hall_periodic", "lab"};
+constexpr std::array<std::string_view, 8> kNames{"office", "hall", "hall_periodic", "arena",
+                                                 "lab",    "loop", "corridor",      "garden"};
 
 }  // namespace
 
@@ -27,6 +28,10 @@ Scene make_scene(std::string_view name, const SceneVariation& variation) {
   if (name == "hall") return make_hall(variation, false);
   if (name == "hall_periodic") return make_hall(variation, true);
   if (name == "lab") return make_lab(variation);
+  if (name == "arena") return make_arena(variation);
+  if (name == "loop") return make_loop(variation);
+  if (name == "corridor") return make_corridor(variation);
+  if (name == "garden") return make_garden(variation);
   std::string known;
   for (const auto& each : kNames) known += (known.empty() ? "" : ", ") + std::string(each);
   throw ContractError("scene", name, known);

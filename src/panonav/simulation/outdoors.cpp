@@ -1,0 +1,211 @@
+// Scenes without a room around them: the garden, and the arena on a table.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "panonav/simulation/built_in_scenes.hpp"
+#include "panonav/simulation/furniture.hpp"
+
+namespace panonav {
+
+namespace {
+
+// A ring of quadrilaterals far away, leaning inwards, and a flat roof: sky and clouds all round.
+void add_sky(SceneBuilder& builder, Point2 centre, double radius_m, double height_m) {
+  const int sky = builder.textured(sky_texture(builder.random(), 512, 256), 1.0F);
+  constexpr int kFacets = 48;
+  const auto rim = [&](int i, double radius, double z) {
+    const double angle = 2.0 * std::numbers::pi * i / kFacets;
+    return Vector3{centre.x_m + radius * std::cos(angle), centre.y_m + radius * std::sin(angle), z};
+  };
+  const double top = 0.5 * radius_m;
+  Mesh mesh;
+  mesh.object = "sky";
+  mesh.material = sky;
+  for (int i = 0; i < kFacets; ++i) {
+    const auto base = static_cast<std::uint32_t>(mesh.vertices.size());
+    mesh.vertices.insert(mesh.vertices.end(), {rim(i, radius_m, -1.0), rim(i + 1, radius_m, -1.0),
+                                               rim(i + 1, top, height_m), rim(i, top, height_m),
+                                               Vector3{centre.x_m, centre.y_m, 1.2 * height_m}});
+    const float s0 = static_cast<float>(i) / kFacets;
+    const float s1 = static_cast<float>(i + 1) / kFacets;
+    mesh.texture_coordinates.insert(
+        mesh.texture_coordinates.end(),
+        {{s0, 0.0F}, {s1, 0.0F}, {s1, 0.75F}, {s0, 0.75F}, {0.5F * (s0 + s1), 1.0F}});
+    mesh.triangles.push_back({base, base + 1, base + 2});
+    mesh.triangles.push_back({base, base + 2, base + 3});
+    mesh.triangles.push_back({base + 3, base + 2, base + 4});
+  }
+  builder.scene().meshes.push_back(std::move(mesh));
+}
+
+void add_house(SceneBuilder& builder, const std::string& name, const Footing& footing,
+               Vector3 size) {
+  Random& random = builder.random();
+  const auto channel = [&random] { return static_cast<float>(random.uniform(0.25, 0.85)); };
+  const int walls = builder.textured(
+      brick_texture(random, 128, 6, 12, {channel(), channel(), channel()}, {0.7F, 0.7F, 0.68F}));
+  const int roof = builder.textured(
+      brick_texture(random, 128, 8, 8, {channel(), 0.25F, 0.2F}, {0.2F, 0.15F, 0.12F}));
+  builder.box(name, walls, walls, footing, {0.0, 0.0, 0.0}, size, 0.6 * size.z_m);
+  const double c = std::cos(footing.turn_rad);
+  const double s = std::sin(footing.turn_rad);
+  const auto at = [&](double x, double y, double z) {
+    return Vector3{footing.centre.x_m + c * x - s * y, footing.centre.y_m + s * x + c * y, z};
+  };
+  const double hx = 0.55 * size.x_m;
+  const double hy = 0.6 * size.y_m;
+  const double z0 = 0.97 * size.z_m;
+  const double z1 = 1.5 * size.z_m;
+  builder.quadrilateral(name, roof, at(-hx, -hy, z0), at(hx, -hy, z0), at(hx, 0.0, z1),
+                        at(-hx, 0.0, z1), 3.0, 2.0);
+  builder.quadrilateral(name, roof, at(hx, hy, z0), at(-hx, hy, z0), at(-hx, 0.0, z1),
+                        at(hx, 0.0, z1), 3.0, 2.0);
+  for (const double x : {-hx, hx}) {
+    builder.quadrilateral(name, walls, at(0.9 * x, -hy, z0), at(0.9 * x, hy, z0),
+                          at(0.9 * x, 0.0, z1), at(0.9 * x, 0.0, z1));
+  }
+  const int window = builder.textured(window_texture(random, 64));
+  const int door = builder.textured(door_texture(random, 64, {0.35F, 0.22F, 0.15F}));
+  const double out = 0.5 * size.y_m * 1.01;
+  for (const double side : {-1.0, 1.0}) {
+    const double y = side * out;
+    const double w = 0.12 * size.x_m * side;
+    for (const double x : {-0.3, 0.3}) {
+      builder.quadrilateral(name, window, at(x * size.x_m + w * -1.0, y, 0.4 * size.z_m),
+                            at(x * size.x_m + w, y, 0.4 * size.z_m),
+                            at(x * size.x_m + w, y, 0.8 * size.z_m),
+                            at(x * size.x_m - w, y, 0.8 * size.z_m));
+    }
+    builder.quadrilateral(name, door, at(-0.8 * w, y, 0.0), at(0.8 * w, y, 0.0),
+                          at(0.8 * w, y, 0.7 * size.z_m), at(-0.8 * w, y, 0.7 * size.z_m));
+  }
+}
+
+void add_hedge(SceneBuilder& builder, const std::string& name, Point2 from, Point2 to,
+               double height_m) {
+  Random& random = builder.random();
+  const float green = static_cast<float>(random.uniform(0.18, 0.36));
+  const int leaves =
+      builder.textured(foliage_texture(random, 256, {0.75F * green, green, 0.5F * green}));
+  const double length = distance(from, to);
+  const double turn = std::atan2(to.y_m - from.y_m, to.x_m - from.x_m);
+  // Segments of different height and depth: a hedge grows as it likes.
+  const int segments = std::max(1, static_cast<int>(length / 0.8));
+  for (int i = 0; i < segments; ++i) {
+    const double share = (i + 0.5) / segments;
+    const Footing footing{{from.x_m + share * (to.x_m - from.x_m) + random.normal(0.0, 0.05),
+                           from.y_m + share * (to.y_m - from.y_m) + random.normal(0.0, 0.05)},
+                          turn};
+    builder.box(
+        name, leaves, leaves, footing, {0.0, 0.0, 0.0},
+        {1.05 * length / segments, random.uniform(0.4, 0.7), height_m * random.uniform(0.8, 1.2)},
+        1.5);
+  }
+}
+
+}  // namespace
+
+Scene make_garden(const SceneVariation& variation) {
+  SceneBuilder builder("garden", variation);
+  Scene& scene = builder.scene();
+  Random& random = builder.random();
+  scene.floor_low = {0.0, 0.0};
+  scene.floor_high = {12.0, 10.0};
+  scene.ambient = 0.55F;
+  const double azimuth = random.uniform(-std::numbers::pi, std::numbers::pi);
+  scene.directional_lights.push_back({Direction3::from_angles(azimuth, 0.8), 0.6F});
+  const Point2 middle{6.0, 5.0};
+  add_sky(builder, middle, 150.0, 60.0);
+  const int grass = builder.textured(noise_texture(random, 256, {0.25F, 0.36F, 0.16F}, 0.2, 1.4));
+  builder.floor(grass, {-150.0, -150.0}, {150.0, 150.0}, 3.0);
+  const int gravel = builder.textured(noise_texture(random, 256, {0.55F, 0.5F, 0.42F}, 0.15, 1.0));
+  builder.floor(gravel, {4.8, -1.0}, {6.4, 11.0}, 2.0, 0.01);
+
+  // Hedges around, with gaps through which far trees are seen.
+  const std::array<Point2, 4> corners{Point2{-1.5, -1.5}, Point2{13.5, -1.5}, Point2{13.5, 11.5},
+                                      Point2{-1.5, 11.5}};
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Point2 a = corners[i];
+    const Point2 b = corners[(i + 1) % 4];
+    const double gap = random.uniform(0.3, 0.6);
+    const auto along = [&](double t) {
+      return Point2{a.x_m + t * (b.x_m - a.x_m), a.y_m + t * (b.y_m - a.y_m)};
+    };
+    const double height = random.uniform(0.9, 1.8);
+    add_hedge(builder, "hedge " + std::to_string(2 * i), a, along(gap), height);
+    add_hedge(builder, "hedge " + std::to_string(2 * i + 1), along(gap + 0.18), b, height);
+  }
+  const FloorArea plot{{-1.0, -1.0}, {13.0, 11.0}};
+  for (int i = 0; i < 7; ++i) {
+    const Footing wanted{{random.uniform(0.0, 12.0), random.uniform(0.0, 10.0)}, 0.0};
+    add_tree(builder, "tree " + std::to_string(i), builder.movable(wanted, 0.4, plot).centre,
+             random.uniform(2.0, 4.5));
+  }
+  for (int i = 0; i < 5; ++i) {
+    const Footing wanted{{random.uniform(0.5, 11.5), random.uniform(0.5, 9.5)},
+                         random.uniform(-3.0, 3.0)};
+    add_crate(builder, "flower box " + std::to_string(i), builder.movable(wanted, 0.5, plot),
+              {random.uniform(0.4, 1.2), random.uniform(0.3, 0.6), random.uniform(0.3, 0.8)});
+  }
+  add_house(builder, "house", {{random.uniform(2.0, 10.0), 18.0}, random.uniform(-0.2, 0.2)},
+            {9.0, 6.0, 3.2});
+  add_house(builder, "shed", {{-5.0, random.uniform(2.0, 8.0)}, random.uniform(1.2, 1.9)},
+            {3.0, 2.2, 2.0});
+  // Far trees make the horizon.
+  for (int i = 0; i < 60; ++i) {
+    const double angle = 2.0 * std::numbers::pi * (i + random.uniform(-0.5, 0.5)) / 60.0;
+    const double radius = random.uniform(25.0, 90.0);
+    add_tree(builder, "far tree " + std::to_string(i),
+             {middle.x_m + radius * std::cos(angle), middle.y_m + radius * std::sin(angle)},
+             random.uniform(4.0, 12.0));
+  }
+  scene.tour = {{1.0, 1.0}, {11.0, 1.0}, {11.0, 9.0}, {1.0, 9.0}};
+  return builder.finish();
+}
+
+Scene make_arena(const SceneVariation& variation) {
+  SceneBuilder builder("arena", variation);
+  Scene& scene = builder.scene();
+  Random& random = builder.random();
+  scene.floor_low = {0.0, 0.0};
+  scene.floor_high = {1.4, 1.2};
+  scene.camera_height_m = 0.08;
+  scene.ambient = 0.5F;
+  const int table = builder.textured(noise_texture(random, 128, {0.55F, 0.55F, 0.5F}, 0.06));
+  // A little above the floor of the lab, so that the two do not compete.
+  builder.floor(table, {-0.3, -0.3}, {1.7, 1.5}, 0.4, 0.002);
+  // The lab around the table, seen above the houses.
+  const FloorArea lab{{-2.0, -2.0}, {3.4, 3.2}};
+  furnish_room_shell(builder, lab, 2.2);
+  builder.lamp({0.7, 0.6, 1.9}, 1.2F);
+  builder.lamp({-0.8, -0.8, 1.8}, 0.6F);
+
+  // Toy houses along the border and some inside, with streets of 20 cm and more between them.
+  const FloorArea plot{{-0.2, -0.2}, {1.6, 1.4}};
+  int number = 0;
+  const auto house = [&](Point2 at, double turn_rad) {
+    const Footing footing = builder.movable({at, turn_rad}, 0.1, plot);
+    add_house(builder, "house " + std::to_string(number++), footing,
+              {random.uniform(0.09, 0.16), random.uniform(0.08, 0.12), random.uniform(0.07, 0.14)});
+  };
+  for (double x = -0.05; x < 1.5; x += random.uniform(0.16, 0.26)) {
+    house({x, -0.13}, random.normal(0.0, 0.1));
+    house({x + random.uniform(-0.04, 0.04), 1.33}, random.normal(0.0, 0.1));
+  }
+  for (double y = 0.1; y < 1.15; y += random.uniform(0.18, 0.28)) {
+    house({-0.13, y}, 1.57 + random.normal(0.0, 0.1));
+    house({1.53, y}, 1.57 + random.normal(0.0, 0.1));
+  }
+  for (const Point2 at : {Point2{0.45, 0.4}, Point2{0.95, 0.45}, Point2{0.7, 0.85}}) {
+    house({at.x_m + random.normal(0.0, 0.04), at.y_m + random.normal(0.0, 0.04)},
+          random.uniform(-1.5, 1.5));
+  }
+  scene.tour = {{0.15, 0.15}, {1.25, 0.15}, {1.25, 1.05}, {0.15, 1.05}};
+  return builder.finish();
+}
+
+}  // namespace panonav
