@@ -1,348 +1,162 @@
 #include "panonav/simulation/renderer.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <span>
 #include <utility>
-#include <vector>
-
-#if PANONAV_EMBREE_MAJOR >= 4
-#include <embree4/rtcore.h>
-#else
-#include <embree3/rtcore.h>
-#endif
 
 #include "panonav/core/error.hpp"
+#include "panonav/simulation/light.hpp"
+#include "panonav/simulation/mirror.hpp"
+#include "panonav/simulation/ray_tracer.hpp"
+#include "panonav/simulation/texture_sampler.hpp"
 
 namespace panonav {
 
 namespace {
 
-// Grey texture in halved copies, finest first, so that a far surface is sampled without aliasing.
-class MipTexture {
+constexpr float kHousing = 0.02F;
+constexpr float kCameraBody = 0.05F;
+constexpr float kLens = 0.01F;
+
+// Rotation and place of the robot in the scene, applied to many rays.
+class RayMaker {
  public:
-  explicit MipTexture(const Image& image, const std::array<float, 3>& colour) {
-    Level finest{image.width(), image.height(), {}};
-    finest.values.resize(static_cast<std::size_t>(finest.width) * finest.height);
-    for (int v = 0; v < finest.height; ++v) {
-      for (int u = 0; u < finest.width; ++u) {
-        float value = 0.0F;
-        for (int c = 0; c < 3; ++c) {
-          const int channel = image.channels() == 3 ? c : 0;
-          value += kWeights[static_cast<std::size_t>(c)] * colour[static_cast<std::size_t>(c)] *
-                   static_cast<float>(image.at(u, v, channel));
-        }
-        finest.values[static_cast<std::size_t>(v) * finest.width + u] = value / 255.0F;
-      }
-    }
-    levels_.push_back(std::move(finest));
-    while (levels_.back().width > 1 || levels_.back().height > 1) levels_.push_back(halved());
+  explicit RayMaker(const Viewpoint& viewpoint)
+      : at_{viewpoint.pose.x_m, viewpoint.pose.y_m, viewpoint.height_m},
+        x_(scene_from_robot(viewpoint, {1.0, 0.0, 0.0})),
+        y_(scene_from_robot(viewpoint, {0.0, 1.0, 0.0})),
+        z_(scene_from_robot(viewpoint, {0.0, 0.0, 1.0})) {}
+
+  [[nodiscard]] Ray operator()(const Direction3& direction) const {
+    const Direction3 d = turned(direction.x, direction.y, direction.z);
+    return {as_floats(at_.x_m, at_.y_m, at_.z_m), as_floats(d.x, d.y, d.z)};
   }
-
-  [[nodiscard]] int width() const noexcept { return levels_[0].width; }
-  [[nodiscard]] int height() const noexcept { return levels_[0].height; }
-
-  /// Trilinear; `texels` is the width of the footprint in texels of the finest level.
-  [[nodiscard]] float sample(float s, float t, float texels) const noexcept {
-    const float level =
-        std::clamp(std::log2(std::max(texels, 1.0F)), 0.0F, static_cast<float>(levels_.size() - 1));
-    const auto below = static_cast<std::size_t>(level);
-    const std::size_t above = std::min(below + 1, levels_.size() - 1);
-    const float share = level - static_cast<float>(below);
-    return (1.0F - share) * bilinear(levels_[below], s, t) + share * bilinear(levels_[above], s, t);
+  [[nodiscard]] Ray operator()(const Vector3& from_viewpoint, const Direction3& direction) const {
+    const Direction3 o = turned(from_viewpoint.x_m, from_viewpoint.y_m, from_viewpoint.z_m);
+    const Direction3 d = turned(direction.x, direction.y, direction.z);
+    return {as_floats(at_.x_m + o.x, at_.y_m + o.y, at_.z_m + o.z), as_floats(d.x, d.y, d.z)};
   }
-
-  static constexpr std::array<float, 3> kWeights{0.299F, 0.587F, 0.114F};
 
  private:
-  struct Level {
-    int width = 0;
-    int height = 0;
-    std::vector<float> values;
-  };
-
-  [[nodiscard]] Level halved() const {
-    const Level& fine = levels_.back();
-    Level coarse{std::max(1, fine.width / 2), std::max(1, fine.height / 2), {}};
-    coarse.values.resize(static_cast<std::size_t>(coarse.width) * coarse.height);
-    for (int v = 0; v < coarse.height; ++v) {
-      for (int u = 0; u < coarse.width; ++u) {
-        float sum = 0.0F;
-        for (int j = 0; j < 2; ++j) {
-          for (int i = 0; i < 2; ++i) {
-            const int uu = std::min(2 * u + i, fine.width - 1);
-            const int vv = std::min(2 * v + j, fine.height - 1);
-            sum += fine.values[static_cast<std::size_t>(vv) * fine.width + uu];
-          }
-        }
-        coarse.values[static_cast<std::size_t>(v) * coarse.width + u] = 0.25F * sum;
-      }
-    }
-    return coarse;
+  static std::array<float, 3> as_floats(double x, double y, double z) {
+    return {static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)};
   }
-
-  static float bilinear(const Level& level, float s, float t) noexcept {
-    // (0, 0) is the lower left corner, rows are stored from the top; textures repeat.
-    const float u = (s - std::floor(s)) * static_cast<float>(level.width) - 0.5F;
-    const float v = (1.0F - (t - std::floor(t))) * static_cast<float>(level.height) - 0.5F;
-    const float u_floor = std::floor(u);
-    const float v_floor = std::floor(v);
-    const auto wrap = [](int i, int n) { return ((i % n) + n) % n; };
-    const int u0 = wrap(static_cast<int>(u_floor), level.width);
-    const int v0 = wrap(static_cast<int>(v_floor), level.height);
-    const int u1 = wrap(u0 + 1, level.width);
-    const int v1 = wrap(v0 + 1, level.height);
-    const float fu = u - u_floor;
-    const float fv = v - v_floor;
-    const auto at = [&](int uu, int vv) {
-      return level.values[static_cast<std::size_t>(vv) * level.width + uu];
-    };
-    return (1.0F - fv) * ((1.0F - fu) * at(u0, v0) + fu * at(u1, v0)) +
-           fv * ((1.0F - fu) * at(u0, v1) + fu * at(u1, v1));
+  [[nodiscard]] Direction3 turned(double x, double y, double z) const {
+    return {x * x_.x + y * y_.x + z * z_.x, x * x_.y + y * y_.y + z * z_.y,
+            x * x_.z + y * y_.z + z * z_.z};
   }
-
-  std::vector<Level> levels_;
+  Vector3 at_;
+  Direction3 x_, y_, z_;
 };
 
-struct ShadedMaterial {
-  float grey = 0.0F;  ///< of the plain colour
-  std::optional<MipTexture> texture;
-  float emission = 0.0F;
-};
-
-struct ShadedTriangle {
-  std::uint32_t material = 0;
-  std::array<float, 3> normal{};             ///< unit length
-  std::array<std::array<float, 2>, 3> st{};  ///< texture coordinates
-  float texels_per_metre = 0.0F;
-};
-
-float grey_of(const std::array<float, 3>& colour) {
-  float value = 0.0F;
-  for (std::size_t c = 0; c < 3; ++c) value += MipTexture::kWeights[c] * colour[c];
-  return value;
+void validate(const Viewpoint& viewpoint) {
+  require(std::isfinite(viewpoint.pose.x_m), "x_m", viewpoint.pose.x_m, "finite");
+  require(std::isfinite(viewpoint.pose.y_m), "y_m", viewpoint.pose.y_m, "finite");
+  require(std::isfinite(viewpoint.pose.heading_rad), "heading_rad", viewpoint.pose.heading_rad,
+          "finite");
+  require(std::isfinite(viewpoint.height_m), "height_m", viewpoint.height_m, "finite");
+  require(std::isfinite(viewpoint.roll_rad), "roll_rad", viewpoint.roll_rad, "finite");
+  require(std::isfinite(viewpoint.pitch_rad), "pitch_rad", viewpoint.pitch_rad, "finite");
 }
 
-std::array<float, 3> as_floats(const Vector3& v) {
-  return {static_cast<float>(v.x_m), static_cast<float>(v.y_m), static_cast<float>(v.z_m)};
+void require_rays(int rays_per_axis) {
+  require(rays_per_axis >= 1 && rays_per_axis <= 8, "rays_per_axis", rays_per_axis, "1 .. 8");
 }
 
-std::array<float, 3> cross_of(const std::array<float, 3>& a, const std::array<float, 3>& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+double light_spacing_m(const Scene& scene) {
+  return std::clamp(distance(scene.floor_low, scene.floor_high) / 25.0, 0.03, 1.0);
 }
 
-float dot_of(const std::array<float, 3>& a, const std::array<float, 3>& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+// How far an obstacle may be to darken a surface, in spacings of the points where light is known.
+constexpr double kReach = 5.0;
+
+LitTriangles checked_triangles(const Scene& scene) {
+  panonav::validate(scene);
+  return subdivide(scene, light_spacing_m(scene));
 }
 
-std::array<float, 3> minus(const std::array<float, 3>& a, const std::array<float, 3>& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-
-void intersect(RTCScene scene, RTCRayHit& ray) {
-#if PANONAV_EMBREE_MAJOR >= 4
-  rtcIntersect1(scene, &ray);
-#else
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  rtcIntersect1(scene, &context, &ray);
-#endif
-}
-
-RTCRayHit ray_from(const Vector3& origin, const Direction3& direction) {
-  RTCRayHit ray{};
-  ray.ray.org_x = static_cast<float>(origin.x_m);
-  ray.ray.org_y = static_cast<float>(origin.y_m);
-  ray.ray.org_z = static_cast<float>(origin.z_m);
-  ray.ray.dir_x = static_cast<float>(direction.x);
-  ray.ray.dir_y = static_cast<float>(direction.y);
-  ray.ray.dir_z = static_cast<float>(direction.z);
-  ray.ray.tnear = 0.0F;
-  ray.ray.tfar = std::numeric_limits<float>::infinity();
-  ray.ray.mask = 0xFFFFFFFFU;
-  ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  return ray;
+float grey_of(const float* value, int channels) {
+  return channels == 1 ? value[0] : 0.299F * value[0] + 0.587F * value[1] + 0.114F * value[2];
 }
 
 }  // namespace
 
 struct Renderer::Implementation {
-  RTCDevice device = nullptr;
-  RTCScene scene = nullptr;
-  std::vector<ShadedMaterial> materials;
-  std::vector<ShadedTriangle> triangles;
-  std::vector<PointLight> lights;
-  std::vector<DirectionalLight> directional_lights;
-  float ambient = 0.0F;
-  float background = 0.0F;
-
-  Implementation() = default;
-  Implementation(const Implementation&) = delete;
-  Implementation& operator=(const Implementation&) = delete;
-  ~Implementation() {
-    if (scene != nullptr) rtcReleaseScene(scene);
-    if (device != nullptr) rtcReleaseDevice(device);
+  Implementation(const Scene& scene, const RendererOptions& options, Executor& executor)
+      : channels(options.channels),
+        background(scene.background),
+        lit(checked_triangles(scene)),
+        tracer(lit.vertices, lit.indices, options.instructions) {
+    bake_light(scene, tracer, options.shadows, kReach * light_spacing_m(scene), lit, executor);
+    for (const Material& material : scene.materials) materials.emplace_back(material, channels);
+    if (channels == 1) background[0] = grey_of(background.data(), 3);
   }
 
-  void add_materials(const Scene& from) {
-    for (const auto& material : from.materials) {
-      ShadedMaterial shaded{grey_of(material.colour), std::nullopt, material.emission};
-      if (material.texture) shaded.texture.emplace(*material.texture, material.colour);
-      materials.push_back(std::move(shaded));
+  void shade(const Ray& ray, const RayHit& hit, float spread_rad, float* colour) const {
+    if (hit.triangle == RayHit::kNothing) {
+      std::copy_n(background.data(), channels, colour);
+      return;
+    }
+    const LitTriangles::Triangle& triangle = lit.triangles[hit.triangle];
+    const MaterialSampler& material = materials[static_cast<std::size_t>(triangle.material)];
+    const float w = 1.0F - hit.u - hit.v;
+    const float facing = triangle.normal[0] * ray.direction[0] +
+                         triangle.normal[1] * ray.direction[1] +
+                         triangle.normal[2] * ray.direction[2];
+    if (material.textured()) {
+      const auto& uv = triangle.uv;
+      // The pixel's mark on a slanted surface is an ellipse; the square root is a compromise
+      // between blur along its short axis and aliasing along the long one.
+      const float slant = 1.0F / std::sqrt(std::max(std::fabs(facing), 0.02F));
+      const float footprint = spread_rad * hit.distance_m * slant * triangle.texture_density;
+      material.sample(w * uv[0][0] + hit.u * uv[1][0] + hit.v * uv[2][0],
+                      w * uv[0][1] + hit.u * uv[1][1] + hit.v * uv[2][1], footprint, colour);
+    } else {
+      material.sample(0.0F, 0.0F, 0.0F, colour);
+    }
+    const auto& corners = triangle.light[facing <= 0.0F ? 0 : 1];
+    const float light = w * corners[0] + hit.u * corners[1] + hit.v * corners[2];
+    const float emission = material.emission();
+    const float factor = emission + (1.0F - emission) * light;
+    for (int c = 0; c < channels; ++c) colour[c] *= factor;
+  }
+
+  // Adds what the rays see, `rays_per_pixel` neighbouring rays to one pixel.
+  void shade(std::span<const Ray> rays, std::span<const RayHit> hits, float spread_rad,
+             float weight, std::size_t rays_per_pixel, float* values) const {
+    std::array<float, 3> colour{};
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      shade(rays[i], hits[i], spread_rad, colour.data());
+      float* pixel = values + i / rays_per_pixel * static_cast<std::size_t>(channels);
+      for (int c = 0; c < channels; ++c) pixel[c] += weight * colour[static_cast<std::size_t>(c)];
     }
   }
 
-  // All meshes become one geometry, so that the number of a hit is the index of its triangle.
-  void add_triangles(const Scene& from) {
-    std::vector<float> positions;
-    std::vector<std::uint32_t> indices;
-    for (const auto& mesh : from.meshes) {
-      const auto base = static_cast<std::uint32_t>(positions.size() / 3);
-      for (const auto& vertex : mesh.vertices) {
-        for (const float value : as_floats(vertex)) positions.push_back(value);
-      }
-      for (const auto& triangle : mesh.triangles) {
-        ShadedTriangle shaded;
-        shaded.material = static_cast<std::uint32_t>(mesh.material);
-        const auto a = as_floats(mesh.vertices[triangle[0]]);
-        const auto b = as_floats(mesh.vertices[triangle[1]]);
-        const auto c = as_floats(mesh.vertices[triangle[2]]);
-        const auto normal = cross_of(minus(b, a), minus(c, a));
-        const float twice_area = std::sqrt(dot_of(normal, normal));
-        if (twice_area > 0.0F) {
-          shaded.normal = {normal[0] / twice_area, normal[1] / twice_area, normal[2] / twice_area};
-        }
-        if (!mesh.texture_coordinates.empty()) {
-          for (std::size_t i = 0; i < 3; ++i) {
-            shaded.st[i] = mesh.texture_coordinates[triangle[i]];
-          }
-          const auto& texture = materials[shaded.material].texture;
-          if (texture && twice_area > 0.0F) {
-            const float s1 = shaded.st[1][0] - shaded.st[0][0];
-            const float t1 = shaded.st[1][1] - shaded.st[0][1];
-            const float s2 = shaded.st[2][0] - shaded.st[0][0];
-            const float t2 = shaded.st[2][1] - shaded.st[0][1];
-            const float texels = std::abs(s1 * t2 - s2 * t1) *
-                                 static_cast<float>(texture->width()) *
-                                 static_cast<float>(texture->height());
-            shaded.texels_per_metre = std::sqrt(texels / twice_area);
-          }
-        }
-        triangles.push_back(shaded);
-        for (const std::uint32_t index : triangle) indices.push_back(base + index);
-      }
-    }
-    if (triangles.empty()) return;
-    RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    auto* vertex_buffer = static_cast<float*>(
-        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                3 * sizeof(float), positions.size() / 3));
-    auto* index_buffer = static_cast<std::uint32_t*>(
-        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                3 * sizeof(std::uint32_t), indices.size() / 3));
-    if (vertex_buffer == nullptr || index_buffer == nullptr) {
-      rtcReleaseGeometry(geometry);
-      throw Error("Embree has no memory for the triangles of this scene");
-    }
-    std::copy(positions.begin(), positions.end(), vertex_buffer);
-    std::copy(indices.begin(), indices.end(), index_buffer);
-    rtcCommitGeometry(geometry);
-    rtcAttachGeometry(scene, geometry);
-    rtcReleaseGeometry(geometry);
-  }
-
-  [[nodiscard]] float light_at(const std::array<float, 3>& point,
-                               const std::array<float, 3>& normal) const {
-    // Light from everywhere is a little weaker on surfaces that look down.
-    float light = ambient * (0.85F + 0.15F * normal[2]);
-    for (const auto& lamp : lights) {
-      const auto towards = minus(as_floats(lamp.position), point);
-      const float squared = std::max(dot_of(towards, towards), 1e-4F);
-      const float cosine = dot_of(towards, normal) / std::sqrt(squared);
-      if (cosine > 0.0F) light += lamp.intensity * cosine / squared;
-    }
-    for (const auto& sun : directional_lights) {
-      const std::array<float, 3> towards{static_cast<float>(sun.towards_light.x),
-                                         static_cast<float>(sun.towards_light.y),
-                                         static_cast<float>(sun.towards_light.z)};
-      const float cosine = dot_of(towards, normal) / std::sqrt(dot_of(towards, towards));
-      if (cosine > 0.0F) light += sun.intensity * cosine;
-    }
-    return light;
-  }
-
-  [[nodiscard]] float shade(const RTCRayHit& ray, float spread_rad) const {
-    if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return background;
-    const ShadedTriangle& triangle = triangles[ray.hit.primID];
-    const ShadedMaterial& material = materials[triangle.material];
-    const std::array<float, 3> direction{ray.ray.dir_x, ray.ray.dir_y, ray.ray.dir_z};
-    const float facing = dot_of(direction, triangle.normal);
-    float albedo = material.grey;
-    if (material.texture) {
-      const float u = ray.hit.u;
-      const float v = ray.hit.v;
-      const float w = 1.0F - u - v;
-      const float s = w * triangle.st[0][0] + u * triangle.st[1][0] + v * triangle.st[2][0];
-      const float t = w * triangle.st[0][1] + u * triangle.st[1][1] + v * triangle.st[2][1];
-      // A slanted surface shows more of itself in one direction; the square root is a compromise
-      // between blur across and aliasing along it.
-      const float slant = 1.0F / std::sqrt(std::max(std::abs(facing), 0.05F));
-      const float texels = spread_rad * ray.ray.tfar * slant * triangle.texels_per_metre;
-      albedo = material.texture->sample(s, t, texels);
-    }
-    std::array<float, 3> normal = triangle.normal;
-    if (facing > 0.0F) normal = {-normal[0], -normal[1], -normal[2]};
-    const std::array<float, 3> point{ray.ray.org_x + ray.ray.tfar * direction[0],
-                                     ray.ray.org_y + ray.ray.tfar * direction[1],
-                                     ray.ray.org_z + ray.ray.tfar * direction[2]};
-    const float light = (1.0F - material.emission) * light_at(point, normal) + material.emission;
-    return std::clamp(albedo * light, 0.0F, 1.0F);
-  }
+  int channels;
+  std::array<float, 3> background;
+  LitTriangles lit;
+  RayTracer tracer;
+  std::vector<MaterialSampler> materials;
 };
 
-Renderer::Renderer(const Scene& scene, const RendererOptions& options)
-    : implementation_(std::make_unique<Implementation>()) {
-  validate(scene);
-  // One thread for building: the caller's executor is the only source of threads.
-  std::string configuration = "threads=1,set_affinity=0";
-  if (!options.instructions.empty()) configuration += ",isa=" + options.instructions;
-  implementation_->device = rtcNewDevice(configuration.c_str());
-  if (implementation_->device == nullptr) {
-    throw Error("Embree cannot start with the instruction set '" + options.instructions + "'");
-  }
-  implementation_->scene = rtcNewScene(implementation_->device);
-  rtcSetSceneFlags(implementation_->scene, RTC_SCENE_FLAG_ROBUST);
-  implementation_->lights = scene.lights;
-  implementation_->directional_lights = scene.directional_lights;
-  implementation_->ambient = scene.ambient;
-  implementation_->background = grey_of(scene.background);
-  implementation_->add_materials(scene);
-  implementation_->add_triangles(scene);
-  rtcCommitScene(implementation_->scene);
+Renderer::Renderer(const Scene& scene, const RendererOptions& options, Executor& executor) {
+  require(options.channels == 1 || options.channels == 3, "channels", options.channels, "1 or 3");
+  implementation_ = std::make_unique<Implementation>(scene, options, executor);
+}
+
+Renderer::Renderer(const Scene& scene, const RendererOptions& options) {
+  Executor here(1);
+  *this = Renderer(scene, options, here);
 }
 
 Renderer::~Renderer() = default;
 Renderer::Renderer(Renderer&&) noexcept = default;
 Renderer& Renderer::operator=(Renderer&&) noexcept = default;
-
-float Renderer::radiance_along(const Vector3& origin, const Direction3& direction,
-                               double spread_rad) const {
-  RTCRayHit ray = ray_from(origin, direction);
-  intersect(implementation_->scene, ray);
-  return implementation_->shade(ray, static_cast<float>(spread_rad));
-}
-
-double Renderer::distance_along(const Vector3& origin, const Direction3& direction) const {
-  RTCRayHit ray = ray_from(origin, direction);
-  intersect(implementation_->scene, ray);
-  if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::numeric_limits<double>::infinity();
-  return static_cast<double>(ray.ray.tfar) *
-         std::sqrt(direction.x * direction.x + direction.y * direction.y +
-                   direction.z * direction.z);
-}
 
 Direction3 scene_from_robot(const Viewpoint& viewpoint, const Direction3& in_robot) {
   // Roll about x, then pitch about y, then heading about z.
@@ -359,43 +173,166 @@ Direction3 scene_from_robot(const Viewpoint& viewpoint, const Direction3& in_rob
   return {ch * x2 - sh * y1, sh * x2 + ch * y1, z2};
 }
 
+namespace {
+
+// The ray with a direction of unit length, and the length that it had.
+std::pair<Ray, double> unit_ray(const Vector3& origin, const Direction3& direction) {
+  const double length = std::hypot(direction.x, direction.y, direction.z);
+  require(length > 0.0 && std::isfinite(length), "length of the direction", length,
+          "> 0 and finite");
+  const auto component = [length](double value) { return static_cast<float>(value / length); };
+  return {{{static_cast<float>(origin.x_m), static_cast<float>(origin.y_m),
+            static_cast<float>(origin.z_m)},
+           {component(direction.x), component(direction.y), component(direction.z)}},
+          length};
+}
+
+}  // namespace
+
+float Renderer::radiance_along(const Vector3& origin, const Direction3& direction,
+                               double spread_rad) const {
+  const Ray ray = unit_ray(origin, direction).first;
+  std::array<float, 3> colour{};
+  implementation_->shade(ray, implementation_->tracer.first_hit(ray),
+                         static_cast<float>(spread_rad), colour.data());
+  return std::clamp(grey_of(colour.data(), implementation_->channels), 0.0F, 1.0F);
+}
+
 float Renderer::radiance(const Viewpoint& viewpoint, const Direction3& direction,
                          double spread_rad) const {
   return radiance_along({viewpoint.pose.x_m, viewpoint.pose.y_m, viewpoint.height_m},
                         scene_from_robot(viewpoint, direction), spread_rad);
 }
 
+double Renderer::distance_along(const Vector3& origin, const Direction3& direction) const {
+  const RayHit hit = implementation_->tracer.first_hit(unit_ray(origin, direction).first);
+  if (hit.triangle == RayHit::kNothing) return std::numeric_limits<double>::infinity();
+  return hit.distance_m;
+}
+
 Panorama Renderer::render_panorama(const Viewpoint& viewpoint, const PanoramaRendering& rendering,
                                    Executor& executor) const {
-  require(rendering.rays_per_axis >= 1 && rendering.rays_per_axis <= 8, "rays_per_axis",
-          rendering.rays_per_axis, "1 .. 8");
+  validate(viewpoint);
+  require_rays(rendering.rays_per_axis);
   Panorama panorama(rendering.rows, rendering.columns, rendering.elevations);
   const int n = rendering.rays_per_axis;
+  const auto channels = static_cast<std::size_t>(implementation_->channels);
+  const auto columns = static_cast<std::size_t>(rendering.columns);
+  const std::size_t rays_per_row = columns * static_cast<std::size_t>(n);
   const double column_rad = 2.0 * std::numbers::pi / rendering.columns;
   const double row_rad =
       (rendering.elevations.top_rad - rendering.elevations.bottom_rad) / rendering.rows;
-  const double spread_rad = std::max(column_rad, row_rad) / n;
-  const auto values = panorama.values();
-  executor.for_chunks(
-      static_cast<std::size_t>(rendering.rows), 4,
-      [&](std::size_t begin, std::size_t end, std::size_t) {
-        for (std::size_t y = begin; y < end; ++y) {
-          for (int c = 0; c < rendering.columns; ++c) {
-            float sum = 0.0F;
-            for (int j = 0; j < n; ++j) {
-              const double elevation =
-                  rendering.elevations.top_rad - (static_cast<double>(y) + (j + 0.5) / n) * row_rad;
-              for (int i = 0; i < n; ++i) {
-                const double azimuth = (c + (i + 0.5) / n - 0.5) * column_rad;
-                sum += radiance(viewpoint, Direction3::from_angles(azimuth, elevation), spread_rad);
-              }
-            }
-            values[y * static_cast<std::size_t>(rendering.columns) + static_cast<std::size_t>(c)] =
-                sum / static_cast<float>(n * n);
-          }
+  const auto spread_rad = static_cast<float>(std::sqrt(column_rad * row_rad) / n);
+  const float weight = 1.0F / static_cast<float>(n * n);
+  std::vector<std::array<double, 2>> azimuths(rays_per_row);
+  for (std::size_t i = 0; i < rays_per_row; ++i) {
+    const double azimuth = ((static_cast<double>(i) + 0.5) / n - 0.5) * column_rad;
+    azimuths[i] = {std::cos(azimuth), std::sin(azimuth)};
+  }
+  const RayMaker make_ray(viewpoint);
+  const auto out = panorama.values();
+  const auto draw_rows = [&](std::size_t begin, std::size_t end, std::size_t) {
+    std::vector<Ray> rays(rays_per_row);
+    std::vector<RayHit> hits(rays_per_row);
+    std::vector<float> row(columns * channels);
+    for (std::size_t y = begin; y < end; ++y) {
+      std::fill(row.begin(), row.end(), 0.0F);
+      for (int j = 0; j < n; ++j) {
+        const double elevation =
+            rendering.elevations.top_rad - (static_cast<double>(y) + (j + 0.5) / n) * row_rad;
+        const double flat = std::cos(elevation);
+        const double up = std::sin(elevation);
+        for (std::size_t i = 0; i < rays_per_row; ++i) {
+          rays[i] = make_ray({flat * azimuths[i][0], flat * azimuths[i][1], up});
         }
-      });
+        implementation_->tracer.trace(rays, hits);
+        implementation_->shade(rays, hits, spread_rad, weight, static_cast<std::size_t>(n),
+                               row.data());
+      }
+      for (std::size_t c = 0; c < columns; ++c) {
+        out[y * columns + c] =
+            std::clamp(grey_of(row.data() + c * channels, implementation_->channels), 0.0F, 1.0F);
+      }
+    }
+  };
+  executor.for_chunks(static_cast<std::size_t>(rendering.rows), 4, draw_rows);
   return panorama;
+}
+
+Radiance Renderer::render_image(const Viewpoint& viewpoint, const Camera& camera, int rays_per_axis,
+                                Executor& executor) const {
+  validate(viewpoint);
+  panonav::validate(camera);
+  require_rays(rays_per_axis);
+  std::optional<HyperboloidalMirror> mirror;
+  if (std::holds_alternative<HyperboloidalModel>(camera.model)) mirror.emplace(camera);
+  const int n = rays_per_axis;
+  const auto channels = static_cast<std::size_t>(implementation_->channels);
+  const auto width = static_cast<std::size_t>(camera.image_size.width);
+  Radiance image{camera.image_size.width, camera.image_size.height, implementation_->channels, {}};
+  image.values.resize(width * static_cast<std::size_t>(image.height) * channels);
+  const float weight = 1.0F / static_cast<float>(n * n);
+  // The angle between pixels varies little over a picture; the one at two thirds of the rim, about
+  // the horizon, stands for all.
+  const bool flat = std::holds_alternative<EquirectangularModel>(camera.model);
+  const double around_px =
+      flat ? camera.image_size.width : 2.0 * std::numbers::pi * camera.rim_radius_px * 2.0 / 3.0;
+  const auto spread_rad = static_cast<float>(2.0 * std::numbers::pi / around_px / n);
+  const RayMaker make_ray(viewpoint);
+
+  const auto draw_rows = [&](std::size_t begin, std::size_t end, std::size_t) {
+    std::vector<Ray> rays;
+    std::vector<std::size_t> pixel_of;
+    std::vector<RayHit> hits;
+    std::array<float, 3> colour{};
+    const auto add = [&](std::size_t pixel, const float* values) {
+      for (std::size_t c = 0; c < channels; ++c) {
+        image.values[pixel * channels + c] += weight * values[c];
+      }
+    };
+    for (std::size_t line = begin * n; line < end * n; ++line) {
+      rays.clear();
+      pixel_of.clear();
+      for (std::size_t i = 0; i < width * n; ++i) {
+        const PixelPoint point{(static_cast<double>(i) + 0.5) / n,
+                               (static_cast<double>(line) + 0.5) / n};
+        const std::size_t pixel = line / n * width + i / n;
+        if (!mirror) {
+          if (const auto direction = unproject(camera, point)) {
+            rays.push_back(make_ray(*direction));
+            pixel_of.push_back(pixel);
+          }
+          continue;
+        }
+        const MirrorRay ray = mirror->trace(point);
+        if (ray.target == MirrorTarget::world) {
+          rays.push_back(make_ray(ray.origin, ray.direction));
+          pixel_of.push_back(pixel);
+        } else {
+          const bool housing = ray.target == MirrorTarget::housing;
+          colour.fill(housing ? kHousing : ray.body_radius < 0.3 ? kLens : kCameraBody);
+          add(pixel, colour.data());
+        }
+      }
+      hits.resize(rays.size());
+      implementation_->tracer.trace(rays, hits);
+      for (std::size_t i = 0; i < rays.size(); ++i) {
+        implementation_->shade(rays[i], hits[i], spread_rad, colour.data());
+        add(pixel_of[i], colour.data());
+      }
+    }
+  };
+  executor.for_chunks(static_cast<std::size_t>(image.height), 8, draw_rows);
+  return image;
+}
+
+Image to_image(const Radiance& radiance) {
+  Image image(radiance.width, radiance.height, radiance.channels);
+  for (std::size_t i = 0; i < radiance.values.size(); ++i) {
+    const float value = std::clamp(radiance.values[i], 0.0F, 1.0F);
+    image.pixels()[i] = static_cast<std::uint8_t>(255.0F * value + 0.5F);
+  }
+  return image;
 }
 
 }  // namespace panonav

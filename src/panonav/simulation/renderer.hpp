@@ -1,9 +1,8 @@
 #pragma once
 
-#include <cstdint>
 #include <memory>
-#include <span>
 #include <string>
+#include <vector>
 
 #include "panonav/camera/camera.hpp"
 #include "panonav/core/executor.hpp"
@@ -26,6 +25,10 @@ struct RendererOptions {
   /// Embree's instruction set, for example "sse4.2" for pictures that must be the same on every
   /// machine. Empty: the widest that the processor has.
   std::string instructions;
+  /// Lamps cast shadows and corners are darker. Off: every surface is lit as if it stood alone.
+  bool shadows = true;
+  /// 1: grey. 3: images in colour, for people; panoramas are grey all the same.
+  int channels = 1;
 };
 
 /// How a panoramic cylinder is rendered.
@@ -37,12 +40,25 @@ struct PanoramaRendering {
   int rays_per_axis = 2;
 };
 
-/// Ray tracing of a scene with Embree. Building takes time in the order of the triangles, a ray
-/// about a microsecond. Same scene, viewpoint and instruction set: same bits on any number of
-/// threads. All members may be called from several threads at once.
+/// What reaches the pixels of a camera before exposure and noise: linear, 1 is white in light 1,
+/// not clamped. Rows from the top, channels interleaved (1 grey by the weights of ITU-R BT.601, 3
+/// RGB).
+struct Radiance {
+  int width = 0;
+  int height = 0;
+  int channels = 1;
+  std::vector<float> values;
+};
+
+/// Ray tracing of a scene with Embree. Light and shadows are computed once, when it is built, at
+/// points a 25th of the floor's diagonal apart (some tenths of a second for a room); a ray then
+/// costs a fraction of a microsecond. Same scene, viewpoint and instruction set: same bits on any
+/// number of threads. All members may be called from several threads at once.
 class Renderer {
  public:
-  /// Keeps what it needs of the scene. Throws ContractError on a scene that is not valid.
+  /// Keeps what it needs of the scene. Throws ContractError on a scene that is not valid and on a
+  /// number of channels that is neither 1 nor 3. `executor` helps to compute the light.
+  Renderer(const Scene& scene, const RendererOptions& options, Executor& executor);
   explicit Renderer(const Scene& scene, const RendererOptions& options = {});
   ~Renderer();
   Renderer(Renderer&&) noexcept;
@@ -64,6 +80,13 @@ class Renderer {
                                          const PanoramaRendering& rendering,
                                          Executor& executor) const;
 
+  /// What the camera sees. A hyperboloidal mirror is traced as the thing it is, with the camera's
+  /// body in the middle and dark housing beyond the rim (see HyperboloidalMirror); every other
+  /// camera by `unproject`, 0 where it sees nothing. Throws ContractError unless the camera is
+  /// valid and rays_per_axis is 1 .. 8.
+  [[nodiscard]] Radiance render_image(const Viewpoint& viewpoint, const Camera& camera,
+                                      int rays_per_axis, Executor& executor) const;
+
   /// Metres to the nearest surface along the ray; infinity where there is none.
   [[nodiscard]] double distance_along(const Vector3& origin, const Direction3& direction) const;
 
@@ -71,6 +94,9 @@ class Renderer {
   struct Implementation;
   std::unique_ptr<Implementation> implementation_;
 };
+
+/// As 8-bit pixels: 1 becomes 255, rounded and clamped, without noise.
+[[nodiscard]] Image to_image(const Radiance& radiance);
 
 /// The direction `in_robot` in scene coordinates, for a robot with this heading and tilt.
 [[nodiscard]] Direction3 scene_from_robot(const Viewpoint& viewpoint, const Direction3& in_robot);

@@ -1,0 +1,57 @@
+#pragma once
+
+#include "panonav/camera/camera.hpp"
+#include "panonav/simulation/scene.hpp"
+
+namespace panonav {
+
+/// What a pixel of a mirror camera sees.
+enum class MirrorTarget {
+  world,        ///< the world, along the reflected ray
+  camera_body,  ///< the camera itself, reflected in the middle of the mirror
+  housing       ///< what lies beyond the mirror's rim
+};
+
+/// The way of light from a pixel through the lens to the mirror and out, in the robot frame (x
+/// forward, y left, z up) with its origin in the mirror's inner focus, the viewpoint.
+struct MirrorRay {
+  MirrorTarget target = MirrorTarget::housing;
+  Vector3 origin;            ///< on the mirror; meaningless for the housing
+  Direction3 direction;      ///< of unit length; meaningless for the housing
+  double body_radius = 0.0;  ///< camera body: distance from its axis in radii of the body, 0 .. 1
+};
+
+/// A hyperboloidal mirror above a pinhole, as a thing of glass: the ray is reflected by the
+/// surface's normal where it meets the surface, and no use is made of the single viewpoint. [Y03
+/// eq. 1, figure 1]
+class HyperboloidalMirror {
+ public:
+  /// Throws ContractError unless the camera is valid and its model hyperboloidal.
+  explicit HyperboloidalMirror(const Camera& camera);
+
+  [[nodiscard]] MirrorRay trace(PixelPoint pixel) const;
+  /// Radius of the mirror's rim, and of the camera body that hides the middle.
+  [[nodiscard]] double rim_radius_m() const noexcept { return rim_radius_mm_ * 1e-3; }
+  [[nodiscard]] double body_radius_m() const noexcept { return body_radius_mm_ * 1e-3; }
+
+ private:
+  struct Point {
+    double radius_mm, height_mm;      // of the hit, about the middle between the foci
+    double direction_r, direction_z;  // of the reflected ray, unit length
+  };
+  // False where the ray misses the mirror's sheet.
+  bool reflect(double radius_px, Point& point) const;
+
+  Camera camera_;
+  HyperboloidalModel model_;
+  double focus_mm_;  // c: the inner focus lies at height +c, the lens at -c
+  double rim_radius_mm_ = 0.0;
+  double body_radius_mm_ = 0.0;
+};
+
+/// The mirror camera that the simulated robot carries: 640 x 480 pixels, the shape of [Y03]'s
+/// mirror at a third of its size (5 cm across, so that it suits the smallest scene), from 58
+/// degrees below the horizon to 21 above.
+[[nodiscard]] Camera simulated_mirror_camera();
+
+}  // namespace panonav
