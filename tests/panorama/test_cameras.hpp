@@ -26,7 +26,7 @@ inline Camera mirror_camera() {
 /// The image of a world whose grey level (0 .. 1) depends on the direction; black where the mirror
 /// ends. Each pixel is the mean of samples x samples points.
 inline Image render(const Camera& camera, const std::function<double(double, double)>& world,
-                    int samples = 4) {
+                    int samples = 2) {
   Image image(camera.image_size.width, camera.image_size.height);
   for (int v = 0; v < image.height(); ++v) {
     for (int u = 0; u < image.width(); ++u) {

@@ -12,9 +12,6 @@ namespace panonav {
 
 namespace {
 
-constexpr double target_deviation = 0.25;
-constexpr double least_deviation = 0.25 / 255.0;
-
 /// Sums are taken row by row in double precision, so that a turn changes them by rounding only.
 struct Moments {
   double mean = 0.0;
@@ -71,15 +68,26 @@ void visit_options(PreprocessingOptions& options, OptionVisitor& visitor) {
                 options.normalise_gain);
 }
 
+double normalising_gain(double standard_deviation) noexcept {
+  constexpr double target = 0.25;
+  constexpr double least = 0.25 / 255.0;
+  return standard_deviation >= least ? target / standard_deviation : 1.0;
+}
+
+void check_masks(const PreprocessingOptions& options, int rows) {
+  if (options.masked_rows_top >= rows - options.masked_rows_bottom) {
+    throw ContractError(
+        "masked_rows_top + masked_rows_bottom",
+        to_text(static_cast<double>(options.masked_rows_top) + options.masked_rows_bottom),
+        "below " + std::to_string(rows) + " (the rows of the panorama)");
+  }
+}
+
 Panorama preprocess(Panorama panorama, const PreprocessingOptions& options) {
   validate(options);
+  check_masks(options, panorama.rows());
   const int first = options.masked_rows_top;
   const int end = panorama.rows() - options.masked_rows_bottom;
-  if (first >= end) {
-    throw ContractError("masked_rows_top + masked_rows_bottom",
-                        to_text(static_cast<double>(first) + options.masked_rows_bottom),
-                        "below " + std::to_string(panorama.rows()) + " (the rows of the panorama)");
-  }
   const auto values = panorama.values();
   const auto columns = static_cast<std::size_t>(panorama.columns());
   const auto kept = values.subspan(first * columns, (end - first) * columns);
@@ -90,9 +98,7 @@ Panorama preprocess(Panorama panorama, const PreprocessingOptions& options) {
   if (options.remove_mean || options.normalise_gain) {
     const Moments found = moments(panorama, first, end);
     const double offset = options.remove_mean ? found.mean : 0.0;
-    const double gain = options.normalise_gain && found.deviation >= least_deviation
-                            ? target_deviation / found.deviation
-                            : 1.0;
+    const double gain = options.normalise_gain ? normalising_gain(found.deviation) : 1.0;
     for (float& value : kept) value = static_cast<float>((value - offset) * gain);
   }
   return panorama;

@@ -28,6 +28,12 @@ struct PreprocessingOptions {
 
 void visit_options(PreprocessingOptions& options, OptionVisitor& visitor);
 
+/// The factor by which `normalise_gain` scales a view of this standard deviation.
+[[nodiscard]] double normalising_gain(double standard_deviation) noexcept;
+
+/// Throws ContractError when the masks leave no row of so many.
+void check_masks(const PreprocessingOptions& options, int rows);
+
 /// Throws ContractError when the masks leave no row; OptionError on options out of range.
 [[nodiscard]] Panorama preprocess(Panorama panorama, const PreprocessingOptions& options);
 

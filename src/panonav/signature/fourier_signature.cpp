@@ -8,6 +8,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/kernels/polar.hpp"
 
 namespace panonav {
 
@@ -66,10 +67,7 @@ FourierSignature compute_signature(const Panorama& panorama,
             kernels::chosen_instructions());
   std::vector<float> magnitudes(shape.size());
   std::vector<float> phases(shape.size());
-  for (std::size_t i = 0; i < shape.size(); ++i) {
-    magnitudes[i] = std::sqrt(real[i] * real[i] + imaginary[i] * imaginary[i]);
-    phases[i] = magnitudes[i] == 0.0F ? 0.0F : wrap_phase(std::atan2(imaginary[i], real[i]));
-  }
+  kernels::to_polar(real, imaginary, magnitudes, phases, kernels::chosen_instructions());
   return {shape, std::move(magnitudes), std::move(phases), panorama.elevations()};
 }
 
