@@ -41,8 +41,8 @@ std::string flag_of(std::string_view name) {
 /// Adds a flag for each member that it visits, and remembers what is typed as text.
 class FlagDeclarer final : public OptionVisitor {
  public:
-  FlagDeclarer(CLI::App& app, std::string group, OptionTexts& texts)
-      : app_(app), group_(std::move(group)), texts_(texts) {}
+  FlagDeclarer(CLI::App& app, std::string group, std::string prefix, OptionTexts& texts)
+      : app_(app), group_(std::move(group)), prefix_(std::move(prefix)), texts_(texts) {}
 
   void visit(const OptionInfo& info, int& value) override {
     declare(info, "INT", std::to_string(value), range_text(info));
@@ -67,10 +67,13 @@ class FlagDeclarer final : public OptionVisitor {
     std::string help(info.help);
     help += " (default " + initial;
     if (range != "any finite number") help += "; " + range;
-    app_.add_option(flag_of(info.name), text, help + ")")->type_name(type)->group(group_);
+    app_.add_option(flag_of(prefix_ + std::string(info.name)), text, help + ")")
+        ->type_name(type)
+        ->group(group_);
   }
   CLI::App& app_;
   std::string group_;
+  std::string prefix_;
   OptionTexts& texts_;
 };
 
@@ -179,6 +182,20 @@ void Arguments::option(const std::string& flag, std::optional<double>& value,
       ->type_name("NUMBER");
 }
 
+void Arguments::option(const std::string& flag, std::optional<std::pair<double, double>>& value,
+                       const std::string& help) {
+  const std::string name = long_form(flag);
+  implementation_->app
+      .add_option_function<std::vector<std::string>>(
+          flag,
+          [&value, name](const std::vector<std::string>& texts) {
+            value = {number_from_text(name, texts.at(0)), number_from_text(name, texts.at(1))};
+          },
+          help)
+      ->expected(2)
+      ->type_name("LOW HIGH");
+}
+
 void Arguments::option(const std::string& flag, int& value, int low, const std::string& help) {
   const std::string name = long_form(flag);
   implementation_->app
@@ -189,7 +206,7 @@ void Arguments::option(const std::string& flag, int& value, int low, const std::
       ->type_name("INT");
 }
 
-void Arguments::choice(const std::string& flag, std::string& value,
+void Arguments::choice(const std::string& flag, std::optional<std::string>& value,
                        std::vector<std::string> choices, const std::string& help) {
   const std::string name = long_form(flag);
   std::string all;
@@ -211,19 +228,31 @@ void Arguments::flag(const std::string& flag, bool& value, const std::string& he
   implementation_->app.add_flag(flag, value, help);
 }
 
-void Arguments::add_section(const std::string& section, Visit visit, std::function<void()> check) {
+void Arguments::add_section(const std::string& section, const std::string& prefix, Visit visit,
+                            std::function<void()> check) {
   auto& added = implementation_->sections.emplace_back(
       Implementation::Section{section, std::move(visit), std::move(check), {}});
-  FlagDeclarer declarer(implementation_->app, "Options of [" + section + "]", added.texts);
+  FlagDeclarer declarer(implementation_->app, "Options of [" + section + "]",
+                        prefix.empty() ? "" : prefix + "_", added.texts);
   added.visit(declarer);
 }
 
-void Arguments::resolve(const std::optional<std::string>& /*config*/) const {
-  for (const auto& section : implementation_->sections) {
+void Arguments::resolve(const std::optional<std::string>& /*config*/) {
+  for (auto& section : implementation_->sections) {
     TextApplier applier(section.texts);
     section.visit(applier);
     section.check();
   }
+}
+
+bool Arguments::given(const std::string& section, const std::string& name) const {
+  for (const auto& candidate : implementation_->sections) {
+    if (candidate.name != section) continue;
+    for (const auto& [option, text] : candidate.texts) {
+      if (text && (name.empty() || name == option)) return true;
+    }
+  }
+  return false;
 }
 
 std::string_view verb_in(std::span<const Verb> verbs, int argc, const char* const* argv) {
@@ -253,7 +282,7 @@ std::optional<ParsedCommand> parse(std::span<const Verb> verbs, int argc, const 
   struct Declared {
     CLI::App* app;
     CommonArguments common;
-    std::unique_ptr<Arguments> arguments;
+    std::shared_ptr<Arguments> arguments;
     Run run;
   };
   std::deque<Declared> declared;
@@ -262,7 +291,7 @@ std::optional<ParsedCommand> parse(std::span<const Verb> verbs, int argc, const 
     auto& entry = declared.emplace_back();
     entry.app = sub;
     Arguments::Parser parser{*sub};
-    entry.arguments = std::make_unique<Arguments>(parser);
+    entry.arguments = std::make_shared<Arguments>(parser);
     entry.run = verb.declare(*entry.arguments);
     sub->add_flag("--json", entry.common.json, "Results as JSON on standard output");
     entry.arguments->option("--threads", entry.common.threads, 0,
@@ -286,9 +315,11 @@ std::optional<ParsedCommand> parse(std::span<const Verb> verbs, int argc, const 
   for (std::size_t i = 0; i < declared.size(); ++i) {
     if (!declared[i].app->parsed()) continue;
     const auto& entry = declared[i];
-    // The run keeps what it needs alive; the option structs that `resolve` fills belong to it.
     entry.arguments->resolve(entry.common.config);
-    return ParsedCommand{verbs[i].name, entry.common, entry.run};
+    return ParsedCommand{verbs[i].name, entry.common,
+                         [arguments = entry.arguments, run = entry.run](Session& session) {
+                           return run(session);  // with its arguments still alive
+                         }};
   }
   throw UsageError("a verb is missing");
 }

@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "panonav/core/options.hpp"
@@ -50,29 +51,38 @@ class Arguments {
   void option(const std::string& flag, std::optional<std::uint64_t>& value,
               const std::string& help);
   void option(const std::string& flag, std::optional<double>& value, const std::string& help);
+  /// Exactly two numbers, low and high.
+  void option(const std::string& flag, std::optional<std::pair<double, double>>& value,
+              const std::string& help);
   /// Whole number from `low` on.
   void option(const std::string& flag, int& value, int low, const std::string& help);
   /// One of `choices`.
-  void choice(const std::string& flag, std::string& value, std::vector<std::string> choices,
-              const std::string& help);
+  void choice(const std::string& flag, std::optional<std::string>& value,
+              std::vector<std::string> choices, const std::string& help);
   void flag(const std::string& flag, bool& value, const std::string& help);
 
-  /// One flag for each member that visit_options shows: `cell_size_m` becomes `--cell-size-m`. The
-  /// same members are read from the table [`section`] of a --config file; flags win over the file,
-  /// the file over defaults.
+  /// One flag for each member that visit_options shows: `cell_size_m` becomes `--cell-size-m`, with
+  /// a prefix "area" `--area-cell-size-m`. The same members are read from the table [`section`] of
+  /// a
+  /// --config file; flags win over the file, the file over defaults.
   template <class Options>
-  void options(const std::string& section, Options& values) {
+  void options(const std::string& section, Options& values, const std::string& prefix = "") {
     add_section(
-        section, [&values](OptionVisitor& visitor) { visit_options(values, visitor); },
+        section, prefix, [&values](OptionVisitor& visitor) { visit_options(values, visitor); },
         [&values] { validate(values); });
   }
 
+  /// Whether the user gave this member by flag or file; an empty name: any member of the section.
+  /// Meaningful once the verb runs.
+  [[nodiscard]] bool given(const std::string& section, const std::string& name = "") const;
+
   /// Fills the option structs once everything is typed: file first, then flags, then checks.
-  void resolve(const std::optional<std::string>& config) const;
+  void resolve(const std::optional<std::string>& config);
 
  private:
   using Visit = std::function<void(OptionVisitor&)>;
-  void add_section(const std::string& section, Visit visit, std::function<void()> check);
+  void add_section(const std::string& section, const std::string& prefix, Visit visit,
+                   std::function<void()> check);
 
   struct Implementation;
   std::unique_ptr<Implementation> implementation_;

@@ -1,3 +1,4 @@
+#include <csignal>
 #include <iostream>
 #include <new>
 #include <string>
@@ -33,6 +34,8 @@ ExitCode run(std::string_view& verb, int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  // A file that hits its size limit is then a failed write with a message, not a killed process.
+  std::signal(SIGXFSZ, SIG_IGN);
   std::string_view verb;
   try {
     return static_cast<int>(run(verb, argc, argv));

@@ -16,7 +16,8 @@ enum class ExitCode : int {
   fault = 3,      ///< the program itself failed; never meant to happen
 };
 
-/// The work of a verb, once its arguments are known. Throws panonav::Error on bad input.
+/// The work of a verb, once its arguments are known. Throws panonav::Error on bad input. The
+/// `Arguments` that it was declared with are still there when it runs.
 using Run = std::function<ExitCode(Session&)>;
 
 /// One verb of the command line.

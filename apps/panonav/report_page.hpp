@@ -1,0 +1,43 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace panonav::command {
+
+/// A picture of a report: a file in the folder of the page, and what a person should see in it.
+struct ReportPicture {
+  std::string file;
+  std::string caption;
+};
+
+/// One HTML page that needs nothing but the pictures beside it: no scripts, nothing from the
+/// network.
+class ReportPage {
+ public:
+  ReportPage(std::string title, std::string lead);
+
+  void section(std::string_view title);
+  void text(std::string_view paragraph);
+  /// Numbers that matter most, large: "0.09 m" "median error".
+  void figures(const std::vector<std::pair<std::string, std::string>>& value_and_meaning);
+  /// Throws ContractError when a row has another number of cells than the header.
+  void table(const std::vector<std::string>& header,
+             const std::vector<std::vector<std::string>>& rows);
+  /// Side by side where the window is wide enough.
+  void pictures(const std::vector<ReportPicture>& pictures);
+  /// Command lines as typed.
+  void commands(const std::vector<std::string>& command_lines);
+
+  /// Writes `folder`/index.html, whole or not at all. Throws FileError.
+  void write(const std::filesystem::path& folder) const;
+
+ private:
+  std::string title_;
+  std::string body_;
+};
+
+}  // namespace panonav::command

@@ -1,0 +1,97 @@
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "arguments.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/storage/memory_file.hpp"
+#include "session.hpp"
+#include "verbs.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+std::string_view kind_name(PictureKind kind) {
+  switch (kind) {
+    case PictureKind::panorama:
+      return "panorama";
+    case PictureKind::equirectangular:
+      return "equirectangular";
+    case PictureKind::mirror:
+      return "mirror";
+  }
+  return "panorama";
+}
+
+ordered_json as_json(const MemoryFile& memory, const MemoryFileInfo& info) {
+  const auto& header = memory.header();
+  const auto& steps = header.preprocessing;
+  ordered_json json{{"memory", memory.path().string()},
+                    {"format_version", info.format_version},
+                    {"views", info.views},
+                    {"views_with_position", info.views_with_position},
+                    {"views_with_heading", info.views_with_heading},
+                    {"links", info.links},
+                    {"thumbnails", info.thumbnails},
+                    {"file_bytes", info.file_bytes},
+                    {"rows", header.shape.rows},
+                    {"components", header.shape.components},
+                    {"signature_bytes", 2 * header.shape.size()},
+                    {"panorama_columns", header.panorama_columns},
+                    {"full_scale", header.full_scale},
+                    {"elevations_rad", nullptr},
+                    {"kind", kind_name(header.source.kind)},
+                    {"preprocessing",
+                     {{"masked_rows_top", steps.masked_rows_top},
+                      {"masked_rows_bottom", steps.masked_rows_bottom},
+                      {"edge_channel", steps.edge_channel},
+                      {"remove_mean", steps.remove_mean},
+                      {"normalise_gain", steps.normalise_gain}}}};
+  if (header.elevations) {
+    json["elevations_rad"] = {header.elevations->bottom_rad, header.elevations->top_rad};
+  }
+  return json;
+}
+
+ExitCode show(const std::string& path, Session& session) {
+  const auto memory = MemoryFile::open(path, Access::read_only);
+  const auto info = memory.info();
+  if (session.json()) {
+    session.print(as_json(memory, info).dump());
+    return ExitCode::done;
+  }
+  const auto& header = memory.header();
+  session.print(session.strong(path) + ": " + std::to_string(info.views) + " views, " +
+                std::to_string(info.views_with_position) + " with a position, " +
+                std::to_string(info.views_with_heading) + " with a heading, " +
+                std::to_string(info.links) + " links");
+  session.print("  signatures  " + std::to_string(header.shape.rows) + " rows x " +
+                std::to_string(header.shape.components) + " components, " +
+                std::to_string(2 * header.shape.size()) + " bytes a view");
+  session.print("  pictures    " + std::string(kind_name(header.source.kind)) + ", " +
+                std::to_string(header.panorama_columns) + " columns, elevations " +
+                (header.elevations ? to_text(degrees(header.elevations->bottom_rad)) + " to " +
+                                         to_text(degrees(header.elevations->top_rad)) + " degrees"
+                                   : std::string("unknown")));
+  session.print("  file        " + std::to_string(info.file_bytes) + " bytes, format " +
+                std::to_string(info.format_version) + ", " + std::to_string(info.thumbnails) +
+                " thumbnails");
+  return ExitCode::done;
+}
+
+Run declare(Arguments& arguments) {
+  auto path = std::make_shared<std::string>();
+  arguments.positional("MEMORY", *path, "Memory file");
+  return [path](Session& session) { return show(*path, session); };
+}
+
+}  // namespace
+
+Verb info_verb() {
+  return {"info", "Show what a memory holds", "", "  panonav info office.panonav", declare};
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,210 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "command_runner.hpp"
+#include "landmark_world.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/io/image_file.hpp"
+
+namespace panonav::testing {
+namespace {
+
+using nlohmann::json;
+
+/// A memory of a 5 x 5 grid, made once for all tests of this file.
+class Localise : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new TemporaryFolder;
+    world_ = new LandmarkWorld(7);
+    write_dataset(folder_->path() / "grid", *world_, grid_poses(5));
+    Random random(3);
+    std::vector<Pose2> asked;
+    for (int i = 0; i < 20; ++i) {
+      asked.push_back({random.uniform(0.0, 2.0), random.uniform(0.0, 2.0),
+                       random.uniform(-std::numbers::pi, std::numbers::pi)});
+    }
+    asked_ = new std::vector<Pose2>(asked);
+    write_dataset(folder_->path() / "asked", *world_, asked);
+    const auto made = run_panonav({"memorise", *folder_ / "grid", memory()});
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+  }
+  static void TearDownTestSuite() {
+    delete folder_;
+    delete world_;
+    delete asked_;
+  }
+  static std::string memory() { return *folder_ / "grid.panonav"; }
+  static std::string grid() { return *folder_ / "grid"; }
+  static std::string asked() { return *folder_ / "asked"; }
+
+  static std::vector<json> answers(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "localise");
+    arguments.push_back("--json");
+    const auto result = run_panonav(arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    std::vector<json> parsed;
+    for (const auto& line : lines(result.out)) parsed.push_back(json::parse(line));
+    return parsed;
+  }
+
+  static TemporaryFolder* folder_;
+  static LandmarkWorld* world_;
+  static std::vector<Pose2>* asked_;
+};
+TemporaryFolder* Localise::folder_ = nullptr;
+LandmarkWorld* Localise::world_ = nullptr;
+std::vector<Pose2>* Localise::asked_ = nullptr;
+
+TEST_F(Localise, JsonLinesHaveExactlyTheDocumentedFields) {
+  const auto all = answers({memory(), asked()});
+  ASSERT_EQ(all.size(), 20U);
+  for (const auto& answer : all) {
+    std::vector<std::string> keys;
+    for (const auto& [key, value] : answer.items()) keys.push_back(key);
+    std::sort(keys.begin(), keys.end());
+    EXPECT_EQ(keys, (std::vector<std::string>{"bytes_read", "components", "file", "heading_rad",
+                                              "known", "matches", "position", "turned_rad"}));
+    EXPECT_TRUE(answer["known"].is_boolean());
+    EXPECT_TRUE(answer["components"].is_number_integer());
+    EXPECT_TRUE(answer["bytes_read"].is_number_unsigned());
+    EXPECT_EQ(answer["turned_rad"].get<double>(), 0.0);
+    ASSERT_FALSE(answer["matches"].empty());
+    for (const auto& match : answer["matches"]) {
+      EXPECT_EQ(match.size(), 3U);
+      EXPECT_TRUE(match.at("file").is_string());
+      EXPECT_TRUE(match.at("dissimilarity").is_number());
+      EXPECT_TRUE(match.at("heading_rad").is_number() || match.at("heading_rad").is_null());
+    }
+    if (!answer["position"].is_null()) {
+      EXPECT_EQ(answer["position"].size(), 3U);
+      EXPECT_GT(answer["position"].at("radius_m").get<double>(), 0.0);
+    }
+  }
+}
+
+TEST_F(Localise, FindsPlaceAndHeadingOfPosesBetweenTheReferences) {
+  const auto all = answers({memory(), asked()});
+  ASSERT_EQ(all.size(), asked_->size());
+  int near = 0;
+  int heading_right = 0;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    EXPECT_EQ(all[i]["file"], view_name(i));
+    if (all[i]["position"].is_null()) continue;
+    const Point2 found{all[i]["position"]["x_m"], all[i]["position"]["y_m"]};
+    near += distance(found, (*asked_)[i].position()) <= 0.5 ? 1 : 0;
+    if (!all[i]["heading_rad"].is_null()) {
+      const double error = angle_difference(all[i]["heading_rad"], (*asked_)[i].heading_rad);
+      heading_right += std::abs(error) <= radians(15.0) ? 1 : 0;
+    }
+  }
+  EXPECT_GE(near, 18);
+  EXPECT_GE(heading_right, 18);
+}
+
+TEST_F(Localise, TurnedByWholeColumnsEveryViewFindsItselfAndItsTurn) {
+  const auto all = answers({memory(), grid(), "--turn-randomly", "11"});
+  ASSERT_EQ(all.size(), 25U);
+  int turned = 0;
+  for (const auto& answer : all) {
+    const auto& best = answer["matches"][0];
+    EXPECT_EQ(best["file"], answer["file"]);
+    EXPECT_EQ(best["dissimilarity"], 0);
+    // The robot turned by +turned_rad, so its heading relative to the reference grew by that much.
+    const double turn_rad = answer["turned_rad"];
+    EXPECT_NEAR(angle_difference(best["heading_rad"], turn_rad), 0.0, radians(2.0));
+    const double columns = turn_rad * 96.0 / (2.0 * std::numbers::pi);
+    EXPECT_NEAR(columns, std::round(columns), 1e-9);
+    turned += std::abs(turn_rad) > 0.1 ? 1 : 0;
+  }
+  EXPECT_GE(turned, 15);
+  EXPECT_EQ(answers({memory(), grid(), "--turn-randomly", "11"}), all);
+  EXPECT_NE(answers({memory(), grid(), "--turn-randomly", "12"}), all);
+}
+
+TEST_F(Localise, ExcludeSameFileLeavesOnlyThatViewOut) {
+  const auto all = answers({memory(), grid(), "--exclude-same-file", "--top", "24"});
+  for (const auto& answer : all) {
+    EXPECT_EQ(answer["matches"].size(), 24U);
+    for (const auto& match : answer["matches"]) EXPECT_NE(match["file"], answer["file"]);
+  }
+}
+
+TEST_F(Localise, ComponentsAndTopAreObeyed) {
+  const auto all = answers({memory(), asked(), "--components", "3", "--top", "2"});
+  for (const auto& answer : all) {
+    EXPECT_EQ(answer["matches"].size(), 2U);
+    EXPECT_EQ(answer["components"], 3);
+  }
+}
+
+TEST_F(Localise, AnswersDoNotDependOnTheNumberOfThreads) {
+  const auto one = run_panonav({"localise", memory(), asked(), "--json", "--threads", "1"});
+  const auto three = run_panonav({"localise", memory(), asked(), "--json", "--threads", "3"});
+  EXPECT_EQ(one.exit_code, 0);
+  EXPECT_FALSE(one.out.empty());
+  EXPECT_EQ(one.out, three.out);
+}
+
+TEST_F(Localise, AnotherWorldIsUnknownAndExitCodeSaysSo) {
+  write_dataset(folder_->path() / "elsewhere", LandmarkWorld(1234), grid_poses(4));
+  const auto result = run_panonav({"localise", memory(), *folder_ / "elsewhere", "--json"});
+  const auto said = lines(result.out);
+  ASSERT_EQ(said.size(), 16U);
+  int known = 0;
+  for (const auto& line : said) {
+    const auto answer = json::parse(line);
+    known += answer["known"].get<bool>() ? 1 : 0;
+    EXPECT_FALSE(answer["matches"].empty());
+    if (!answer["known"].get<bool>()) {
+      EXPECT_TRUE(answer["position"].is_null());
+      EXPECT_TRUE(answer["heading_rad"].is_null());
+    }
+  }
+  EXPECT_LE(known, 1);
+  EXPECT_EQ(result.exit_code, known == 0 ? 1 : 0);
+}
+
+TEST_F(Localise, OneImageAsksToo) {
+  const auto all = answers({memory(), (std::filesystem::path(asked()) / view_name(3)).string()});
+  ASSERT_EQ(all.size(), 1U);
+  EXPECT_EQ(all[0]["file"], view_name(3));
+  EXPECT_EQ(all[0]["matches"], answers({memory(), asked()})[3]["matches"]);
+}
+
+TEST_F(Localise, TextForPeopleNamesEachImage) {
+  const auto result = run_panonav({"localise", memory(), asked()});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_NE(result.out.find(view_name(0)), std::string::npos);
+  EXPECT_EQ(result.out.find('\033'), std::string::npos) << "colours in a pipe";
+}
+
+TEST_F(Localise, WrongArgumentsAreRefused) {
+  EXPECT_NE(refusal({"localise", memory(), asked(), "--components", "0"}).find("components"),
+            std::string::npos);
+  EXPECT_NE(refusal({"localise", memory(), asked(), "--components", "400"}).find("components"),
+            std::string::npos);
+  EXPECT_NE(refusal({"localise", memory(), asked(), "--top", "0"}).find("top"), std::string::npos);
+  EXPECT_NE(refusal({"localise", *folder_ / "nothing.panonav", asked()}).find("nothing.panonav"),
+            std::string::npos);
+  EXPECT_NE(refusal({"localise", memory(), *folder_ / "nowhere"}).find("nowhere"),
+            std::string::npos);
+  EXPECT_NE(refusal({"localise", memory()}).find("INPUT"), std::string::npos);
+}
+
+TEST_F(Localise, ViewsOfAnotherSizeAreRefused) {
+  write_dataset(folder_->path() / "small", *world_, grid_poses(2));
+  for (int i = 0; i < 4; ++i) {
+    write_png(folder_->path() / "small" / view_name(static_cast<std::size_t>(i)),
+              world_->picture({0.5 * i, 0.0, 0.0}, 96, 10).view());
+  }
+  const auto line = refusal({"localise", memory(), *folder_ / "small"});
+  EXPECT_NE(line.find("view_000.png"), std::string::npos) << line;
+  EXPECT_NE(line.find("12"), std::string::npos) << line;
+}
+
+}  // namespace
+}  // namespace panonav::testing
