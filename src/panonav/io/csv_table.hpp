@@ -1,0 +1,43 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace panonav {
+
+/// A small table of text with a header line. Fields are separated by commas, may stand in double
+/// quotes, and are trimmed of blanks; empty lines and lines that start with # do not count.
+class CsvTable {
+ public:
+  /// Throws FileError: missing, larger than 64 MB, no header, a row with another number of fields
+  /// than the header (with its line), a column name that stands twice.
+  [[nodiscard]] static CsvTable read(const std::filesystem::path& path);
+
+  [[nodiscard]] std::size_t rows() const noexcept { return cells_.size(); }
+  [[nodiscard]] const std::vector<std::string>& columns() const noexcept { return columns_; }
+  [[nodiscard]] bool has(std::string_view column) const noexcept {
+    return index(column).has_value();
+  }
+  /// Throws FileError when there is no such column.
+  [[nodiscard]] const std::string& text(std::size_t row, std::string_view column) const;
+  /// Throws FileError that names line, column and value unless it is a finite number.
+  [[nodiscard]] double number(std::size_t row, std::string_view column) const;
+  [[noreturn]] void fail(std::size_t row, std::string_view column, std::string_view found,
+                         std::string_view allowed) const;
+
+ private:
+  [[nodiscard]] std::optional<std::size_t> index(std::string_view column) const noexcept;
+  std::filesystem::path path_;
+  std::vector<std::string> columns_;
+  std::vector<std::vector<std::string>> cells_;
+  std::vector<std::size_t> lines_;  // line of the file of each row
+};
+
+/// The field as a CSV file needs it: in quotes where it holds a comma, a quote or a blank at an
+/// end.
+[[nodiscard]] std::string csv_field(std::string_view text);
+
+}  // namespace panonav

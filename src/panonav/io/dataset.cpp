@@ -1,0 +1,313 @@
+#include "panonav/io/dataset.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <string>
+#include <unordered_set>
+
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/io/atomic_file.hpp"
+#include "panonav/io/camera_file.hpp"
+#include "panonav/io/csv_table.hpp"
+#include "panonav/io/toml_fields.hpp"
+
+namespace panonav {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::array<std::string_view, 3> kKinds{"panorama", "equirectangular", "mirror"};
+constexpr std::array<std::string_view, 2> kDirections{"clockwise", "counter-clockwise"};
+constexpr std::array<std::string_view, 8> kColumns{
+    "file", "stamp_s", "x_m", "y_m", "heading_deg", "odom_x_m", "odom_y_m", "odom_heading_deg"};
+
+ElevationBand elevation_band(TomlFields& fields, const std::vector<double>& values) {
+  const bool fits =
+      values.size() == 2 && values[0] >= -90.0 && values[1] <= 90.0 && values[0] < values[1];
+  if (!fits) {
+    std::string found = "[";
+    for (std::size_t i = 0; i < values.size(); ++i)
+      found += (i > 0 ? ", " : "") + to_text(values[i]);
+    fields.fail("elevation_deg", found + "]", "[bottom, top] with -90 <= bottom < top <= 90");
+  }
+  return {radians(values[0]), radians(values[1])};
+}
+
+PictureSource read_source(TomlFields& images, const fs::path& folder) {
+  PictureSource source;
+  const auto kind = images.choice("kind", kKinds);
+  if (!kind) images.fail("kind", "missing", "\"panorama\", \"equirectangular\", \"mirror\"");
+  source.kind = static_cast<PictureKind>(*kind);
+  std::optional<ElevationBand> band;
+  if (const auto values = images.numbers("elevation_deg")) band = elevation_band(images, *values);
+  if (source.kind == PictureKind::mirror) {
+    const std::string file = images.required_text("camera", "the name of a camera file");
+    CameraFile camera = read_camera(folder / file);
+    source.camera = std::move(camera.camera);
+    source.mask = std::move(camera.mask);
+    source.layout.kept_elevations = band;
+    return source;
+  }
+  if (const auto direction = images.choice("columns", kDirections)) {
+    source.layout.direction =
+        *direction == 0 ? ColumnDirection::clockwise : ColumnDirection::counter_clockwise;
+  }
+  if (const auto forward = images.number("forward_column")) {
+    if (*forward < 0.0 || *forward > 1.0)
+      images.fail("forward_column", to_text(*forward), "0 .. 1");
+    source.layout.forward_column = *forward;
+  }
+  if (source.kind == PictureKind::panorama) {
+    source.layout.elevations = band;
+  } else {
+    source.layout.elevations = ElevationBand{radians(-90.0), radians(90.0)};
+    source.layout.kept_elevations = band;
+  }
+  return source;
+}
+
+void require_picture(const fs::path& table, const DatasetEntry& entry) {
+  std::error_code error;
+  if (!fs::is_regular_file(entry.path, error)) {
+    throw FileError(table.string(),
+                    "file is '" + entry.file +
+                        "', which is not there; allowed: a picture in the data set's folder");
+  }
+}
+
+// Columns that belong together are given all or not at all.
+bool has_all(const CsvTable& table, const fs::path& path,
+             std::initializer_list<std::string_view> names) {
+  std::size_t found = 0;
+  std::string_view missing;
+  for (const auto name : names) {
+    if (table.has(name)) {
+      ++found;
+    } else {
+      missing = name;
+    }
+  }
+  if (found != 0 && found != names.size()) {
+    throw FileError(path.string(),
+                    "has no column '" + std::string(missing) +
+                        "', which belongs to the others; allowed: all of them or none");
+  }
+  return found == names.size();
+}
+
+std::vector<DatasetEntry> read_entries(const fs::path& folder, const fs::path& path,
+                                       bool positions_wanted) {
+  const CsvTable table = CsvTable::read(path);
+  for (const auto& column : table.columns()) {
+    if (std::find(kColumns.begin(), kColumns.end(), column) == kColumns.end()) {
+      std::string known;
+      for (const auto name : kColumns) known += (known.empty() ? "" : ", ") + std::string(name);
+      throw FileError(path.string(), "the column '" + column + "' is not known; known: " + known);
+    }
+  }
+  if (!table.has("file")) throw FileError(path.string(), "has no column 'file'");
+  const bool has_position = has_all(table, path, {"x_m", "y_m"});
+  const bool has_odometry = has_all(table, path, {"odom_x_m", "odom_y_m", "odom_heading_deg"});
+  if (table.has("heading_deg") && !has_position) {
+    throw FileError(path.string(), "has a column 'heading_deg' but no 'x_m' and 'y_m'");
+  }
+  if (positions_wanted && !has_position && !has_odometry) {
+    throw FileError(path.string(),
+                    "has no columns 'x_m' and 'y_m'; a table without positions is named by [list]");
+  }
+  if (table.rows() == 0) throw FileError(path.string(), "names no picture; allowed: one or more");
+  std::vector<DatasetEntry> entries;
+  std::unordered_set<std::string> seen;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    DatasetEntry entry;
+    entry.file = table.text(row, "file");
+    if (entry.file.empty()) table.fail(row, "file", "empty", "a picture in the data set's folder");
+    if (!seen.insert(entry.file).second) {
+      table.fail(row, "file", "'" + entry.file + "' for the second time", "each picture once");
+    }
+    entry.path = folder / entry.file;
+    require_picture(path, entry);
+    if (table.has("stamp_s")) entry.stamp_s = table.number(row, "stamp_s");
+    if (has_position) {
+      entry.pose = ReferencePose{table.number(row, "x_m"), table.number(row, "y_m"), std::nullopt};
+      if (table.has("heading_deg")) {
+        entry.pose->heading_rad = wrap_angle(radians(table.number(row, "heading_deg")));
+      }
+    }
+    if (has_odometry) {
+      entry.odometry = Pose2{table.number(row, "odom_x_m"), table.number(row, "odom_y_m"),
+                             wrap_angle(radians(table.number(row, "odom_heading_deg")))};
+    }
+    entries.push_back(std::move(entry));
+  }
+  return entries;
+}
+
+bool is_picture(const fs::path& path) {
+  std::string extension = path.extension().string();
+  for (auto& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
+}
+
+// Digits compare as numbers, everything else letter by letter.
+bool natural_less(const std::string& a, const std::string& b) {
+  const auto digit = [](char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; };
+  std::size_t i = 0;
+  std::size_t j = 0;
+  while (i < a.size() && j < b.size()) {
+    if (digit(a[i]) && digit(b[j])) {
+      std::size_t i_end = i;
+      std::size_t j_end = j;
+      while (i_end < a.size() && digit(a[i_end])) ++i_end;
+      while (j_end < b.size() && digit(b[j_end])) ++j_end;
+      std::size_t i_first = i;
+      std::size_t j_first = j;
+      while (i_first + 1 < i_end && a[i_first] == '0') ++i_first;
+      while (j_first + 1 < j_end && b[j_first] == '0') ++j_first;
+      if (i_end - i_first != j_end - j_first) return i_end - i_first < j_end - j_first;
+      const int order = a.compare(i_first, i_end - i_first, b, j_first, j_end - j_first);
+      if (order != 0) return order < 0;
+      i = i_end;
+      j = j_end;
+    } else {
+      if (a[i] != b[j]) return a[i] < b[j];
+      ++i;
+      ++j;
+    }
+  }
+  if (i == a.size() && j == b.size()) return a < b;  // differ in leading zeros at most
+  return i == a.size();
+}
+
+}  // namespace
+
+Dataset read_dataset(const fs::path& folder) {
+  const fs::path path = folder / "dataset.toml";
+  const toml::table table = read_toml(path);
+  TomlFields top(path, "", table);
+  auto images = top.section("images");
+  if (!images) top.fail("[images]", "missing", "a section that says what the pictures are");
+  auto poses = top.section("poses");
+  auto list = top.section("list");
+  if (poses.has_value() == list.has_value()) {
+    top.fail("[poses] or [list]", poses ? "both there" : "missing",
+             "one of the two, with the field file");
+  }
+  Dataset dataset;
+  dataset.folder = folder;
+  dataset.source = read_source(*images, folder);
+  TomlFields& entries = poses ? *poses : *list;
+  const std::string file = entries.required_text("file", "the name of a table");
+  dataset.entries = read_entries(folder, folder / file, poses.has_value());
+  images->finish();
+  entries.finish();
+  top.finish();
+  return dataset;
+}
+
+Dataset read_picture_folder(const fs::path& folder, PictureSource source) {
+  Dataset dataset{folder, std::move(source), {}};
+  std::error_code error;
+  std::vector<std::string> names;
+  fs::directory_iterator iterator(folder, error);
+  if (error) throw FileError(folder.string(), "cannot be read: " + error.message());
+  for (const auto& file : iterator) {
+    if (is_picture(file.path()) && file.is_regular_file(error)) {
+      names.push_back(file.path().filename().string());
+    }
+  }
+  if (names.empty())
+    throw FileError(folder.string(), "holds no PNG or JPEG picture; allowed: one or more");
+  std::sort(names.begin(), names.end(), natural_less);
+  for (auto& name : names) {
+    DatasetEntry entry;
+    entry.path = folder / name;
+    entry.file = std::move(name);
+    dataset.entries.push_back(std::move(entry));
+  }
+  return dataset;
+}
+
+Dataset single_picture(const fs::path& file, PictureSource source) {
+  std::error_code error;
+  if (!fs::is_regular_file(file, error))
+    throw FileError(file.string(), "is not there; allowed: a PNG or JPEG picture");
+  Dataset dataset{file.parent_path(), std::move(source), {}};
+  DatasetEntry entry;
+  entry.file = file.filename().string();
+  entry.path = file;
+  dataset.entries.push_back(std::move(entry));
+  return dataset;
+}
+
+void write_dataset(const Dataset& dataset) {
+  const auto& entries = dataset.entries;
+  require(!entries.empty(), "number of pictures", 0.0, ">= 1");
+  const auto all_or_none = [&](std::string_view field, const auto& has) {
+    const auto count = std::count_if(entries.begin(), entries.end(), has);
+    require(count == 0 || count == static_cast<std::ptrdiff_t>(entries.size()),
+            "number of pictures with " + std::string(field), static_cast<double>(count),
+            "0 or all " + std::to_string(entries.size()));
+    return count > 0;
+  };
+  const bool stamps = all_or_none("stamp_s", [](const auto& e) { return e.stamp_s.has_value(); });
+  const bool poses = all_or_none("x_m", [](const auto& e) { return e.pose.has_value(); });
+  const bool headings = all_or_none(
+      "heading_deg", [](const auto& e) { return e.pose && e.pose->heading_rad.has_value(); });
+  const bool odometry =
+      all_or_none("odom_x_m", [](const auto& e) { return e.odometry.has_value(); });
+
+  std::string table = "file";
+  if (stamps) table += ",stamp_s";
+  if (poses) table += ",x_m,y_m";
+  if (headings) table += ",heading_deg";
+  if (odometry) table += ",odom_x_m,odom_y_m,odom_heading_deg";
+  table += "\n";
+  for (const auto& entry : entries) {
+    table += csv_field(entry.file);
+    const auto add = [&table](double value) { table += "," + to_text(value); };
+    if (stamps) add(*entry.stamp_s);
+    if (poses) {
+      add(entry.pose->x_m);
+      add(entry.pose->y_m);
+    }
+    if (headings) add(degrees(*entry.pose->heading_rad));
+    if (odometry) {
+      add(entry.odometry->x_m);
+      add(entry.odometry->y_m);
+      add(degrees(entry.odometry->heading_rad));
+    }
+    table += "\n";
+  }
+
+  const PictureSource& source = dataset.source;
+  std::string text =
+      "[images]\nkind = \"" + std::string(kKinds[static_cast<std::size_t>(source.kind)]) + "\"\n";
+  std::optional<ElevationBand> band = source.layout.kept_elevations;
+  if (source.kind == PictureKind::panorama) band = source.layout.elevations;
+  if (source.kind != PictureKind::mirror) {
+    text +=
+        "columns = \"" +
+        std::string(kDirections[source.layout.direction == ColumnDirection::clockwise ? 0 : 1]) +
+        "\"\nforward_column = " + to_text(source.layout.forward_column) + "\n";
+  }
+  if (band) {
+    text += "elevation_deg = [" + to_text(degrees(band->bottom_rad)) + ", " +
+            to_text(degrees(band->top_rad)) + "]\n";
+  }
+  if (source.kind == PictureKind::mirror) {
+    require(source.camera.has_value(), "camera of mirror pictures", 0.0, "one camera");
+    write_camera(dataset.folder / "camera.toml", {*source.camera, source.mask});
+    text += "camera = \"camera.toml\"\n";
+  }
+  const bool with_poses = poses || odometry;
+  const std::string name = with_poses ? "poses.csv" : "images.csv";
+  text += std::string("\n[") + (with_poses ? "poses" : "list") + "]\nfile = \"" + name + "\"\n";
+  write_file(dataset.folder / name, table);
+  write_file(dataset.folder / "dataset.toml", text);
+}
+
+}  // namespace panonav

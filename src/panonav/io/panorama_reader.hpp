@@ -1,0 +1,33 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "panonav/core/image.hpp"
+#include "panonav/panorama/picture.hpp"
+#include "panonav/panorama/picture_source.hpp"
+#include "panonav/panorama/unwarper.hpp"
+
+namespace panonav {
+
+/// Turns the pictures of one recording into panoramic cylinders of one shape. For mirror pictures
+/// the table is computed once, at construction. Several threads may use one at a time.
+class PanoramaReader {
+ public:
+  /// `shape`: rows or columns 0 keep the pictures' own (80 x 512 for mirror pictures). Throws
+  /// ContractError on a source that is not valid.
+  PanoramaReader(PictureSource source, PanoramaShape shape);
+
+  [[nodiscard]] const PictureSource& source() const noexcept { return source_; }
+  /// Throws ContractError on a picture whose size is not the camera's.
+  [[nodiscard]] Panorama convert(ImageView picture) const;
+  /// Reads and converts. Throws FileError that names the file and what is wrong with it.
+  [[nodiscard]] Panorama read(const std::filesystem::path& file) const;
+
+ private:
+  PictureSource source_;
+  PanoramaShape shape_;
+  std::optional<Unwarper> unwarper_;
+};
+
+}  // namespace panonav

@@ -1,0 +1,118 @@
+#include "panonav/io/camera_file.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "panonav/core/error.hpp"
+#include "panonav/io/trajectory_file.hpp"
+
+namespace panonav {
+namespace {
+
+namespace fs = std::filesystem;
+
+Camera mirror_camera(CameraModel model) {
+  Camera camera;
+  camera.model = std::move(model);
+  camera.image_size = {640, 480};
+  camera.centre = {322.5, 239.25};
+  camera.rim_radius_px = 230.0;
+  camera.inner_radius_px = 40.0;
+  camera.forward_angle_rad = 0.3;
+  return camera;
+}
+
+std::string error_of(const fs::path& path) {
+  try {
+    (void)read_camera(path);
+    return "";
+  } catch (const FileError& error) {
+    return error.what();
+  }
+}
+
+TEST(CameraFile, EveryModelReadsBackTheSame) {
+  const fs::path path = fs::temp_directory_path() / "panonav_camera_test.toml";
+  int models = 0;
+  for (const CameraModel& model :
+       {CameraModel{HyperboloidalModel{}}, CameraModel{PolynomialModel{{-180.0, 0.0, 0.002}}},
+        CameraModel{UnifiedModel{0.9, 280.0}}, CameraModel{EquiangularModel{-1.0, 0.3}}}) {
+    const CameraFile file{mirror_camera(model), std::nullopt};
+    write_camera(path, file);
+    const CameraFile back = read_camera(path);
+    EXPECT_EQ(back.camera.model, model);
+    EXPECT_EQ(back.camera.centre, file.camera.centre);
+    EXPECT_NEAR(back.camera.forward_angle_rad, 0.3, 1e-12);
+    EXPECT_EQ(back.camera.direction, file.camera.direction);
+    ++models;
+  }
+  EXPECT_EQ(models, 4);
+  fs::remove(path);
+}
+
+TEST(CameraFile, FaultsNameFieldValueAndRange) {
+  const fs::path path = fs::temp_directory_path() / "panonav_camera_fault.toml";
+  write_camera(path, {mirror_camera(HyperboloidalModel{}), std::nullopt});
+  std::ifstream in(path);
+  const std::string good((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string text = good;
+    const auto at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    text.replace(at, text.find('\n', at) - at, to);
+    std::ofstream(path) << text;
+    return error_of(path);
+  };
+  EXPECT_NE(with("model", "model = \"pinhole\"").find("pinhole"), std::string::npos);
+  EXPECT_NE(with("rim_radius_px", "rim_radius_px = nan").find("rim_radius_px"), std::string::npos);
+  EXPECT_NE(with("width_px", "width_px = 0.5").find("width_px is 0.5"), std::string::npos);
+  EXPECT_NE(with("centre_u_px", "").find("centre_u_px is missing"), std::string::npos);
+  EXPECT_NE(with("columns", "colums = \"clockwise\"").find("colums is not a known field"),
+            std::string::npos);
+  EXPECT_NE(error_of(path.parent_path() / "panonav_no_such_camera.toml"), "");
+  fs::remove(path);
+}
+
+TEST(TrajectoryFile, TumAndCsvReadBackTheSame) {
+  std::vector<StampedPose> trajectory;
+  for (int i = 0; i < 20; ++i) {
+    trajectory.push_back({0.1 * i, {0.3 * i, -0.01 * i * i, wrap_angle(0.5 * i)}});
+  }
+  for (const char* name : {"panonav_trajectory.tum", "panonav_trajectory.csv"}) {
+    const fs::path path = fs::temp_directory_path() / name;
+    write_trajectory(path, trajectory);
+    const auto back = read_trajectory(path);
+    ASSERT_EQ(back.size(), trajectory.size());
+    for (std::size_t i = 0; i < back.size(); ++i) {
+      EXPECT_DOUBLE_EQ(back[i].stamp_s, trajectory[i].stamp_s);
+      EXPECT_EQ(back[i].pose.position(), trajectory[i].pose.position());
+      EXPECT_NEAR(angle_difference(back[i].pose.heading_rad, trajectory[i].pose.heading_rad), 0.0,
+                  1e-12);
+    }
+    fs::remove(path);
+  }
+}
+
+TEST(TrajectoryFile, FaultsNameTheLine) {
+  const fs::path path = fs::temp_directory_path() / "panonav_trajectory_fault.tum";
+  const auto message = [&](const std::string& text) -> std::string {
+    std::ofstream(path) << text;
+    try {
+      (void)read_trajectory(path);
+      return "";
+    } catch (const FileError& error) {
+      return error.what();
+    }
+  };
+  EXPECT_NE(message("0 1 2 0 0 0 0 1\n1 2 3\n").find("line 2"), std::string::npos);
+  EXPECT_NE(message("0 1 nan 0 0 0 0 1\n").find("line 1"), std::string::npos);
+  EXPECT_NE(message("0 1 2 0 0 0 0 0.5\n").find("quaternion"), std::string::npos);
+  EXPECT_NE(message("1 1 2 0 0 0 0 1\n1 1 2 0 0 0 0 1\n").find("stamp"), std::string::npos);
+  EXPECT_NE(message("# nothing\n").find("no pose"), std::string::npos);
+  fs::remove(path);
+}
+
+}  // namespace
+}  // namespace panonav

@@ -1,0 +1,161 @@
+#include "panonav/io/dataset.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "panonav/core/error.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav/io/panorama_reader.hpp"
+
+namespace panonav {
+namespace {
+
+namespace fs = std::filesystem;
+
+class DatasetFolder : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
+    folder = fs::temp_directory_path() / (std::string("panonav_dataset_") + test->name());
+    fs::remove_all(folder);
+    fs::create_directories(folder);
+    Image picture(32, 8, 1);
+    for (int u = 0; u < 32; ++u) {
+      for (int v = 0; v < 8; ++v) picture.at(u, v) = static_cast<std::uint8_t>(8 * u);
+    }
+    write_png(folder / "a.png", picture.view());
+    write_png(folder / "b.png", picture.view());
+    write("dataset.toml", kToml);
+    write("poses.csv", "file,x_m,y_m,heading_deg\na.png,1,2,90\nb.png,3,4,-180\n");
+  }
+  void TearDown() override { fs::remove_all(folder); }
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder / name) << text;
+  }
+  // The message of the error that reading throws; empty when it throws none.
+  [[nodiscard]] std::string error() const {
+    try {
+      (void)read_dataset(folder);
+      return "";
+    } catch (const FileError& e) {
+      return e.what();
+    }
+  }
+  void expect_error(const std::string& part) const {
+    const std::string message = error();
+    EXPECT_NE(message.find(part), std::string::npos) << "message: " << message;
+    EXPECT_EQ(message.find('\n'), std::string::npos) << "more than one line: " << message;
+  }
+
+  static constexpr const char* kToml =
+      "[images]\nkind = \"panorama\"\ncolumns = \"clockwise\"\nforward_column = 0.5\n"
+      "[poses]\nfile = \"poses.csv\"\n";
+  fs::path folder;
+};
+
+TEST_F(DatasetFolder, ReadsPosesInRadians) {
+  const Dataset dataset = read_dataset(folder);
+  ASSERT_EQ(dataset.entries.size(), 2U);
+  EXPECT_EQ(dataset.entries[0].file, "a.png");
+  EXPECT_DOUBLE_EQ(dataset.entries[0].pose->x_m, 1.0);
+  EXPECT_NEAR(*dataset.entries[0].pose->heading_rad, radians(90.0), 1e-12);
+  EXPECT_NEAR(*dataset.entries[1].pose->heading_rad, radians(-180.0), 1e-12);
+  EXPECT_FALSE(dataset.source.layout.elevations.has_value());
+}
+
+TEST_F(DatasetFolder, WhatIsWrittenReadsBackTheSame) {
+  Dataset dataset = read_dataset(folder);
+  dataset.source.layout.elevations = ElevationBand{radians(-30.0), radians(40.0)};
+  for (std::size_t i = 0; i < 2; ++i) {
+    dataset.entries[i].stamp_s = 0.25 * static_cast<double>(i);
+    dataset.entries[i].odometry = Pose2{0.1 * static_cast<double>(i), -0.7, 0.3};
+  }
+  write_dataset(dataset);
+  const Dataset back = read_dataset(folder);
+  ASSERT_EQ(back.entries.size(), 2U);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(back.entries[i].stamp_s, dataset.entries[i].stamp_s);
+    EXPECT_NEAR(back.entries[i].odometry->heading_rad, 0.3, 1e-12);
+    EXPECT_EQ(back.entries[i].pose->position(), dataset.entries[i].pose->position());
+  }
+  EXPECT_NEAR(back.source.layout.elevations->top_rad, radians(40.0), 1e-12);
+}
+
+TEST_F(DatasetFolder, EveryFaultHasItsLine) {
+  write("poses.csv", "file,x_m,y_m\na.png,1,nan\n");
+  expect_error("line 2: y_m is 'nan'");
+  write("poses.csv", "file,x_m,y_m\na.png,1,\n");
+  expect_error("line 2: y_m is empty");
+  write("poses.csv", "file,x_m\na.png,1\n");
+  expect_error("no column 'y_m'");
+  write("poses.csv", "file,x_m,y_m\na.png,1,2\na.png,1,2\n");
+  expect_error("'a.png' for the second time");
+  write("poses.csv", "file,x_m,y_m\nc.png,1,2\n");
+  expect_error("'c.png', which is not there");
+  write("poses.csv", "file,x_m,y_m\n");
+  expect_error("names no picture");
+  write("poses.csv", "file,x_m,y_m,colour\na.png,1,2,3\n");
+  expect_error("'colour' is not known");
+  write("poses.csv", "");
+  expect_error("no header");
+  write("poses.csv", "file,x_m,y_m\na.png,1\n");
+  expect_error("line 2 has 2 fields");
+  fs::remove(folder / "poses.csv");
+  expect_error("poses.csv");
+  write("dataset.toml", "[images]\nkind = \"film\"\n[list]\nfile = \"poses.csv\"\n");
+  expect_error("kind is \"film\"; allowed: \"panorama\"");
+  write("dataset.toml",
+        "[images]\nkind = \"panorama\"\nforward_colum = 0.5\n[poses]\nfile = \"poses.csv\"\n");
+  write("poses.csv", "file,x_m,y_m\na.png,1,2\n");
+  expect_error("forward_colum is not a known field");
+  write(
+      "dataset.toml",
+      "[images]\nkind = \"panorama\"\nelevation_deg = [40, -30]\n[poses]\nfile = \"poses.csv\"\n");
+  expect_error("elevation_deg is [40, -30]");
+  write("dataset.toml", "[images\n");
+  expect_error("is not TOML");
+}
+
+TEST_F(DatasetFolder, APlainFolderIsReadInNaturalOrder) {
+  const Image picture(8, 4, 1);
+  for (const char* name : {"view_10.png", "view_9.png", "view_2.PNG"}) {
+    write_png(folder / name, picture.view());
+  }
+  fs::remove(folder / "a.png");
+  fs::remove(folder / "b.png");
+  const Dataset dataset = read_picture_folder(folder, {});
+  ASSERT_EQ(dataset.entries.size(), 3U);
+  EXPECT_EQ(dataset.entries[0].file, "view_2.PNG");
+  EXPECT_EQ(dataset.entries[1].file, "view_9.png");
+  EXPECT_EQ(dataset.entries[2].file, "view_10.png");
+}
+
+TEST(RealDatasets, AllAreReadAndConverted) {
+  const char* data = std::getenv("PANONAV_DATA");
+  if (data == nullptr || *data == '\0')
+    GTEST_SKIP() << "PANONAV_DATA is not set: no real recordings";
+  const struct {
+    const char* name;
+    std::size_t pictures;
+    bool headings;
+  } expected[] = {
+      {"gantry_plants", 196, true}, {"sussex_route", 455, false}, {"indoor_walk_360", 117, false}};
+  for (const auto& each : expected) {
+    const fs::path folder = fs::path(data) / each.name;
+    if (!fs::exists(folder)) GTEST_SKIP() << folder << " is not there";
+    const Dataset dataset = read_dataset(folder);
+    EXPECT_EQ(dataset.entries.size(), each.pictures) << each.name;
+    EXPECT_EQ(dataset.entries[0].pose && dataset.entries[0].pose->heading_rad, each.headings)
+        << each.name;
+    const PanoramaReader reader(dataset.source, {});
+    const Panorama view = reader.read(dataset.entries[0].path);
+    EXPECT_GE(view.columns(), 90) << each.name;
+  }
+}
+
+}  // namespace
+}  // namespace panonav
