@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "io/picture_samples.hpp"
-#include "io/temporary_folder.hpp"
+#include "support/temporary_folder.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/io/atomic_file.hpp"

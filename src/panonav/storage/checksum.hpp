@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <vector>
+
+namespace panonav {
+
+/// XXH64 of bytes: a fast 64-bit hash that finds accidental damage; no protection against forgery.
+/// The same on every platform.
+[[nodiscard]] std::uint64_t checksum(std::span<const std::uint8_t> bytes, std::uint64_t seed = 0);
+
+/// Gathers the fields of a record for its checksum. Every field is preceded by its kind, texts and
+/// blobs by their length too, so that different records never give the same bytes.
+class RecordBytes {
+ public:
+  void add_null();
+  void add(std::int64_t value);
+  void add(double value);
+  void add(std::string_view text);
+  void add(std::span<const std::uint8_t> blob);
+  [[nodiscard]] std::span<const std::uint8_t> bytes() const& noexcept { return bytes_; }
+  std::span<const std::uint8_t> bytes() const&& = delete;  // would dangle
+  void clear() noexcept { bytes_.clear(); }
+
+ private:
+  void add_word(std::uint64_t word);
+  std::vector<std::uint8_t> bytes_;
+};
+
+}  // namespace panonav

@@ -1,0 +1,517 @@
+#include "panonav/storage/memory_file.hpp"
+
+#include <sqlite3.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/storage/checksum.hpp"
+#include "panonav/storage/memory_file_access.hpp"
+#include "panonav/storage/memory_header.hpp"
+#include "panonav/storage/memory_schema.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr const char* view_columns =
+    "id, name, x_m, y_m, heading_rad, stamp_s, signature, checksum";
+
+void add_optional(RecordBytes& record, const std::optional<double>& value) {
+  if (value) {
+    record.add(*value);
+  } else {
+    record.add_null();
+  }
+}
+
+// Over all fields of a view. The signature is hashed where it lies; the short fields are its seed.
+std::int64_t view_checksum(RecordBytes& scratch, ViewId id, const ReferenceInfo& info,
+                           std::span<const std::uint8_t> signature) {
+  scratch.clear();
+  scratch.add(std::int64_t{id.value});
+  scratch.add(std::string_view(info.name));
+  if (info.pose) {
+    scratch.add(info.pose->x_m);
+    scratch.add(info.pose->y_m);
+    add_optional(scratch, info.pose->heading_rad);
+  } else {
+    for (int i = 0; i < 3; ++i) scratch.add_null();
+  }
+  add_optional(scratch, info.stamp_s);
+  return static_cast<std::int64_t>(checksum(signature, checksum(scratch.bytes())));
+}
+
+std::int64_t thumbnail_checksum(ViewId view, std::span<const std::uint8_t> picture) {
+  RecordBytes record;
+  record.add(std::int64_t{view.value});
+  return static_cast<std::int64_t>(checksum(picture, checksum(record.bytes())));
+}
+
+std::int64_t link_checksum(const Link& link) {
+  RecordBytes record;
+  record.add(std::int64_t{link.a.value});
+  record.add(std::int64_t{link.b.value});
+  record.add(std::int64_t{static_cast<int>(link.kind)});
+  return static_cast<std::int64_t>(checksum(record.bytes()));
+}
+
+// Links have no direction; a < b makes a pair unique.
+Link ordered(Link link) {
+  if (link.b < link.a) std::swap(link.a, link.b);
+  return link;
+}
+
+void require_finite(const std::optional<ReferencePose>& pose) {
+  if (!pose) return;
+  require(std::isfinite(pose->x_m), "pose x_m", pose->x_m, "finite");
+  require(std::isfinite(pose->y_m), "pose y_m", pose->y_m, "finite");
+  if (pose->heading_rad) {
+    require(std::isfinite(*pose->heading_rad), "pose heading_rad", *pose->heading_rad, "finite");
+  }
+}
+
+void require_view(const NewView& view, SignatureShape shape) {
+  if (view.signature.shape != shape || view.signature.magnitudes.size() != shape.size() ||
+      view.signature.phases.size() != shape.size()) {
+    throw ContractError(
+        "signature shape",
+        std::to_string(view.signature.shape.rows) + " rows x " +
+            std::to_string(view.signature.shape.components) + " components",
+        std::to_string(shape.rows) + " rows x " + std::to_string(shape.components) + " components");
+  }
+  if (view.info.name.empty()) throw ContractError("view name", "empty", "at least one character");
+  require_finite(view.info.pose);
+  if (view.info.stamp_s) {
+    require(std::isfinite(*view.info.stamp_s), "stamp_s", *view.info.stamp_s, "finite");
+  }
+}
+
+std::optional<double> optional_real(const Statement& row, int column) {
+  if (row.is_null(column)) return std::nullopt;
+  return row.real(column);
+}
+
+void bind_optional(Statement& statement, int parameter, const std::optional<double>& value) {
+  if (value) {
+    statement.bind(parameter, *value);
+  } else {
+    statement.bind_null(parameter);
+  }
+}
+
+// x_m, y_m, heading_rad from parameter `first` on.
+void bind_pose(Statement& statement, int first, const std::optional<ReferencePose>& pose) {
+  bind_optional(statement, first, pose ? std::optional(pose->x_m) : std::nullopt);
+  bind_optional(statement, first + 1, pose ? std::optional(pose->y_m) : std::nullopt);
+  bind_optional(statement, first + 2, pose ? pose->heading_rad : std::nullopt);
+}
+
+[[noreturn]] void refuse_view(ViewId view) {
+  throw ContractError("view", std::to_string(view.value), "a view of the memory file");
+}
+
+// A row of the table of views, checked. `signature` points into the statement's row.
+struct StoredView {
+  ViewId id;
+  ReferenceInfo info;
+  std::span<const std::uint8_t> signature;
+};
+
+}  // namespace
+
+struct MemoryFile::Implementation {
+  Implementation(std::filesystem::path path_, Database database_, MemoryHeader header_)
+      : path(std::move(path_)),
+        database(std::move(database_)),
+        header(std::move(header_)),
+        insert_view(database,
+                    "INSERT INTO views(id, name, x_m, y_m, heading_rad, stamp_s, signature, "
+                    "checksum) VALUES(?, ?, ?, ?, ?, ?, ?, ?)"),
+        next_id(database, "SELECT seq FROM sqlite_sequence WHERE name = 'views'"),
+        insert_thumbnail(database,
+                         "INSERT INTO thumbnails(view, picture, checksum) VALUES(?, ?, ?)"),
+        find_name(database, "SELECT id FROM views WHERE name = ?") {}
+
+  [[nodiscard]] ViewId id_in(const Statement& row, int column) {
+    const std::int64_t id = row.integer(column);
+    if (id < 1 || id > std::int64_t{UINT32_MAX}) database.fail_damaged("a view id is out of range");
+    return {static_cast<std::uint32_t>(id)};
+  }
+
+  // Reads and checks a row of `view_columns`.
+  [[nodiscard]] StoredView view_in(const Statement& row) {
+    StoredView view;
+    view.id = id_in(row, 0);
+    view.info.name = row.text(1);
+    const auto x_m = optional_real(row, 2);
+    const auto y_m = optional_real(row, 3);
+    if (x_m && y_m) view.info.pose = ReferencePose{*x_m, *y_m, optional_real(row, 4)};
+    view.info.stamp_s = optional_real(row, 5);
+    view.signature = row.blob(6);
+    if (view.signature.size() != 2 * header.shape.size() ||
+        row.integer(7) != view_checksum(scratch, view.id, view.info, view.signature)) {
+      database.fail_damaged("view " + std::to_string(view.id.value) +
+                            " does not match its checksum");
+    }
+    return view;
+  }
+
+  ViewId insert(const NewView& view) {
+    const std::int64_t last = next_id.step() ? next_id.integer(0) : 0;
+    next_id.reset();
+    if (last < 0 || last >= std::int64_t{UINT32_MAX}) {
+      database.fail_damaged("the last view id is out of range");
+    }
+    const ViewId id{static_cast<std::uint32_t>(last + 1)};
+    signature.assign(view.signature.magnitudes.begin(), view.signature.magnitudes.end());
+    signature.insert(signature.end(), view.signature.phases.begin(), view.signature.phases.end());
+    insert_view.bind(1, std::int64_t{id.value}).bind(2, std::string_view(view.info.name));
+    bind_pose(insert_view, 3, view.info.pose);
+    bind_optional(insert_view, 6, view.info.stamp_s);
+    insert_view.bind(7, std::span<const std::uint8_t>(signature))
+        .bind(8, view_checksum(scratch, id, view.info, signature));
+    const int constraint = insert_view.run();
+    if (constraint == SQLITE_CONSTRAINT_UNIQUE) {
+      throw ContractError("view name",
+                          "\"" + view.info.name + "\", which " + path.string() + " already holds",
+                          "a name that is unique");
+    }
+    if (constraint != 0) database.fail_damaged("the id of a new view is taken");
+    if (!view.thumbnail.empty()) {
+      insert_thumbnail.bind(1, std::int64_t{id.value})
+          .bind(2, std::span<const std::uint8_t>(view.thumbnail))
+          .bind(3, thumbnail_checksum(id, view.thumbnail));
+      if (insert_thumbnail.run() != 0) database.fail_damaged("a thumbnail without a view");
+    }
+    return id;
+  }
+
+  [[nodiscard]] bool contains(ViewId view) {
+    Statement statement(database, "SELECT 1 FROM views WHERE id = ?");
+    return statement.bind(1, std::int64_t{view.value}).step();
+  }
+
+  [[nodiscard]] Link link_in(const Statement& row) {
+    Link link{id_in(row, 0), id_in(row, 1), LinkKind::sequence};
+    const std::int64_t kind = row.integer(2);
+    if (kind < 0 || kind > static_cast<int>(LinkKind::closure)) {
+      database.fail_damaged("a link of unknown kind");
+    }
+    link.kind = static_cast<LinkKind>(kind);
+    if (row.integer(3) != link_checksum(link)) {
+      database.fail_damaged("the link of views " + std::to_string(link.a.value) + " and " +
+                            std::to_string(link.b.value) + " does not match its checksum");
+    }
+    return link;
+  }
+
+  std::filesystem::path path;
+  Database database;
+  MemoryHeader header;
+  RecordBytes scratch;
+  std::vector<std::uint8_t> signature;
+  Statement insert_view;
+  Statement next_id;
+  Statement insert_thumbnail;
+  Statement find_name;
+};
+
+MemoryFile::MemoryFile(std::unique_ptr<Implementation> implementation)
+    : implementation_(std::move(implementation)) {}
+MemoryFile::~MemoryFile() = default;
+MemoryFile::MemoryFile(MemoryFile&&) noexcept = default;
+MemoryFile& MemoryFile::operator=(MemoryFile&&) noexcept = default;
+
+MemoryFile MemoryFile::create(const std::filesystem::path& path, const MemoryHeader& header) {
+  make_memory_file(path, header);
+  return open(path, Access::read_write);
+}
+
+MemoryFile MemoryFile::open(const std::filesystem::path& path, Access access) {
+  Database database = open_memory_database(path, access);
+  std::optional<MemoryHeader> header;
+  try {
+    const Transaction reading(database, Transaction::Kind::reading);
+    require_schema(database);
+    header = header_from(read_settings(database));
+  } catch (const FileError&) {
+    database.leave_log_on_close();
+    throw;
+  } catch (const Error& error) {
+    database.leave_log_on_close();
+    database.fail_damaged(error.what());
+  }
+  // Members hold the database's address, so it must have its last one before they are made.
+  return MemoryFile(
+      std::make_unique<Implementation>(path, std::move(database), std::move(*header)));
+}
+
+const MemoryHeader& MemoryFile::header() const noexcept {
+  return implementation_->header;
+}
+const std::filesystem::path& MemoryFile::path() const noexcept {
+  return implementation_->path;
+}
+
+ViewId MemoryFile::append(const NewView& view) {
+  return append(std::span(&view, 1)).front();
+}
+
+std::vector<ViewId> MemoryFile::append(std::span<const NewView> views) {
+  for (const NewView& view : views) require_view(view, implementation_->header.shape);
+  std::vector<ViewId> ids;
+  ids.reserve(views.size());
+  Transaction transaction(implementation_->database, Transaction::Kind::writing);
+  for (const NewView& view : views) ids.push_back(implementation_->insert(view));
+  transaction.commit();
+  return ids;
+}
+
+void MemoryFile::remove(std::span<const ViewId> views) {
+  Database& database = implementation_->database;
+  Statement links(database, "DELETE FROM links WHERE a = ?1 OR b = ?1");
+  Statement thumbnail(database, "DELETE FROM thumbnails WHERE view = ?");
+  Statement row(database, "DELETE FROM views WHERE id = ?");
+  Transaction transaction(database, Transaction::Kind::writing);
+  for (const ViewId view : views) {
+    if (!implementation_->contains(view)) refuse_view(view);
+    for (Statement* statement : {&links, &thumbnail, &row}) {
+      static_cast<void>(statement->bind(1, std::int64_t{view.value}).run());
+    }
+  }
+  transaction.commit();
+}
+
+void MemoryFile::set_pose(ViewId view, const std::optional<ReferencePose>& pose) {
+  require_finite(pose);
+  Database& database = implementation_->database;
+  Transaction transaction(database, Transaction::Kind::writing);
+  std::int64_t new_checksum = 0;
+  {
+    const std::string sql = std::string("SELECT ") + view_columns + " FROM views WHERE id = ?";
+    Statement read(database, sql.c_str());
+    if (!read.bind(1, std::int64_t{view.value}).step()) refuse_view(view);
+    StoredView stored = implementation_->view_in(read);
+    stored.info.pose = pose;
+    new_checksum = view_checksum(implementation_->scratch, view, stored.info, stored.signature);
+  }
+  Statement write(database,
+                  "UPDATE views SET x_m = ?, y_m = ?, heading_rad = ?, checksum = ? WHERE id = ?");
+  bind_pose(write, 1, pose);
+  static_cast<void>(write.bind(4, new_checksum).bind(5, std::int64_t{view.value}).run());
+  transaction.commit();
+}
+
+void MemoryFile::link(std::span<const Link> links) {
+  Database& database = implementation_->database;
+  Statement insert(
+      database,
+      "INSERT INTO links(a, b, kind, checksum) VALUES(?, ?, ?, ?) ON CONFLICT(a, b) DO "
+      "UPDATE SET kind = excluded.kind, checksum = excluded.checksum");
+  Transaction transaction(database, Transaction::Kind::writing);
+  for (const Link& given : links) {
+    const Link link = ordered(given);
+    if (link.a == link.b) {
+      throw ContractError("link", "of view " + std::to_string(link.a.value) + " to itself",
+                          "two different views");
+    }
+    for (const ViewId view : {link.a, link.b}) {
+      if (!implementation_->contains(view)) refuse_view(view);
+    }
+    insert.bind(1, std::int64_t{link.a.value})
+        .bind(2, std::int64_t{link.b.value})
+        .bind(3, std::int64_t{static_cast<int>(link.kind)})
+        .bind(4, link_checksum(link));
+    static_cast<void>(insert.run());
+  }
+  transaction.commit();
+}
+
+void MemoryFile::unlink(ViewId a, ViewId b) {
+  const Link pair = ordered({a, b, LinkKind::sequence});
+  Transaction transaction(implementation_->database, Transaction::Kind::writing);
+  Statement erase(implementation_->database, "DELETE FROM links WHERE a = ? AND b = ?");
+  static_cast<void>(
+      erase.bind(1, std::int64_t{pair.a.value}).bind(2, std::int64_t{pair.b.value}).run());
+  transaction.commit();
+}
+
+std::optional<ViewId> MemoryFile::find(std::string_view name) const {
+  Statement& statement = implementation_->find_name;
+  std::optional<ViewId> found;
+  if (statement.bind(1, name).step()) found = implementation_->id_in(statement, 0);
+  statement.reset();
+  return found;
+}
+
+std::vector<std::string> MemoryFile::names() const {
+  std::vector<std::string> names;
+  Statement rows(implementation_->database, "SELECT name FROM views ORDER BY id");
+  while (rows.step()) names.emplace_back(rows.text(0));
+  return names;
+}
+
+std::optional<std::vector<std::uint8_t>> MemoryFile::thumbnail(ViewId view) const {
+  Database& database = implementation_->database;
+  if (!implementation_->contains(view)) refuse_view(view);
+  Statement row(database, "SELECT picture, checksum FROM thumbnails WHERE view = ?");
+  if (!row.bind(1, std::int64_t{view.value}).step()) return std::nullopt;
+  const auto picture = row.blob(0);
+  if (row.integer(1) != thumbnail_checksum(view, picture)) {
+    database.fail_damaged("the thumbnail of view " + std::to_string(view.value) +
+                          " does not match its checksum");
+  }
+  return std::vector<std::uint8_t>(picture.begin(), picture.end());
+}
+
+void MemoryFile::set_parameter(std::string_view name, std::string_view value) {
+  Transaction transaction(implementation_->database, Transaction::Kind::writing);
+  write_setting(implementation_->database, "parameter." + std::string(name), std::string(value));
+  transaction.commit();
+}
+
+std::optional<std::string> MemoryFile::parameter(std::string_view name) const {
+  const Settings settings = read_settings(implementation_->database);
+  const auto found = settings.find("parameter." + std::string(name));
+  if (found == settings.end()) return std::nullopt;
+  const auto* text = std::get_if<std::string>(&found->second);
+  if (text == nullptr) implementation_->database.fail_damaged("parameter " + std::string(name));
+  return *text;
+}
+
+VisualMemory MemoryFile::load() const {
+  Database& database = implementation_->database;
+  const MemoryHeader& header = implementation_->header;
+  VisualMemory memory(header.shape, header.full_scale, header.elevations);
+  const Transaction reading(database, Transaction::Kind::reading);
+  PackedSignature packed{header.shape, std::vector<std::uint8_t>(header.shape.size()),
+                         std::vector<std::uint8_t>(header.shape.size())};
+  try {
+    const std::string sql = std::string("SELECT ") + view_columns + " FROM views ORDER BY id";
+    Statement rows(database, sql.c_str());
+    while (rows.step()) {
+      StoredView view = implementation_->view_in(rows);
+      const auto half = static_cast<std::ptrdiff_t>(header.shape.size());
+      std::copy_n(view.signature.begin(), half, packed.magnitudes.begin());
+      std::copy_n(view.signature.begin() + half, half, packed.phases.begin());
+      memory.append_as(view.id, packed, std::move(view.info));
+    }
+    // A page that lost its cells loses views without a fault of their own; the index of the names,
+    // which lies on other pages, still counts them.
+    const std::int64_t count =
+        database.integer("SELECT count(*) FROM views INDEXED BY sqlite_autoindex_views_1");
+    if (count != static_cast<std::int64_t>(memory.size())) {
+      database.fail_damaged("it holds " + std::to_string(memory.size()) + " of " +
+                            std::to_string(count) + " views");
+    }
+    Statement check(database, "PRAGMA quick_check(links)");
+    if (!check.step() || check.text(0) != "ok") database.fail_damaged("table links");
+    check.reset();
+    Statement links(database, "SELECT a, b, kind, checksum FROM links ORDER BY a, b");
+    while (links.step()) memory.link(implementation_->link_in(links));
+  } catch (const ContractError& error) {
+    database.fail_damaged(error.what());
+  }
+  return memory;
+}
+
+std::vector<MemoryFault> MemoryFile::verify() const {
+  Database& database = implementation_->database;
+  std::vector<MemoryFault> faults;
+  // Whatever goes wrong in one part must not hide the faults of the others.
+  const auto check = [&](std::optional<ViewId> view, const auto& part) {
+    try {
+      part();
+    } catch (const Error& error) {
+      const std::string prefix = database.path().string() + ": ";
+      std::string what = error.what();
+      if (what.starts_with(prefix)) what.erase(0, prefix.size());
+      if (what.starts_with("is damaged: ")) what.erase(0, 12);
+      faults.push_back({view, std::move(what)});
+    }
+  };
+  const Transaction reading(database, Transaction::Kind::reading);
+  check(std::nullopt, [&] {
+    Statement rows(database, "PRAGMA integrity_check");
+    while (rows.step()) {
+      std::string line(rows.text(0));
+      std::ranges::replace(line, '\n', ' ');
+      if (line != "ok") faults.push_back({std::nullopt, std::move(line)});
+    }
+  });
+  check(std::nullopt, [&] { static_cast<void>(header_from(read_settings(database))); });
+
+  // From the table and from the index of the names: a view that either has lost is found in the
+  // other.
+  std::set<ViewId> views;
+  for (const char* sql : {"SELECT id FROM views NOT INDEXED ORDER BY id",
+                          "SELECT id FROM views INDEXED BY sqlite_autoindex_views_1"}) {
+    check(std::nullopt, [&] {
+      Statement ids(database, sql);
+      while (ids.step()) views.insert(implementation_->id_in(ids, 0));
+    });
+  }
+  check(std::nullopt, [&] {
+    const std::string sql = std::string("SELECT ") + view_columns + " FROM views WHERE id = ?";
+    Statement row(database, sql.c_str());
+    for (const ViewId view : views) {
+      check(view, [&] {
+        if (!row.bind(1, std::int64_t{view.value}).step()) database.fail_damaged("view is missing");
+        static_cast<void>(implementation_->view_in(row));
+      });
+      row.reset();
+    }
+  });
+  check(std::nullopt, [&] {
+    Statement ids(database, "SELECT view FROM thumbnails ORDER BY view");
+    while (ids.step()) {
+      const ViewId view = implementation_->id_in(ids, 0);
+      check(view, [&] {
+        if (!views.contains(view)) database.fail_damaged("a thumbnail without a view");
+        static_cast<void>(thumbnail(view));
+      });
+    }
+  });
+  check(std::nullopt, [&] {
+    Statement links(database, "SELECT a, b, kind, checksum FROM links ORDER BY a, b");
+    while (links.step()) {
+      check(std::nullopt, [&] {
+        const Link link = implementation_->link_in(links);
+        if (!views.contains(link.a) || !views.contains(link.b)) {
+          database.fail_damaged("a link of views " + std::to_string(link.a.value) + " and " +
+                                std::to_string(link.b.value) + ", of which one is missing");
+        }
+      });
+    }
+  });
+  return faults;
+}
+
+MemoryFileInfo MemoryFile::info() const {
+  Database& database = implementation_->database;
+  const Transaction reading(database, Transaction::Kind::reading);
+  const auto count = [&](const char* sql) {
+    return static_cast<std::uint64_t>(database.integer(sql));
+  };
+  MemoryFileInfo info;
+  info.views = count("SELECT count(*) FROM views");
+  info.views_with_position = count("SELECT count(x_m) FROM views");
+  info.views_with_heading = count("SELECT count(heading_rad) FROM views");
+  info.links = count("SELECT count(*) FROM links");
+  info.thumbnails = count("SELECT count(*) FROM thumbnails");
+  info.format_version = static_cast<int>(database.integer("PRAGMA user_version"));
+  for (const char* suffix : {"", "-wal"}) {
+    std::filesystem::path file = database.path();
+    file += suffix;
+    std::error_code missing;
+    const auto size = std::filesystem::file_size(file, missing);
+    if (!missing) info.file_bytes += size;
+  }
+  return info;
+}
+
+}  // namespace panonav

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "panonav/storage/database.hpp"
+
+namespace panonav {
+
+/// "PNAV": marks an SQLite file as a memory file.
+inline constexpr std::uint32_t memory_application_id = 0x504E4156;
+/// Written as user_version. A reader refuses files of a larger one.
+inline constexpr int memory_format_version = 1;
+
+/// Looks at the first bytes alone, without SQLite, so that nothing that is not ours is ever opened
+/// for writing. Throws FileError: missing, no SQLite file, of another program, newer.
+void require_memory_file(const std::filesystem::path& path);
+
+/// Makes the tables in an empty database.
+void create_schema(Database& database);
+/// Throws FileError unless the tables are exactly those that `create_schema` makes.
+void require_schema(Database& database);
+
+using SettingValue = std::variant<std::int64_t, double, std::string, std::vector<std::uint8_t>>;
+using Settings = std::map<std::string, SettingValue, std::less<>>;
+
+/// All rows of the table of settings; throws FileError when one is damaged.
+[[nodiscard]] Settings read_settings(Database& database);
+/// Replaces the value that the key had. Within the caller's transaction, if there is one.
+void write_setting(Database& database, const std::string& key, const SettingValue& value);
+
+}  // namespace panonav

@@ -1,0 +1,326 @@
+#include "panonav/storage/memory_file.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <iostream>
+#include <limits>
+#include <thread>
+
+#include "panonav/core/error.hpp"
+#include "storage/memory_samples.hpp"
+#include "support/temporary_folder.hpp"
+
+namespace panonav {
+namespace {
+
+using test::message_of;
+using test::mirror_header;
+using test::random_packed;
+using test::random_view;
+using test::same_content;
+using test::small_header;
+using test::TemporaryFolder;
+
+TEST(MemoryFile, HeadersComeBack) {
+  const TemporaryFolder folder;
+  MemoryHeader plain = small_header();
+  plain.created_s.reset();
+  MemoryHeader picture = small_header();
+  picture.source.kind = PictureKind::equirectangular;
+  picture.source.layout.direction = ColumnDirection::counter_clockwise;
+  picture.source.layout.forward_column = 0.25;
+  picture.source.layout.elevations = ElevationBand{-1.5, 1.5};
+  picture.source.layout.kept_elevations = ElevationBand{-0.5, 0.7};
+  picture.elevations = ElevationBand{-0.5, 0.7};
+  std::vector<MemoryHeader> headers{plain, picture, mirror_header()};
+  for (const CameraModel& model :
+       {CameraModel(HyperboloidalModel{}), CameraModel(UnifiedModel{0.9, 200.0}),
+        CameraModel(EquiangularModel{-0.9, 0.4})}) {
+    headers.push_back(mirror_header());
+    headers.back().source.camera->model = model;
+    headers.back().source.mask.reset();
+  }
+  int number = 0;
+  for (const MemoryHeader& header : headers) {
+    const auto path = folder / ("m" + std::to_string(number++) + ".panonav");
+    EXPECT_EQ(MemoryFile::create(path, header).header(), header);
+    EXPECT_EQ(MemoryFile::open(path, Access::read_only).header(), header);
+  }
+}
+
+TEST(MemoryFile, ContentComesBack) {
+  const TemporaryFolder folder;
+  const auto path = folder / "a b%20?#.panonav";
+  const MemoryHeader header = mirror_header();
+  VisualMemory expected(header.shape, header.full_scale, header.elevations);
+  Random random(1);
+  {
+    MemoryFile file = MemoryFile::create(path, header);
+    EXPECT_TRUE(file.load().empty());
+    for (int number = 0; number < 50; ++number) {
+      const NewView view = random_view(random, header.shape, number);
+      const ViewId id = file.append(view);
+      expected.append_as(id, view.signature, view.info);
+    }
+    const auto views = expected.views();
+    const std::vector<Link> links{{views[0], views[1], LinkKind::sequence},
+                                  {views[1], views[7], LinkKind::closure},
+                                  {views[2], views[3], LinkKind::neighbour}};
+    file.link(links);
+    for (const Link& link : links) expected.link(link);
+    EXPECT_TRUE(same_content(file.load(), expected));
+  }
+  MemoryFile file = MemoryFile::open(path, Access::read_write);
+  ASSERT_EQ(expected.size(), 50U);
+  EXPECT_TRUE(same_content(file.load(), expected));
+  EXPECT_TRUE(file.verify().empty());
+
+  const std::vector<ViewId> views(expected.views().begin(), expected.views().end());
+  const ReferencePose pose{1.25, -3.5, 0.75};
+  file.set_pose(views[0], pose);
+  expected.set_pose(views[0], pose);
+  file.set_pose(views[1], std::nullopt);
+  expected.set_pose(views[1], std::nullopt);
+  const std::vector<ViewId> gone{views[7], views[49]};
+  file.remove(gone);
+  for (const ViewId view : gone) expected.remove(view);
+  file.unlink(views[3], views[2]);
+  expected.unlink(views[2], views[3]);
+  EXPECT_EQ(expected.links().size(), 1U);
+  EXPECT_TRUE(same_content(file.load(), expected));
+  EXPECT_TRUE(file.verify().empty());
+
+  EXPECT_EQ(file.thumbnail(views[4]), (std::vector<std::uint8_t>{1, 2, 3, 4}));
+  EXPECT_EQ(file.thumbnail(views[5]), std::nullopt);
+  EXPECT_EQ(file.find("view_3.png"), views[3]);
+  EXPECT_EQ(file.find("view_7.png"), std::nullopt);
+  EXPECT_EQ(file.names().size(), 48U);
+  EXPECT_EQ(file.names().front(), "view_0.png");
+  const MemoryFileInfo info = file.info();
+  EXPECT_EQ(info.views, 48U);
+  EXPECT_EQ(info.links, 1U);
+  EXPECT_EQ(info.thumbnails, 13U);
+  EXPECT_GT(info.file_bytes, 8192U);
+  EXPECT_EQ(info.format_version, 1);
+  std::uint64_t positions = 0;
+  std::uint64_t headings = 0;
+  for (const ViewId view : expected.views()) {
+    const auto& known = expected.info(view).pose;
+    positions += known.has_value();
+    headings += known && known->heading_rad;
+  }
+  EXPECT_EQ(info.views_with_position, positions);
+  EXPECT_EQ(info.views_with_heading, headings);
+}
+
+TEST(MemoryFile, IdsAreNeverUsedTwice) {
+  const TemporaryFolder folder;
+  Random random(2);
+  const auto path = folder / "m.panonav";
+  const SignatureShape shape = small_header().shape;
+  ViewId last;
+  {
+    MemoryFile file = MemoryFile::create(path, small_header());
+    file.append(random_view(random, shape, 0));
+    last = file.append(random_view(random, shape, 1));
+    file.remove(std::span(&last, 1));
+  }
+  MemoryFile file = MemoryFile::open(path, Access::read_write);
+  // The name is free again, the id is not.
+  EXPECT_GT(file.append(random_view(random, shape, 1)), last);
+}
+
+TEST(MemoryFile, ParametersAreKept) {
+  const TemporaryFolder folder;
+  const auto path = folder / "m.panonav";
+  {
+    MemoryFile file = MemoryFile::create(path, small_header());
+    EXPECT_EQ(file.parameter("unknown place"), std::nullopt);
+    file.set_parameter("unknown place", "{\"a\": 1}");
+    file.set_parameter("unknown place", "{\"a\": 2}");
+  }
+  const MemoryFile file = MemoryFile::open(path, Access::read_only);
+  EXPECT_EQ(file.parameter("unknown place"), "{\"a\": 2}");
+  EXPECT_EQ(file.header(), small_header());
+}
+
+TEST(MemoryFile, ABadViewChangesNothing) {
+  const TemporaryFolder folder;
+  Random random(3);
+  const SignatureShape shape = small_header().shape;
+  MemoryFile file = MemoryFile::create(folder / "m.panonav", small_header());
+  file.append(random_view(random, shape, 1));
+  const VisualMemory before = file.load();
+  ASSERT_EQ(before.size(), 1U);
+
+  const auto refused = [&](NewView view, std::string_view part) {
+    const std::vector<NewView> views{random_view(random, shape, 100), std::move(view)};
+    const std::string message = message_of<ContractError>([&] { file.append(views); });
+    EXPECT_NE(message.find(part), std::string::npos) << message;
+    EXPECT_TRUE(same_content(file.load(), before));
+  };
+  refused(random_view(random, shape, 1), "\"view_1.png\"");
+  refused(random_view(random, {7, 4}, 2), "7 rows x 4 components; allowed: 7 rows x 5 components");
+  NewView view = random_view(random, shape, 1);
+  view.info.name.clear();
+  refused(view, "view name");
+  view = random_view(random, shape, 4);
+  view.info.pose->x_m = std::numeric_limits<double>::quiet_NaN();
+  refused(view, "pose x_m is nan");
+  view = random_view(random, shape, 2);
+  view.info.stamp_s = std::numeric_limits<double>::infinity();
+  refused(view, "stamp_s is inf");
+
+  const ViewId id = before.views()[0];
+  const ViewId unknown{77};
+  EXPECT_THROW(file.remove(std::vector{id, unknown}), ContractError);
+  EXPECT_THROW(file.set_pose(unknown, std::nullopt), ContractError);
+  EXPECT_THROW(file.link(std::vector{Link{id, unknown, LinkKind::closure}}), ContractError);
+  EXPECT_THROW(file.link(std::vector{Link{id, id, LinkKind::closure}}), ContractError);
+  EXPECT_THROW((void)file.thumbnail(unknown), ContractError);
+  EXPECT_TRUE(same_content(file.load(), before));
+}
+
+TEST(MemoryFile, ImpossibleHeadersAreRefused) {
+  const TemporaryFolder folder;
+  const auto refused = [&](const MemoryHeader& header) {
+    EXPECT_THROW(MemoryFile::create(folder / "m.panonav", header), Error);
+    EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+  };
+  MemoryHeader header = small_header();
+  header.shape.rows = 0;
+  refused(header);
+  header = small_header();
+  header.full_scale = 0.0F;
+  refused(header);
+  header = small_header();
+  header.source.kind = PictureKind::mirror;
+  refused(header);
+  header = mirror_header();
+  header.source.kind = PictureKind::panorama;
+  refused(header);
+  header = mirror_header();
+  header.source.mask = Image(3, 3);
+  refused(header);
+  header = small_header();
+  header.elevations = ElevationBand{0.5, 0.5};
+  refused(header);
+  header = small_header();
+  header.panorama_columns = 9;
+  refused(header);
+}
+
+TEST(MemoryFile, CreateNeverReplaces) {
+  const TemporaryFolder folder;
+  const auto path = folder.write("m.panonav", "something else");
+  EXPECT_NE(message_of<FileError>([&] {
+              MemoryFile::create(path, small_header());
+            }).find("is there already"),
+            std::string::npos);
+  EXPECT_EQ(std::filesystem::file_size(path), 14U);
+  EXPECT_THROW(MemoryFile::create(folder / "no" / "m.panonav", small_header()), FileError);
+}
+
+TEST(MemoryFile, NothingIsLeftBesideAClosedFile) {
+  const TemporaryFolder folder;
+  Random random(4);
+  const auto path = folder / "m.panonav";
+  {
+    MemoryFile file = MemoryFile::create(path, small_header());
+    file.append(random_view(random, small_header().shape, 0));
+  }
+  { (void)MemoryFile::open(path, Access::read_only).load(); }
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
+}
+
+TEST(MemoryFile, ReadersBesideOneWriter) {
+  const TemporaryFolder folder;
+  const auto path = folder / "m.panonav";
+  const SignatureShape shape = small_header().shape;
+  constexpr int rounds = 100;
+  constexpr int views_per_round = 3;
+  MemoryFile writer = MemoryFile::create(path, small_header());
+  // Each reader must see whole transactions only, and never fewer views than before.
+  std::vector<std::thread> readers;
+  std::vector<std::string> faults(3);
+  std::vector<int> loads(3);
+  for (std::size_t reader = 0; reader < 3; ++reader) {
+    readers.emplace_back([&, reader] {
+      try {
+        const MemoryFile file = MemoryFile::open(path, Access::read_only);
+        std::size_t seen = 0;
+        while (seen < rounds * views_per_round) {
+          const VisualMemory memory = file.load();
+          ++loads[reader];
+          if (memory.size() < seen) faults[reader] = "views were lost";
+          if (memory.size() % views_per_round != 0) faults[reader] = "half a transaction was seen";
+          seen = memory.size();
+          if (!faults[reader].empty()) return;
+        }
+      } catch (const std::exception& error) {
+        faults[reader] = error.what();
+      }
+    });
+  }
+  Random random(5);
+  for (int round = 0; round < rounds; ++round) {
+    std::vector<NewView> views;
+    for (int i = 0; i < views_per_round; ++i) {
+      views.push_back(random_view(random, shape, round * views_per_round + i));
+    }
+    writer.append(views);
+  }
+  for (auto& reader : readers) reader.join();
+  for (std::size_t reader = 0; reader < 3; ++reader) {
+    EXPECT_EQ(faults[reader], "");
+    EXPECT_GE(loads[reader], 1);
+  }
+}
+
+TEST(MemoryFile, TwoWritersTakeTurns) {
+  const TemporaryFolder folder;
+  const auto path = folder / "m.panonav";
+  Random random(6);
+  const SignatureShape shape = small_header().shape;
+  MemoryFile first = MemoryFile::create(path, small_header());
+  MemoryFile second = MemoryFile::open(path, Access::read_write);
+  std::vector<ViewId> ids;
+  for (int number = 0; number < 20; ++number) {
+    ids.push_back((number % 2 == 0 ? first : second).append(random_view(random, shape, number)));
+  }
+  EXPECT_TRUE(std::ranges::is_sorted(ids));
+  EXPECT_EQ(first.load().size(), 20U);
+  EXPECT_THROW(second.append(random_view(random, shape, 0)), ContractError);
+}
+
+// The figure of docs/performance.md is measured by the benchmark; this keeps the order of magnitude
+// and the promise that a large memory comes back whole.
+TEST(MemoryFile, ALargeMemoryLoadsQuickly) {
+  const TemporaryFolder folder;
+  const auto path = folder / "m.panonav";
+  MemoryHeader header = small_header();
+  header.shape = {80, 15};
+  header.panorama_columns = 512;
+  constexpr int count = 20000;
+  Random random(7);
+  {
+    MemoryFile file = MemoryFile::create(path, header);
+    std::vector<NewView> views;
+    for (int number = 0; number < count; ++number) {
+      views.push_back(random_view(random, header.shape, number));
+    }
+    EXPECT_EQ(file.append(views).size(), static_cast<std::size_t>(count));
+  }
+  const auto start = std::chrono::steady_clock::now();
+  const VisualMemory memory = MemoryFile::open(path, Access::read_only).load();
+  const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - start;
+  EXPECT_EQ(memory.size(), static_cast<std::size_t>(count));
+  RecordProperty("load_s", std::to_string(passed.count()));
+  std::cout << count << " views of 80 x 15 loaded in " << passed.count() << " s\n";
+}
+
+}  // namespace
+}  // namespace panonav

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "panonav/core/random.hpp"
+#include "panonav/storage/memory_file.hpp"
+
+namespace panonav::test {
+
+inline PackedSignature random_packed(Random& random, SignatureShape shape) {
+  PackedSignature packed{shape, std::vector<std::uint8_t>(shape.size()),
+                         std::vector<std::uint8_t>(shape.size())};
+  for (auto* part : {&packed.magnitudes, &packed.phases}) {
+    for (auto& value : *part) value = static_cast<std::uint8_t>(random.index(256));
+  }
+  return packed;
+}
+
+/// A view with and without each of the optional parts, by its number.
+inline NewView random_view(Random& random, SignatureShape shape, int number) {
+  NewView view;
+  view.info.name = "view_" + std::to_string(number) + ".png";
+  if (number % 3 != 0) {
+    view.info.pose = ReferencePose{random.uniform(-5.0, 5.0), random.uniform(-5.0, 5.0), {}};
+    if (number % 3 == 1) view.info.pose->heading_rad = random.uniform(-3.0, 3.0);
+  }
+  if (number % 2 == 0) view.info.stamp_s = 0.1 * number;
+  view.signature = random_packed(random, shape);
+  if (number % 4 == 0) view.thumbnail = {1, 2, 3, static_cast<std::uint8_t>(number % 256)};
+  return view;
+}
+
+inline MemoryHeader small_header() {
+  MemoryHeader header;
+  header.shape = {7, 5};
+  header.full_scale = 0.5F;
+  header.panorama_columns = 90;
+  header.preprocessing.normalise_gain = true;
+  header.created_s = 1700000000.5;
+  return header;
+}
+
+inline MemoryHeader mirror_header() {
+  MemoryHeader header = small_header();
+  header.elevations = ElevationBand{-0.5, 0.25};
+  header.source.kind = PictureKind::mirror;
+  header.source.layout.kept_elevations = ElevationBand{-0.5, 0.25};
+  Camera camera;
+  camera.model = PolynomialModel{{-120.0, 0.0, 0.002, 1e-7}};
+  camera.image_size = {64, 48};
+  camera.centre = {32.25, 24.5};
+  camera.rim_radius_px = 22.0;
+  camera.inner_radius_px = 5.0;
+  camera.direction = ColumnDirection::clockwise;
+  camera.forward_angle_rad = 0.3;
+  header.source.camera = camera;
+  Image mask(64, 48);
+  for (int u = 0; u < 64; ++u) mask.at(u, 3 * u % 48) = 255;
+  header.source.mask = mask;
+  return header;
+}
+
+/// What two memories hold is the same.
+inline bool same_content(const VisualMemory& a, const VisualMemory& b) {
+  if (a.shape() != b.shape() || a.full_scale() != b.full_scale() ||
+      a.elevations() != b.elevations() || a.size() != b.size() ||
+      a.links().size() != b.links().size()) {
+    return false;
+  }
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const ViewId view = a.views()[i];
+    if (b.views()[i] != view || a.info(view) != b.info(view) || a.packed(view) != b.packed(view)) {
+      return false;
+    }
+  }
+  for (std::size_t i = 0; i < a.links().size(); ++i) {
+    if (!(a.links()[i] == b.links()[i])) return false;
+  }
+  return true;
+}
+
+}  // namespace panonav::test
