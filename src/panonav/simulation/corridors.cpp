@@ -40,7 +40,7 @@ Scene make_loop(const SceneVariation& variation) {
                     {{-0.5, 3.5}, {6.5, 4.5}},
                     {{-0.5, -0.5}, {0.5, 4.5}},
                     {{5.5, -0.5}, {6.5, 4.5}}};
-  scene.ambient = 0.45F;
+  scene.ambient = 0.65F;
   scene.tour = {{0.0, 0.0}, {6.0, 0.0}, {6.0, 4.0}, {0.0, 4.0}};
   furnish_room_shell(builder, outside, kHeight);
   const auto inner = corners_of(block);
@@ -121,7 +121,7 @@ Scene make_loop(const SceneVariation& variation) {
   const int shine = builder.plain({0.98F, 0.98F, 0.95F}, 1.0F);
   for (const Point2 at : {Point2{0.0, 0.0}, Point2{3.0, 0.0}, Point2{6.0, 0.0}, Point2{6.0, 2.0},
                           Point2{6.0, 4.0}, Point2{3.0, 4.0}, Point2{0.0, 4.0}, Point2{0.0, 2.0}}) {
-    add_ceiling_lamp(builder, shine, at, kHeight, static_cast<float>(random.uniform(0.3, 0.6)));
+    add_ceiling_lamp(builder, shine, at, kHeight, static_cast<float>(random.uniform(0.6, 1.0)));
   }
   return builder.finish();
 }
@@ -143,7 +143,7 @@ Scene make_corridor(const SceneVariation& variation) {
                     {{-0.6, kShort - 0.6}, {kLong + 0.6, kShort + 0.6}},
                     {{-0.6, -0.6}, {0.6, kShort + 0.6}},
                     {{kLong - 0.6, -0.6}, {kLong + 0.6, kShort + 0.6}}};
-  scene.ambient = 0.45F;
+  scene.ambient = 0.65F;
   scene.tour = {{0.0, 0.0}, {kLong, 0.0}, {kLong, kShort}, {0.0, kShort}};
 
   const int carpet = builder.textured(noise_texture(random, 128, {0.3F, 0.3F, 0.34F}, 0.08));
@@ -157,7 +157,7 @@ Scene make_corridor(const SceneVariation& variation) {
   // passage instead.
   const auto dress = [&](const std::string& name, Point2 from, Point2 to, bool passages) {
     builder.wall(name, plaster, from, to, kHeight, 2.0);
-    builder.on_wall(name + " rail", rail, from, to, 0.0, distance(from, to), 0.85, 0.95);
+    builder.on_wall(name + " rail", rail, from, to, 0.0, distance(from, to), 0.85, 0.95, 0.005);
     const double length = distance(from, to);
     const int doors = static_cast<int>(length / 2.0);
     const double first = 0.5 * (length - 2.0 * doors) + 0.55;
@@ -183,12 +183,12 @@ Scene make_corridor(const SceneVariation& variation) {
   add_plant(builder, "plant", {outside.low.x_m + 0.3, random.uniform(2.0, 6.0)});
   const int shine = builder.plain({0.98F, 0.98F, 0.95F}, 1.0F);
   for (double x = 0.0; x <= kLong + 0.1; x += 2.0) {
-    add_ceiling_lamp(builder, shine, {x, 0.0}, kHeight, 0.35F);
-    add_ceiling_lamp(builder, shine, {x, kShort}, kHeight, 0.35F);
+    add_ceiling_lamp(builder, shine, {x, 0.0}, kHeight, 0.7F);
+    add_ceiling_lamp(builder, shine, {x, kShort}, kHeight, 0.7F);
   }
   for (double y = 2.0; y < kShort - 0.1; y += 2.0) {
-    add_ceiling_lamp(builder, shine, {0.0, y}, kHeight, 0.35F);
-    add_ceiling_lamp(builder, shine, {kLong, y}, kHeight, 0.35F);
+    add_ceiling_lamp(builder, shine, {0.0, y}, kHeight, 0.7F);
+    add_ceiling_lamp(builder, shine, {kLong, y}, kHeight, 0.7F);
   }
   return builder.finish();
 }

@@ -33,8 +33,8 @@ void furnish_room_shell(SceneBuilder& builder, const FloorArea& room, double hei
     builder.wall(wall,
                  builder.textured(noise_texture(random, 256, tint(random, 0.45, 0.85, 0.12), 0.07)),
                  from, to, height_m, 2.5);
-    builder.wall(wall + " skirting", builder.plain(tint(random, 0.1, 0.3, 0.1)), from, to, 0.08,
-                 1.0);
+    builder.on_wall(wall + " skirting", builder.plain(tint(random, 0.1, 0.3, 0.1)), from, to, 0.0,
+                    length, 0.0, 0.08, 0.005);
     double along = random.uniform(0.2, 0.8);
     while (along < length - 0.6) {
       const double kind = random.uniform();
@@ -174,15 +174,17 @@ void add_tree(SceneBuilder& builder, const std::string& name, Point2 centre, dou
   const double trunk = 0.3 * height_m;
   builder.cylinder(name, bark, centre, 0.0, trunk + 0.5, 0.05 * height_m * random.uniform(0.6, 1.0),
                    10, 1.3);
-  // The crown: tapering drums, each pushed to one side, so that a tree has a shape of its own.
-  const int drums = 4;
-  for (int i = 0; i < drums; ++i) {
-    const double bottom = trunk + (height_m - trunk) * i / drums;
-    const double radius = 0.25 * height_m * random.uniform(0.6, 1.1) * (1.0 - 0.18 * i);
-    const Point2 at{centre.x_m + random.normal(0.0, 0.05 * height_m),
-                    centre.y_m + random.normal(0.0, 0.05 * height_m)};
-    builder.cylinder(name, leaves, at, bottom, bottom + (height_m - trunk) / drums * 1.3,
-                     0.7 * radius, 12, 1.4);
+  // The crown: a few clumps of leaves, pushed to all sides, so that a tree has a shape of its own.
+  const double crown = height_m - trunk;
+  const int clumps = 4 + static_cast<int>(random.index(3));
+  for (int i = 0; i < clumps; ++i) {
+    const double share = (i + 0.5) / clumps;
+    const double radius = crown * random.uniform(0.22, 0.36) * (1.15 - 0.5 * share);
+    builder.blob(
+        name, leaves,
+        {centre.x_m + random.normal(0.0, 0.12 * crown),
+         centre.y_m + random.normal(0.0, 0.12 * crown), trunk + crown * (0.15 + 0.75 * share)},
+        {radius, radius, radius * random.uniform(0.7, 1.0)}, 0.13);
   }
 }
 

@@ -41,22 +41,43 @@ Corner middle(const Corner& a, const Corner& b) {
           {0.5F * (a.uv[0] + b.uv[0]), 0.5F * (a.uv[1] + b.uv[1])}};
 }
 
+// How fine light is computed where: `spacing_m` on the floor, coarser in proportion to the distance
+// from it.
+class Spacing {
+ public:
+  Spacing(const Scene& scene, double spacing_m)
+      : low_{static_cast<float>(scene.floor_low.x_m), static_cast<float>(scene.floor_low.y_m)},
+        high_{static_cast<float>(scene.floor_high.x_m), static_cast<float>(scene.floor_high.y_m)},
+        spacing_m_(static_cast<float>(spacing_m)) {}
+
+  [[nodiscard]] float at(const Float3& point) const {
+    const float dx = std::max({low_[0] - point[0], 0.0F, point[0] - high_[0]});
+    const float dy = std::max({low_[1] - point[1], 0.0F, point[1] - high_[1]});
+    return std::max(spacing_m_, 0.125F * std::hypot(dx, dy));
+  }
+
+ private:
+  std::array<float, 2> low_, high_;
+  float spacing_m_;
+};
+
 // Halves the longest side until all are short enough.
-void split(const Corners& corners, float longest_m, std::vector<Corners>& out) {
+void split(const Corners& corners, const Spacing& spacing, std::vector<Corners>& out) {
   std::vector<Corners> stack{corners};
   while (!stack.empty()) {
     const Corners t = stack.back();
     stack.pop_back();
-    int side = 0;
+    std::size_t side = 0;
     float side_length = 0.0F;
-    for (int i = 0; i < 3; ++i) {
+    for (std::size_t i = 0; i < 3; ++i) {
       const float l = length(t[(i + 1) % 3].position - t[i].position);
       if (l > side_length) {
         side_length = l;
         side = i;
       }
     }
-    if (side_length <= longest_m) {
+    const Float3 centre = (1.0F / 3.0F) * (t[0].position + t[1].position + t[2].position);
+    if (side_length <= spacing.at(centre)) {
       out.push_back(t);
       continue;
     }
@@ -67,10 +88,15 @@ void split(const Corners& corners, float longest_m, std::vector<Corners>& out) {
   }
 }
 
+// How far an obstacle may be to darken a surface, in spacings.
+constexpr double kReach = 5.0;
+
 // Where light is computed: a point a little above one side of a surface.
 struct LightPoint {
   Float3 position;
   Float3 normal;
+  Float3 inwards{};  ///< sum of the ways to the middles of the triangles that share the point
+  float sharers = 0.0F;
   float light = 0.0F;
 };
 
@@ -89,11 +115,13 @@ struct PointKeyHash {
   }
 };
 
-PointKey key_of(const Float3& position, const Float3& normal) {
+// Points nearer to each other than a tenth of the spacing, on surfaces that look the same way,
+// share their light.
+PointKey key_of(const Float3& position, const Float3& normal, float spacing_m) {
   PointKey key;
   for (int i = 0; i < 3; ++i) {
-    key.cells[i] = static_cast<std::int32_t>(std::lround(position[i] * 2000.0F));
-    key.cells[3 + i] = static_cast<std::int32_t>(std::lround(normal[i] * 32.0F));
+    key.cells[i] = static_cast<std::int32_t>(std::lround(position[i] * 10.0F / spacing_m));
+    key.cells[3 + i] = static_cast<std::int32_t>(std::lround(normal[i] * 10.0F));
   }
   return key;
 }
@@ -116,28 +144,29 @@ std::vector<Float3> hemisphere(int count) {
 class LightProbe {
  public:
   LightProbe(const Scene& scene, const RayTracer& tracer, const LitTriangles& lit, bool shadows,
-             double reach_m)
+             double spacing_m)
       : scene_(scene),
         tracer_(tracer),
         lit_(lit),
         shadows_(shadows),
-        reach_m_(static_cast<float>(reach_m)),
-        lift_m_(static_cast<float>(reach_m) * 2e-3F),
-        directions_(hemisphere(32)) {}
+        reach_m_(static_cast<float>(kReach * spacing_m)),
+        spacing_(scene, spacing_m),
+        directions_(hemisphere(24)) {}
 
   [[nodiscard]] float light_at(const Float3& surface, const Float3& normal) const {
-    const Float3 position = surface + lift_m_ * normal;
+    // Above pictures that hang close before their wall: those are no obstacles to its light.
+    const float lift_m = 0.08F * spacing_.at(surface);
+    const Float3 position = surface + lift_m * normal;
     float sum = scene_.ambient * openness(position, normal);
     for (const PointLight& lamp : scene_.lights) {
       const Float3 to_lamp =
           Float3{static_cast<float>(lamp.position.x_m), static_cast<float>(lamp.position.y_m),
                  static_cast<float>(lamp.position.z_m)} -
           position;
-      // Nearer than a lamp's own size the inverse square law would go to infinity.
-      const float distance = std::max(length(to_lamp), 0.2F * reach_m_);
+      const float distance = std::max(length(to_lamp), 1e-6F);
       const Float3 direction = (1.0F / distance) * to_lamp;
-      sum += lamp.intensity / (distance * distance) *
-             visible(position, normal, direction, 0.97F * distance);
+      const float strength = lamp.intensity / (distance * distance + lamp.radius_m * lamp.radius_m);
+      sum += strength * visible(position, normal, direction, 0.97F * distance);
     }
     for (const DirectionalLight& light : scene_.directional_lights) {
       const Float3 towards{static_cast<float>(light.towards_light.x),
@@ -163,7 +192,7 @@ class LightProbe {
       const RayHit hit = tracer_.first_hit(ray);
       if (hit.triangle == RayHit::kNothing || hit.distance_m >= distance_m) return true;
       if (emission_of(hit) < 0.5F) return false;
-      const float step = hit.distance_m + lift_m_;
+      const float step = hit.distance_m + 1e-3F * reach_m_;
       ray.origin = ray.origin + step * ray.direction;
       distance_m -= step;
     }
@@ -196,7 +225,7 @@ class LightProbe {
   const LitTriangles& lit_;
   bool shadows_;
   float reach_m_;
-  float lift_m_;
+  Spacing spacing_;
   std::vector<Float3> directions_;
 };
 
@@ -204,6 +233,7 @@ class LightProbe {
 
 LitTriangles subdivide(const Scene& scene, double spacing_m) {
   LitTriangles lit;
+  const Spacing spacing(scene, spacing_m);
   std::vector<Corners> pieces;
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
     const Mesh& mesh = scene.meshes[m];
@@ -234,7 +264,7 @@ LitTriangles subdivide(const Scene& scene, double spacing_m) {
       if (own_light) {
         pieces.push_back(corners);
       } else {
-        split(corners, static_cast<float>(spacing_m), pieces);
+        split(corners, spacing, pieces);
       }
       for (const Corners& piece : pieces) {
         const auto first = static_cast<std::uint32_t>(lit.vertices.size());
@@ -250,30 +280,45 @@ LitTriangles subdivide(const Scene& scene, double spacing_m) {
   return lit;
 }
 
-void bake_light(const Scene& scene, const RayTracer& tracer, bool shadows, double reach_m,
+void bake_light(const Scene& scene, const RayTracer& tracer, bool shadows, double spacing_m,
                 LitTriangles& lit, Executor& executor) {
+  const Spacing spacing(scene, spacing_m);
   std::vector<LightPoint> points;
   std::unordered_map<PointKey, std::uint32_t, PointKeyHash> known;
   std::vector<std::array<std::uint32_t, 6>> points_of(lit.triangles.size());
   const auto point_index = [&](const Float3& position, const Float3& normal) {
-    const auto [entry, fresh] =
-        known.try_emplace(key_of(position, normal), static_cast<std::uint32_t>(points.size()));
+    const auto [entry, fresh] = known.try_emplace(key_of(position, normal, spacing.at(position)),
+                                                  static_cast<std::uint32_t>(points.size()));
     if (fresh) points.push_back({position, normal});
     return entry->second;
+  };
+  const auto note_middle = [&](std::uint32_t index, const Float3& centre) {
+    LightPoint& point = points[index];
+    point.inwards = point.inwards + (centre - point.position);
+    point.sharers += 1.0F;
   };
   for (std::size_t t = 0; t < lit.triangles.size(); ++t) {
     if (scene.materials[lit.triangles[t].material].emission >= 1.0F) continue;
     const Float3& normal = lit.triangles[t].normal;
+    const auto& index = lit.indices[t];
+    const Float3 centre =
+        (1.0F / 3.0F) * (lit.vertices[index[0]] + lit.vertices[index[1]] + lit.vertices[index[2]]);
     for (int i = 0; i < 3; ++i) {
       const Float3& corner = lit.vertices[lit.indices[t][i]];
       points_of[t][i] = point_index(corner, normal);
       points_of[t][3 + i] = point_index(corner, -1.0F * normal);
+      note_middle(points_of[t][i], centre);
+      note_middle(points_of[t][3 + i], centre);
     }
   }
-  const LightProbe probe(scene, tracer, lit, shadows, reach_m);
+  const LightProbe probe(scene, tracer, lit, shadows, spacing_m);
   executor.for_chunks(points.size(), 256, [&](std::size_t begin, std::size_t end, std::size_t) {
     for (std::size_t i = begin; i < end; ++i) {
-      points[i].light = probe.light_at(points[i].position, points[i].normal);
+      // A point on the border of a surface often lies within the next one, where all is dark: it is
+      // drawn in by a third of the way to its triangles. Within a surface the ways cancel out.
+      const LightPoint& point = points[i];
+      const Float3 position = point.position + (0.33F / point.sharers) * point.inwards;
+      points[i].light = probe.light_at(position, point.normal);
     }
   });
   for (std::size_t t = 0; t < lit.triangles.size(); ++t) {

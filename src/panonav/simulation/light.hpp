@@ -27,14 +27,15 @@ struct LitTriangles {
 };
 
 /// Cuts every triangle of a material that light falls upon until no side is longer than
-/// `spacing_m`. Triangles without area are left out.
+/// `spacing_m`, or an eighth of the distance from the floor where that is more. Triangles without
+/// area are left out.
 [[nodiscard]] LitTriangles subdivide(const Scene& scene, double spacing_m);
 
 /// Fills in the light at every corner: lamps and far lights by Lambert's law, with `shadows` only
 /// where a ray reaches them; the ambient light, with `shadows` dimmed in corners and beneath things
-/// by the share of directions that are blocked nearer than `reach_m`. Cost: about 40 rays per
-/// distinct corner and side with shadows.
-void bake_light(const Scene& scene, const RayTracer& tracer, bool shadows, double reach_m,
+/// by the share of directions that are blocked nearer than five times `spacing_m`. Cost: about 25
+/// rays per distinct corner and side with shadows. The same bits on any number of threads.
+void bake_light(const Scene& scene, const RayTracer& tracer, bool shadows, double spacing_m,
                 LitTriangles& lit, Executor& executor);
 
 }  // namespace panonav

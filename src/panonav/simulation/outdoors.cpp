@@ -13,31 +13,34 @@ namespace panonav {
 
 namespace {
 
-// A ring of quadrilaterals far away, leaning inwards, and a flat roof: sky and clouds all round.
-void add_sky(SceneBuilder& builder, Point2 centre, double radius_m, double height_m) {
-  const int sky = builder.textured(sky_texture(builder.random(), 512, 256), 1.0F);
-  constexpr int kFacets = 48;
-  const auto rim = [&](int i, double radius, double z) {
-    const double angle = 2.0 * std::numbers::pi * i / kFacets;
-    return Vector3{centre.x_m + radius * std::cos(angle), centre.y_m + radius * std::sin(angle), z};
-  };
-  const double top = 0.5 * radius_m;
+// A dome far away, from a little below the horizon up to the zenith: sky and clouds all round.
+void add_sky(SceneBuilder& builder, Point2 centre, double radius_m) {
   Mesh mesh;
   mesh.object = "sky";
-  mesh.material = sky;
-  for (int i = 0; i < kFacets; ++i) {
-    const auto base = static_cast<std::uint32_t>(mesh.vertices.size());
-    mesh.vertices.insert(mesh.vertices.end(), {rim(i, radius_m, -1.0), rim(i + 1, radius_m, -1.0),
-                                               rim(i + 1, top, height_m), rim(i, top, height_m),
-                                               Vector3{centre.x_m, centre.y_m, 1.2 * height_m}});
-    const float s0 = static_cast<float>(i) / kFacets;
-    const float s1 = static_cast<float>(i + 1) / kFacets;
-    mesh.texture_coordinates.insert(
-        mesh.texture_coordinates.end(),
-        {{s0, 0.0F}, {s1, 0.0F}, {s1, 0.75F}, {s0, 0.75F}, {0.5F * (s0 + s1), 1.0F}});
-    mesh.triangles.push_back({base, base + 1, base + 2});
-    mesh.triangles.push_back({base, base + 2, base + 3});
-    mesh.triangles.push_back({base + 3, base + 2, base + 4});
+  mesh.material = builder.textured(sky_texture(builder.random(), 512, 256), 1.0F);
+  constexpr int kFacets = 48;
+  constexpr int kRings = 16;
+  constexpr double kLowest = -0.05;
+  for (int ring = 0; ring <= kRings; ++ring) {
+    const double share = static_cast<double>(ring) / kRings;
+    const double elevation = kLowest + share * (0.5 * std::numbers::pi - kLowest);
+    for (int i = 0; i <= kFacets; ++i) {
+      const double angle = 2.0 * std::numbers::pi * i / kFacets;
+      const double flat_m = radius_m * std::cos(elevation);
+      mesh.vertices.push_back({centre.x_m + flat_m * std::cos(angle),
+                               centre.y_m + flat_m * std::sin(angle),
+                               radius_m * std::sin(elevation)});
+      mesh.texture_coordinates.push_back(
+          {static_cast<float>(i) / kFacets, static_cast<float>(0.01 + 0.98 * share)});
+    }
+  }
+  for (int ring = 0; ring < kRings; ++ring) {
+    for (int i = 0; i < kFacets; ++i) {
+      const auto a = static_cast<std::uint32_t>(ring * (kFacets + 1) + i);
+      const std::uint32_t b = a + kFacets + 1;
+      mesh.triangles.push_back({a, a + 1, b + 1});
+      mesh.triangles.push_back({a, b + 1, b});
+    }
   }
   builder.scene().meshes.push_back(std::move(mesh));
 }
@@ -115,13 +118,13 @@ Scene make_garden(const SceneVariation& variation) {
   Random& random = builder.random();
   scene.floor_low = {0.0, 0.0};
   scene.floor_high = {12.0, 10.0};
-  scene.ambient = 0.55F;
+  scene.ambient = 0.7F;
   const double azimuth = random.uniform(-std::numbers::pi, std::numbers::pi);
-  scene.directional_lights.push_back({Direction3::from_angles(azimuth, 0.8), 0.6F});
+  scene.directional_lights.push_back({Direction3::from_angles(azimuth, 0.8), 0.8F});
   const Point2 middle{6.0, 5.0};
-  add_sky(builder, middle, 150.0, 60.0);
+  add_sky(builder, middle, 150.0);
   const int grass = builder.textured(noise_texture(random, 256, {0.25F, 0.36F, 0.16F}, 0.2, 1.4));
-  builder.floor(grass, {-150.0, -150.0}, {150.0, 150.0}, 3.0);
+  builder.floor(grass, {-160.0, -160.0}, {160.0, 160.0}, 3.0);
   const int gravel = builder.textured(noise_texture(random, 256, {0.55F, 0.5F, 0.42F}, 0.15, 1.0));
   builder.floor(gravel, {4.8, -1.0}, {6.4, 11.0}, 2.0, 0.01);
 

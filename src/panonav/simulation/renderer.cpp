@@ -72,9 +72,6 @@ double light_spacing_m(const Scene& scene) {
   return std::clamp(distance(scene.floor_low, scene.floor_high) / 25.0, 0.03, 1.0);
 }
 
-// How far an obstacle may be to darken a surface, in spacings of the points where light is known.
-constexpr double kReach = 5.0;
-
 LitTriangles checked_triangles(const Scene& scene) {
   panonav::validate(scene);
   return subdivide(scene, light_spacing_m(scene));
@@ -92,7 +89,7 @@ struct Renderer::Implementation {
         background(scene.background),
         lit(checked_triangles(scene)),
         tracer(lit.vertices, lit.indices, options.instructions) {
-    bake_light(scene, tracer, options.shadows, kReach * light_spacing_m(scene), lit, executor);
+    bake_light(scene, tracer, options.shadows, light_spacing_m(scene), lit, executor);
     for (const Material& material : scene.materials) materials.emplace_back(material, channels);
     if (channels == 1) background[0] = grey_of(background.data(), 3);
   }

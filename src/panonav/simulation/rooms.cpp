@@ -73,7 +73,7 @@ void add_lamps(SceneBuilder& builder, const FloorArea& room, double height_m, do
       const Point2 at{room.low.x_m + (i + 0.5) * width / columns,
                       room.low.y_m + (j + 0.5) * depth / rows};
       builder.lamp({at.x_m, at.y_m, height_m - 0.2},
-                   static_cast<float>(builder.random().uniform(0.5, 0.9)));
+                   static_cast<float>(builder.random().uniform(0.8, 1.2)));
       builder.box("lamp", shine, shine, {at, 0.0}, {0.0, 0.0, height_m - 0.1}, {1.2, 0.25, 0.06});
     }
   }
@@ -87,7 +87,7 @@ Scene make_office(const SceneVariation& variation) {
   scene.floor_low = {0.0, 0.0};
   scene.floor_high = {5.0, 2.0};
   scene.drivable = {{{-0.25, -0.25}, {5.25, 2.25}}};
-  scene.ambient = 0.45F;
+  scene.ambient = 0.65F;
   const FloorArea room{{-1.6, -1.5}, {6.6, 3.5}};
   constexpr double kHeight = 2.6;
   furnish_room_shell(builder, room, kHeight);
@@ -103,7 +103,7 @@ Scene make_lab(const SceneVariation& variation) {
   scene.floor_low = {0.0, 0.0};
   scene.floor_high = {7.0, 5.0};
   scene.drivable = {{{0.9, 1.2}, {6.1, 3.8}}};
-  scene.ambient = 0.45F;
+  scene.ambient = 0.65F;
   const FloorArea room{{0.0, 0.0}, {7.0, 5.0}};
   constexpr double kHeight = 2.8;
   furnish_room_shell(builder, room, kHeight);
@@ -120,7 +120,7 @@ Scene make_hall(const SceneVariation& variation, bool periodic) {
   scene.floor_low = {0.0, 0.0};
   scene.floor_high = {7.0, 7.0};
   scene.drivable = {{{-0.3, -0.3}, {7.3, 7.3}}};
-  scene.ambient = 0.45F;
+  scene.ambient = 0.65F;
   const FloorArea room{{-2.0, -2.0}, {9.0, 9.0}};
   constexpr double kHeight = 3.5;
   if (!periodic) {

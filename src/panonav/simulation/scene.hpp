@@ -37,11 +37,12 @@ struct Mesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
-/// A lamp. A surface at distance d that faces it gets the light intensity / d^2, d in metres; a
-/// white surface in light 1 has the value 1.
+/// A lamp. A surface at distance d that faces it gets the light intensity / (d^2 + radius^2), in
+/// metres; a white surface in light 1 has the value 1.
 struct PointLight {
   Vector3 position;
   float intensity = 1.0F;
+  float radius_m = 0.4F;  ///< of the lamp itself: near it, light does not grow without bound
 };
 
 /// Light from far away: a surface that faces it gets the light `intensity`.

@@ -119,6 +119,38 @@ void SceneBuilder::cylinder(const std::string& object, int material, Point2 cent
   }
 }
 
+void SceneBuilder::blob(const std::string& object, int material, Vector3 centre, Vector3 radii,
+                        double roughness) {
+  constexpr int kFacets = 10;
+  constexpr int kRings = 6;
+  Mesh& mesh = mesh_of(object, material);
+  const auto base = static_cast<std::uint32_t>(mesh.vertices.size());
+  for (int ring = 0; ring <= kRings; ++ring) {
+    const double elevation = std::numbers::pi * (static_cast<double>(ring) / kRings - 0.5);
+    double first = 1.0;
+    for (int i = 0; i <= kFacets; ++i) {
+      const double bump = std::max(0.3, random_.normal(1.0, roughness));
+      if (i == 0) first = bump;
+      // The seam closes, and the poles are one point each.
+      const double r = ring == 0 || ring == kRings ? 1.0 : i == kFacets ? first : bump;
+      const double angle = 2.0 * std::numbers::pi * i / kFacets;
+      mesh.vertices.push_back({centre.x_m + radii.x_m * r * std::cos(elevation) * std::cos(angle),
+                               centre.y_m + radii.y_m * r * std::cos(elevation) * std::sin(angle),
+                               centre.z_m + radii.z_m * r * std::sin(elevation)});
+      mesh.texture_coordinates.push_back(
+          {2.0F * static_cast<float>(i) / kFacets, static_cast<float>(ring) / kRings});
+    }
+  }
+  for (int ring = 0; ring < kRings; ++ring) {
+    for (int i = 0; i < kFacets; ++i) {
+      const std::uint32_t a = base + static_cast<std::uint32_t>(ring * (kFacets + 1) + i);
+      const std::uint32_t b = a + kFacets + 1;
+      mesh.triangles.push_back({a, a + 1, b + 1});
+      mesh.triangles.push_back({a, b + 1, b});
+    }
+  }
+}
+
 void SceneBuilder::wall(const std::string& object, int material, Point2 from, Point2 to,
                         double height_m, double tile_m, double bottom_m) {
   quadrilateral(object, material, {from.x_m, from.y_m, bottom_m}, {to.x_m, to.y_m, bottom_m},
@@ -127,13 +159,13 @@ void SceneBuilder::wall(const std::string& object, int material, Point2 from, Po
 }
 
 void SceneBuilder::on_wall(const std::string& object, int material, Point2 from, Point2 to,
-                           double along_m, double width_m, double bottom_m, double top_m) {
+                           double along_m, double width_m, double bottom_m, double top_m,
+                           double before_m) {
   const double length = distance(from, to);
   const double ux = (to.x_m - from.x_m) / length;
   const double uy = (to.y_m - from.y_m) / length;
-  constexpr double kBefore = 0.01;
   const auto corner = [&](double along, double z) {
-    return Vector3{from.x_m + ux * along - uy * kBefore, from.y_m + uy * along + ux * kBefore, z};
+    return Vector3{from.x_m + ux * along - uy * before_m, from.y_m + uy * along + ux * before_m, z};
   };
   // Seen from the left-hand side the wall runs from right to left.
   quadrilateral(object, material, corner(along_m + width_m, bottom_m), corner(along_m, bottom_m),

@@ -43,14 +43,19 @@ class SceneBuilder {
   void cylinder(const std::string& object, int material, Point2 centre, double bottom_m,
                 double top_m, double radius_m, int facets = 16, double bottom_radius_factor = 1.0);
 
+  /// A round body with dents and bumps of its own: tree crowns, bushes. `roughness` is the standard
+  /// deviation of its radius.
+  void blob(const std::string& object, int material, Vector3 centre, Vector3 radii,
+            double roughness);
+
   /// A wall from a to b, seen from both sides, with the texture repeating every `tile_m`.
   void wall(const std::string& object, int material, Point2 from, Point2 to, double height_m,
             double tile_m, double bottom_m = 0.0);
 
-  /// A picture, window or door on the wall from `from` to `to`, `along_m` from its start, 1 cm
-  /// before it on the left-hand side.
+  /// A picture, window or door on the wall from `from` to `to`, `along_m` from its start,
+  /// `before_m` before it on the left-hand side.
   void on_wall(const std::string& object, int material, Point2 from, Point2 to, double along_m,
-               double width_m, double bottom_m, double top_m);
+               double width_m, double bottom_m, double top_m, double before_m = 0.01);
 
   void floor(int material, Point2 low, Point2 high, double tile_m, double height_m = 0.0);
   void ceiling(int material, Point2 low, Point2 high, double height_m, double tile_m);

@@ -139,7 +139,8 @@ Image brick_texture(Random& random, int size, int columns, int rows, Colour bric
     const double y = static_cast<double>(v) / size * rows;
     const int row = static_cast<int>(y);
     for (int u = 0; u < size; ++u) {
-      const double x = static_cast<double>(u) / size * columns + (row % 2 == 1 ? 0.5 : 0.0);
+      const double x =
+          static_cast<double>(u) / size * columns + (row % 2 == 1 && columns > 1 ? 0.5 : 0.0);
       const int column = static_cast<int>(x) % columns;
       const double fx = x - std::floor(x);
       const double fy = y - row;
