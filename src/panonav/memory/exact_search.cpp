@@ -112,14 +112,15 @@ class Search {
     return fine_(row);
   }
 
-  /// A distance within which `top` views lie, from the views that look best by their bounds.
+  /// A distance within which `top` views lie, from the views that look best by their bounds. A good
+  /// one is worth some bytes: it decides how many views the bounds leave.
   std::uint32_t first_limit() {
     std::vector<Bounded> best_blocks(smallest_.size());
     for (std::size_t i = 0; i < best_blocks.size(); ++i) {
       best_blocks[i] = {smallest_[i], static_cast<Row>(i)};
     }
     std::vector<Bounded> best;
-    for (std::size_t blocks = 8 + top_ / 8; best.size() < top_; blocks *= 2) {
+    for (std::size_t blocks = 16 + top_; best.size() < top_; blocks *= 2) {
       best.clear();
       blocks = std::min(blocks, best_blocks.size());
       std::ranges::nth_element(best_blocks,
@@ -132,13 +133,14 @@ class Search {
       }
     }
     if (has_fine_) {
-      keep_smallest(best, 4 * top_);
+      keep_smallest(best, 128 + 16 * top_);
+      std::ranges::sort(best, {}, &Bounded::second);
       for (Bounded& candidate : best) candidate.first = fine(candidate.second);
     }
+    keep_smallest(best, 2 * top_);
+    for (Bounded& candidate : best) candidate.first = full(candidate.second);
     keep_smallest(best, top_);
-    std::uint32_t limit = 0;
-    for (const Bounded& candidate : best) limit = std::max(limit, full(candidate.second));
-    return limit;
+    return std::ranges::max(best).first;
   }
 
   static void keep_smallest(std::vector<Bounded>& values, std::size_t count) {

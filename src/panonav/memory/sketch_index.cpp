@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <cstring>
+#include <numeric>
 
 namespace panonav {
 
@@ -14,21 +16,42 @@ std::size_t groups_of(std::size_t dimensions) {
   return (dimensions + group_bytes - 1) / group_bytes;
 }
 
-/// The code nearest to `sum`, and what it misses. Any code would be safe, so rounding of the float
-/// product does no harm.
-struct Code {
-  std::uint8_t code;
-  std::int32_t missed;
-};
-Code encode_sum(std::int32_t sum, std::int32_t offset, std::uint64_t step, float inverse_step) {
-  const float scaled = static_cast<float>(sum - offset) * inverse_step + 0.5F;
-  const auto code = static_cast<std::int32_t>(std::clamp(scaled, 0.0F, 255.0F));
-  const std::int32_t decoded = offset + code * static_cast<std::int32_t>(step);
-  return {static_cast<std::uint8_t>(code), std::abs(sum - decoded)};
+/// The sum of `count` bytes.
+std::int32_t sum_of_bytes(const std::uint8_t* bytes, int count) {
+  std::int32_t sum = 0;
+  int i = 0;
+  for (; i + 8 <= count; i += 8) {
+    // Eight bytes at once, added up in pairs; the product gathers the four pairs in the highest 16
+    // bits.
+    std::uint64_t eight = 0;
+    std::memcpy(&eight, bytes + i, 8);
+    constexpr std::uint64_t even = 0x00FF00FF00FF00FFU;
+    const std::uint64_t pairs = (eight & even) + ((eight >> 8U) & even);
+    sum += static_cast<std::int32_t>((pairs * 0x0001000100010001U) >> 48U);
+  }
+  for (; i < count; ++i) sum += bytes[i];
+  return sum;
+}
+
+/// The codes nearest to the sums of one group, and what they miss. Any code would be safe, so
+/// rounding of the float product does no harm.
+std::int32_t encode_group(const std::int32_t* sums, const std::int32_t* offsets,
+                          std::uint64_t group_step, float inverse_step, std::uint8_t* codes) {
+  const auto step = static_cast<std::int32_t>(group_step);
+  std::int32_t missed = 0;
+  for (std::size_t i = 0; i < group_bytes; ++i) {
+    const std::int32_t above = sums[i] - offsets[i];
+    const float scaled = static_cast<float>(above) * inverse_step + 0.5F;
+    const auto code = static_cast<std::int32_t>(std::min(std::max(scaled, 0.0F), 255.0F));
+    codes[i] = static_cast<std::uint8_t>(code);
+    missed += std::abs(above - code * step);
+  }
+  return missed;
 }
 
 void set_scale(SketchScale& scale, std::vector<std::int32_t> lowest,
-               std::vector<std::int32_t> highest, std::size_t groups) {
+               std::vector<std::int32_t> highest) {
+  const std::size_t groups = lowest.size() / group_bytes;
   scale.offsets = std::move(lowest);
   scale.highest = std::move(highest);
   scale.steps.assign(groups, 1);
@@ -41,29 +64,37 @@ void set_scale(SketchScale& scale, std::vector<std::int32_t> lowest,
   }
 }
 
-/// A query in the codes of one segment.
+/// A query in the codes of one segment. `values` has room for all groups.
 /// Where all views lie within the scale, what the query lies outside of it is part of the distance.
 void encode_query(const SketchScale& scale, bool covers, std::span<const std::int32_t> sums,
                   std::span<const std::uint8_t> mask, std::size_t groups, std::uint8_t* values,
                   kernels::SketchQuery& encoded) {
   std::int32_t constant = 0;
   std::int32_t largest_slack = 0;
-  const std::size_t dimensions = std::min(sums.size(), groups * group_bytes);
-  for (std::size_t d = 0; d < dimensions; ++d) {
-    if (mask[d] == 0) {
-      values[d] = 0;
-      continue;
+  groups = std::min(groups, scale.steps.size());
+  for (std::size_t group = 0; group < groups; ++group) {
+    std::array<std::int32_t, group_bytes> offsets{};
+    std::array<std::int32_t, group_bytes> inside{};
+    std::array<std::int32_t, group_bytes> counts{};
+    for (std::size_t i = 0; i < group_bytes; ++i) {
+      const std::size_t d = group * group_bytes + i;
+      counts[i] = mask[d] != 0 ? 1 : 0;
+      // What does not count becomes code 0 without loss.
+      offsets[i] = counts[i] * scale.offsets[d];
+      inside[i] = counts[i] * sums[d];
+      if (covers) {
+        const std::int32_t highest = counts[i] * scale.highest[d];
+        const std::int32_t clamped = std::min(std::max(inside[i], offsets[i]), highest);
+        constant += std::abs(inside[i] - clamped);
+        inside[i] = clamped;
+      }
     }
-    const std::uint64_t step = scale.steps[d / group_bytes];
-    std::int32_t sum = sums[d];
-    if (covers) {
-      sum = std::clamp(sum, scale.offsets[d], scale.highest[d]);
-      constant += std::abs(sums[d] - sum);
-      largest_slack += static_cast<std::int32_t>(step / 2 + 1);
+    const std::uint64_t step = scale.steps[group];
+    constant -= encode_group(inside.data(), offsets.data(), step, scale.inverse_steps[group],
+                             values + group * group_bytes);
+    for (const std::int32_t count : counts) {
+      largest_slack += count * static_cast<std::int32_t>(step / 2 + 1);
     }
-    const Code code = encode_sum(sum, scale.offsets[d], step, scale.inverse_steps[d / group_bytes]);
-    values[d] = code.code;
-    constant -= code.missed;
   }
   encoded.steps = scale.steps.data();
   encoded.groups = groups;
@@ -76,16 +107,20 @@ void encode_query(const SketchScale& scale, bool covers, std::span<const std::in
 SketchLayout::SketchLayout(SignatureShape shape_) : shape(shape_) {
   // Where a block would hold fewer than about three rows, a sketch costs as much as what it saves.
   if (shape.rows >= 3) coarse_blocks = shape.rows >= 6 ? 2 : 1;
-  if (shape.rows >= 20) fine_blocks = BlockSums::blocks_per_component;
+  if (shape.rows >= 20) {
+    fine_blocks = BlockSums::blocks_per_component;
+    // Views differ most in their low components, because the spectra of pictures fall.
+    low_components = (shape.components + 2) / 3;
+  }
   const auto components = static_cast<std::size_t>(shape.components);
-  coarse_groups = groups_of(components * coarse_blocks);
+  coarse_groups = groups_of(coarse_dimensions(shape.components));
   fine_groups = (groups_of(components * fine_blocks) + 7) / 8 * 8;
 }
 
 void SketchLayout::sum_blocks(const std::uint8_t* magnitudes, BlockSums& sums) const {
   const auto components = static_cast<std::size_t>(shape.components);
-  sums.fine.resize(components * fine_blocks);
-  sums.coarse.resize(components * coarse_blocks);
+  sums.fine.resize(fine_groups * group_bytes);
+  sums.coarse.resize(coarse_groups * group_bytes);
   const int blocks = fine_blocks > 0 ? fine_blocks : coarse_blocks;
   std::int32_t* const out = fine_blocks > 0 ? sums.fine.data() : sums.coarse.data();
   std::array<int, BlockSums::blocks_per_component + 1> borders{};
@@ -93,97 +128,86 @@ void SketchLayout::sum_blocks(const std::uint8_t* magnitudes, BlockSums& sums) c
   for (std::size_t k = 0; k < components; ++k) {
     const std::uint8_t* const rows = magnitudes + k * shape.rows;
     for (int block = 0; block < blocks; ++block) {
-      std::int32_t sum = 0;
-      for (int row = borders[block]; row < borders[block + 1]; ++row) sum += rows[row];
-      out[k * blocks + block] = sum;
+      out[k * blocks + block] =
+          sum_of_bytes(rows + borders[block], borders[block + 1] - borders[block]);
     }
   }
   if (fine_blocks == 0) return;
-  const int joined = fine_blocks / coarse_blocks;
-  for (std::size_t d = 0; d < sums.coarse.size(); ++d) {
-    sums.coarse[d] = 0;
-    for (int i = 0; i < joined; ++i) sums.coarse[d] += sums.fine[d * joined + i];
+  const std::int32_t* fine = sums.fine.data();
+  std::size_t d = 0;
+  for (int k = 0; k < shape.components; ++k) {
+    const int joined = fine_blocks / coarse_blocks_of(k);
+    for (int block = 0; block < coarse_blocks_of(k); ++block, fine += joined) {
+      sums.coarse[d++] = std::accumulate(fine, fine + joined, std::int32_t{0});
+    }
   }
 }
 
 SketchIndex::Segment SketchIndex::make_segment() const {
   // Until enough views are there to learn from, a scale that holds every possible sum.
-  const auto make_level = [this](int blocks, std::size_t groups) {
-    std::vector<std::int32_t> highest(static_cast<std::size_t>(layout_.shape.components) * blocks);
-    for (std::size_t d = 0; d < highest.size(); ++d) {
-      const int block = static_cast<int>(d) % blocks;
-      highest[d] = 255 * (layout_.first_row(block + 1, blocks) - layout_.first_row(block, blocks));
-    }
-    Level level;
-    std::vector<std::int32_t> lowest(highest.size(), 0);
-    set_scale(level.scale, std::move(lowest), std::move(highest), groups);
-    return level;
-  };
+  BlockSums highest;
+  layout_.sum_blocks(std::vector<std::uint8_t>(layout_.shape.size(), 255).data(), highest);
   Segment segment;
-  segment.coarse = make_level(layout_.coarse_blocks, layout_.coarse_groups);
-  segment.fine = make_level(layout_.fine_blocks, layout_.fine_groups);
+  set_scale(segment.coarse.scale, std::vector<std::int32_t>(highest.coarse.size(), 0),
+            highest.coarse);
+  set_scale(segment.fine.scale, std::vector<std::int32_t>(highest.fine.size(), 0), highest.fine);
   return segment;
 }
 
 bool SketchIndex::encode(Segment& segment, std::size_t place, const BlockSums& sums) const {
-  const auto encode_level = [](Level& level, std::size_t where, std::size_t group_stride,
-                               std::size_t slack_at, const std::vector<std::int32_t>& values) {
-    std::int32_t slack = 0;
-    bool within = true;
+  const auto encode_level = [place](Level& level, std::uint8_t* codes, std::size_t group_stride,
+                                    const std::vector<std::int32_t>& values) {
     const SketchScale& scale = level.scale;
-    for (std::size_t d = 0; d < values.size(); ++d) {
-      const std::size_t group = d / group_bytes;
-      const Code code =
-          encode_sum(values[d], scale.offsets[d], scale.steps[group], scale.inverse_steps[group]);
-      level.codes[where + group * group_stride + d % group_bytes] = code.code;
-      slack += code.missed;
-      within = within && values[d] >= scale.offsets[d] && values[d] <= scale.highest[d];
+    std::int32_t slack = 0;
+    std::int32_t outside = 0;
+    for (std::size_t group = 0; group < scale.steps.size(); ++group) {
+      const std::size_t first = group * group_bytes;
+      slack += encode_group(values.data() + first, scale.offsets.data() + first, scale.steps[group],
+                            scale.inverse_steps[group], codes + group * group_stride);
+      for (std::size_t d = first; d < first + group_bytes; ++d) {
+        outside |= (values[d] - scale.offsets[d]) | (scale.highest[d] - values[d]);
+      }
     }
-    level.slacks[slack_at] = slack;
-    level.covers = level.covers && within;
-    return within;
+    level.slacks[place] = slack;
+    level.covers = level.covers && outside >= 0;
+    return outside >= 0;
   };
-  bool within = encode_level(segment.coarse,
-                             (place / 8 * layout_.coarse_groups * 8 + place % 8) * group_bytes,
-                             8 * group_bytes, place, sums.coarse);
+  const std::size_t octet = place / 8 * layout_.coarse_groups * 8 + place % 8;
+  bool within = encode_level(segment.coarse, segment.coarse.codes.data() + octet * group_bytes,
+                             8 * group_bytes, sums.coarse);
   if (layout_.fine_blocks > 0) {
-    within &= encode_level(segment.fine, place * layout_.fine_groups * group_bytes, group_bytes,
-                           place, sums.fine);
+    const std::size_t at = place * layout_.fine_groups * group_bytes;
+    within &= encode_level(segment.fine, segment.fine.codes.data() + at, group_bytes, sums.fine);
   }
   return within;
 }
 
 void SketchIndex::learn(Segment& segment, std::size_t first_row, const ViewStore& store) const {
-  BlockSums sums;
-  std::vector<std::int32_t> low_coarse, high_coarse, low_fine, high_fine;
-  const auto widen = [](const std::vector<std::int32_t>& values, std::vector<std::int32_t>& low,
-                        std::vector<std::int32_t>& high) {
-    if (low.empty()) {
-      low = values;
-      high = values;
-    }
+  std::vector<std::pair<std::size_t, BlockSums>> all;
+  all.reserve(segment.used);
+  for (std::size_t place = 0; place < segment.coarse.slacks.size(); ++place) {
+    if (segment.coarse.slacks[place] == no_slack) continue;
+    all.emplace_back(place, BlockSums{});
+    layout_.sum_blocks(store.magnitudes(static_cast<Row>(first_row + place)), all.back().second);
+  }
+  BlockSums low = all.front().second;
+  BlockSums high = low;
+  const auto widen = [](const std::vector<std::int32_t>& values, std::vector<std::int32_t>& lowest,
+                        std::vector<std::int32_t>& highest) {
     for (std::size_t d = 0; d < values.size(); ++d) {
-      low[d] = std::min(low[d], values[d]);
-      high[d] = std::max(high[d], values[d]);
+      lowest[d] = std::min(lowest[d], values[d]);
+      highest[d] = std::max(highest[d], values[d]);
     }
   };
-  const std::size_t rows = segment.coarse.slacks.size();
-  for (std::size_t place = 0; place < rows; ++place) {
-    if (segment.coarse.slacks[place] == no_slack) continue;
-    layout_.sum_blocks(store.magnitudes(static_cast<Row>(first_row + place)), sums);
-    widen(sums.coarse, low_coarse, high_coarse);
-    widen(sums.fine, low_fine, high_fine);
+  for (const auto& [place, sums] : all) {
+    widen(sums.coarse, low.coarse, high.coarse);
+    widen(sums.fine, low.fine, high.fine);
   }
-  set_scale(segment.coarse.scale, std::move(low_coarse), std::move(high_coarse),
-            layout_.coarse_groups);
-  set_scale(segment.fine.scale, std::move(low_fine), std::move(high_fine), layout_.fine_groups);
+  set_scale(segment.coarse.scale, std::move(low.coarse), std::move(high.coarse));
+  set_scale(segment.fine.scale, std::move(low.fine), std::move(high.fine));
   segment.coarse.covers = true;
   segment.fine.covers = true;
-  for (std::size_t place = 0; place < rows; ++place) {
-    if (segment.coarse.slacks[place] == no_slack) continue;
-    layout_.sum_blocks(store.magnitudes(static_cast<Row>(first_row + place)), sums);
-    encode(segment, place, sums);
-  }
+  for (const auto& [place, sums] : all) encode(segment, place, sums);
   segment.learnt_from = segment.used;
   segment.outside = 0;
 }
@@ -226,27 +250,26 @@ SketchIndex::Query SketchIndex::prepare(const std::uint8_t* magnitudes, int comp
                                         std::span<const std::uint8_t> allowed_rows) const {
   Query query;
   layout_.sum_blocks(magnitudes, query.sums);
-  const auto mask_of = [&](int blocks, std::size_t groups) {
-    std::vector<std::uint8_t> mask(groups * group_bytes, 0);
-    for (int block = 0; block < blocks; ++block) {
-      bool counts = true;
-      if (!allowed_rows.empty()) {
-        for (int row = layout_.first_row(block, blocks); row < layout_.first_row(block + 1, blocks);
-             ++row) {
-          counts = counts && allowed_rows[row] != 0;
-        }
-      }
-      for (int k = 0; counts && k < components; ++k) {
-        mask[static_cast<std::size_t>(k) * blocks + block] = 255;
-      }
-    }
-    return mask;
+  const auto counts = [&](int block, int blocks) {
+    if (allowed_rows.empty()) return true;
+    const auto rows = allowed_rows.subspan(
+        layout_.first_row(block, blocks),
+        layout_.first_row(block + 1, blocks) - layout_.first_row(block, blocks));
+    return std::ranges::count(rows, 0) == 0;
   };
-  query.coarse_mask = mask_of(layout_.coarse_blocks, layout_.coarse_groups);
-  query.fine_mask = mask_of(layout_.fine_blocks, layout_.fine_groups);
-  const auto wanted = static_cast<std::size_t>(components);
-  query.coarse_groups = groups_of(wanted * layout_.coarse_blocks);
-  query.fine_groups = (groups_of(wanted * layout_.fine_blocks) + 7) / 8 * 8;
+  query.coarse_mask.assign(layout_.coarse_groups * group_bytes, 0);
+  query.fine_mask.assign(layout_.fine_groups * group_bytes, 0);
+  std::size_t coarse = 0;
+  std::size_t fine = 0;
+  for (int k = 0; k < components; ++k) {
+    const int blocks = layout_.coarse_blocks_of(k);
+    for (int i = 0; i < blocks; ++i) query.coarse_mask[coarse++] = counts(i, blocks) ? 255 : 0;
+    for (int i = 0; i < layout_.fine_blocks; ++i) {
+      query.fine_mask[fine++] = counts(i, layout_.fine_blocks) ? 255 : 0;
+    }
+  }
+  query.coarse_groups = groups_of(coarse);
+  query.fine_groups = (groups_of(fine) + 7) / 8 * 8;
   return query;
 }
 

@@ -17,6 +17,7 @@ namespace panonav {
 /// Sums of the packed magnitudes of one view over blocks of neighbouring rows, component by
 /// component. The sum of |sum over a block of a - the same of b| over all blocks is at most the L1
 /// between a and b.
+/// Both levels are padded with zeros to whole groups of 8.
 struct BlockSums {
   static constexpr int blocks_per_component = 8;
   std::vector<std::int32_t> fine;  ///< 8 blocks a component; empty when rows are too few
@@ -29,6 +30,15 @@ struct SketchLayout {
   explicit SketchLayout(SignatureShape shape_);
 
   [[nodiscard]] bool any() const noexcept { return coarse_blocks > 0; }
+  /// Blocks of component k in the coarse level.
+  [[nodiscard]] int coarse_blocks_of(int k) const noexcept {
+    return k < low_components ? 2 * coarse_blocks : coarse_blocks;
+  }
+  /// Coarse dimensions of the components before k.
+  [[nodiscard]] std::size_t coarse_dimensions(int k) const noexcept {
+    return static_cast<std::size_t>(coarse_blocks) *
+           (k + (k < low_components ? k : low_components));
+  }
   /// First row of block `block` of `blocks`.
   [[nodiscard]] int first_row(int block, int blocks) const noexcept {
     return static_cast<int>(static_cast<std::int64_t>(block) * shape.rows / blocks);
@@ -37,8 +47,9 @@ struct SketchLayout {
   void sum_blocks(const std::uint8_t* magnitudes, BlockSums& sums) const;
 
   SignatureShape shape;
-  int coarse_blocks = 0;  ///< blocks a component: 2, 1 or 0 (views too small to be sketched)
-  int fine_blocks = 0;    ///< 8 or 0
+  int coarse_blocks = 0;   ///< blocks a component: 2, 1 or 0 (views too small to be sketched)
+  int low_components = 0;  ///< the first of them have twice as many coarse blocks
+  int fine_blocks = 0;     ///< 8 or 0
   std::size_t coarse_groups = 0;
   std::size_t fine_groups = 0;  ///< a multiple of 8
 };
