@@ -52,14 +52,14 @@ class Nearest {
   std::vector<Match> heap_;  // the furthest in front
 };
 
-/// Counts which share of the fine bounds was worth its bytes.
+/// Whether the fine bounds of the last views were worth their bytes.
 class FineBenefit {
  public:
   FineBenefit(std::size_t fine_bytes, std::size_t full_bytes)
       : fine_bytes_(fine_bytes), full_bytes_(full_bytes) {}
   void count(std::size_t tested, std::size_t passed) {
-    tested_ += tested;
-    passed_ += passed;
+    tested_ = tested_ / 2 + tested;
+    passed_ = passed_ / 2 + passed;
   }
   [[nodiscard]] bool pays() const noexcept {
     return tested_ < 256 || (tested_ - passed_) * full_bytes_ > tested_ * fine_bytes_;
@@ -172,7 +172,7 @@ class Search {
           if (bound <= nearest.limit()) waiting.emplace_back(bound, row);
         }
         benefit.count(passed, waiting.size() - before);
-        if (waiting.size() >= most_waiting) compare(waiting, nearest);
+        if (waiting.size() >= most_waiting || !benefit.pays()) compare(waiting, nearest);
       } else {
         for (std::size_t i = 0; i < passed; ++i) {
           if (i + 1 < passed) comparison_.prefetch(static_cast<Row>(begin + found[i + 1]));
