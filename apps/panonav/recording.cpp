@@ -50,7 +50,7 @@ std::optional<PictureSource> picture_source(const PictureArguments& pictures) {
           "file says where forward is");
     }
     source.kind = PictureKind::mirror;
-    auto camera = read_camera_file(*pictures.camera);
+    auto camera = read_camera(*pictures.camera);
     source.camera = std::move(camera.camera);
     source.mask = std::move(camera.mask);
     source.layout.kept_elevations = band;

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <iomanip>
 #include <iostream>
+#include <sstream>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -50,6 +52,12 @@ std::string Session::good(std::string_view text) const {
 }
 std::string Session::bad(std::string_view text) const {
   return styled(text, "31");
+}
+
+std::string fixed(double value, int digits) {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(digits) << value;
+  return text.str();
 }
 
 Progress::Progress(std::string label, std::size_t total)

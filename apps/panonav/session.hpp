@@ -37,6 +37,9 @@ class Session {
   Executor executor_;
 };
 
+/// A number with this many digits after the point, for people.
+[[nodiscard]] std::string fixed(double value, int digits);
+
 /// A bar on standard error, only where that is a terminal and only once the work has taken longer
 /// than a second. The bar is gone when the object is. Not thread-safe: advance it from one thread.
 class Progress {

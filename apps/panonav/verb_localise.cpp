@@ -1,9 +1,7 @@
 #include <cmath>
-#include <iomanip>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
-#include <sstream>
 
 #include "memory_pipeline.hpp"
 #include "panonav/core/error.hpp"
@@ -80,12 +78,6 @@ ordered_json as_json(const Answer& answer, const VisualMemory& memory, bool area
     json["areas"] = std::move(levels);
   }
   return json;
-}
-
-std::string fixed(double value, int digits) {
-  std::ostringstream text;
-  text << std::fixed << std::setprecision(digits) << value;
-  return text.str();
 }
 
 std::string as_text(const Answer& answer, const VisualMemory& memory, Session& session) {

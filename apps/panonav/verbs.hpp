@@ -9,10 +9,12 @@ namespace panonav::command {
 /// Every verb, in the order in which a newcomer meets them.
 [[nodiscard]] std::vector<Verb> all_verbs();
 
+[[nodiscard]] Verb calibrate_verb();
 [[nodiscard]] Verb forget_verb();
 [[nodiscard]] Verb info_verb();
 [[nodiscard]] Verb localise_verb();
 [[nodiscard]] Verb memorise_verb();
+[[nodiscard]] Verb unwrap_verb();
 [[nodiscard]] Verb verify_verb();
 
 }  // namespace panonav::command
