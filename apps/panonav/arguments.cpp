@@ -192,7 +192,7 @@ void Arguments::option(const std::string& flag, std::optional<std::pair<double, 
             value = {number_from_text(name, texts.at(0)), number_from_text(name, texts.at(1))};
           },
           help)
-      ->expected(2)
+      ->type_size(2)
       ->type_name("LOW HIGH");
 }
 
@@ -271,6 +271,7 @@ std::optional<ParsedCommand> parse(std::span<const Verb> verbs, int argc, const 
   app.set_version_flag("--version", "panonav " PANONAV_VERSION, "Print the version and stop");
   app.set_help_flag("-h,--help", "Print this help and stop");
   app.get_formatter()->column_width(32);
+  app.get_formatter()->label("SUBCOMMAND", "VERB");
   app.footer(
       "panonav VERB --help shows a verb's options with an example.\n"
       "Exit codes: 0 done, 1 no answer (lost), 2 bad input, 3 fault of the program.");
@@ -288,6 +289,7 @@ std::optional<ParsedCommand> parse(std::span<const Verb> verbs, int argc, const 
   std::deque<Declared> declared;
   for (const auto& verb : verbs) {
     CLI::App* sub = app.add_subcommand(std::string(verb.name), std::string(verb.summary));
+    sub->group("Verbs");
     auto& entry = declared.emplace_back();
     entry.app = sub;
     Arguments::Parser parser{*sub};

@@ -183,7 +183,8 @@ ExitCode calibrate(const Arguments& arguments, const CalibrateArguments& wanted,
                                                           : ColumnDirection::counter_clockwise,
                 .forward_angle_rad = forward_rad});
   if (wanted.overlay) {
-    write_png(*wanted.overlay, draw_mirror(views.front(), *mirror, forward_rad).view());
+    const Image overlay = draw_mirror(views.front(), *mirror, forward_rad);
+    write_png(*wanted.overlay, overlay.view());
   }
   write_camera(wanted.out, {camera, std::nullopt});
   if (session.json()) {

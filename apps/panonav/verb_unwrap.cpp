@@ -28,7 +28,8 @@ ExitCode unwrap(const UnwrapArguments& wanted, Session& session) {
   }
   const PanoramaReader reader(std::move(*source), {wanted.unwarper.rows, wanted.unwarper.columns});
   const auto panorama = reader.read(wanted.image);
-  write_png(wanted.out, to_picture(panorama).view());
+  const Image picture = to_picture(panorama);
+  write_png(wanted.out, picture.view());
 
   const auto& band = panorama.elevations();
   const auto horizon = panorama.horizon_row();

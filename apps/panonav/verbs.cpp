@@ -3,7 +3,9 @@
 namespace panonav::command {
 
 std::vector<Verb> all_verbs() {
-  return {};
+  return {
+      unwrap_verb(),
+  };
 }
 
 }  // namespace panonav::command
