@@ -1,0 +1,322 @@
+#include "panonav/camera/find_mirror.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+
+#include "panonav/camera/circle_search.hpp"
+#include "panonav/camera/edge_field.hpp"
+#include "panonav/core/error.hpp"
+
+namespace panonav {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+/// The longest side of the fields on which circles are climbed, and on which all of them are tried.
+constexpr int middle_side_px = 400;
+constexpr int coarse_side_px = 96;
+constexpr int candidates = 24;
+/// A ring around the mirror is narrower than this part of its outer radius. Wider plain bands are
+/// sky or ceiling above a horizon.
+constexpr double widest_ring = 0.2;
+/// A ring has less than this part of the slope along the circle that the scene inside it has.
+constexpr double plain_ring = 0.35;
+
+/// Circles belong together when their centres differ by at most this part of the radius, ..
+constexpr double concentric = 0.04;
+/// .. and another circle is taken for the rim instead of the clearest only if it is nearly as
+/// clear.
+constexpr double as_clear = 0.6;
+
+/// The disc in the middle is sought among these radii, in radii of the rim; its centre may be off
+/// by a lens that is not quite on the mirror's axis.
+constexpr double smallest_disc = 0.04;
+constexpr double largest_disc = 0.65;
+constexpr double disc_off_centre = 0.02;
+/// Least quality of its circle: lower when its inside is plain, because the scene around it is
+/// often as dark as the disc, which leaves gaps in its edge.
+constexpr double least_disc = 0.5;
+constexpr double least_plain_disc = 0.25;
+
+/// What one search needs of one or several images.
+struct Evidence {
+  EdgeField middle;
+  EdgeField coarse;
+  int middle_reduction = 1;
+  int coarse_reduction = 1;
+};
+
+int reduction_to(int side_px, int target_px) {
+  return std::max(1, (side_px + target_px - 1) / target_px);
+}
+
+EdgeField middle_field(const ImageView& image) {
+  const int longest = std::max(image.width, image.height);
+  return edge_field(smooth_planes(image, reduction_to(longest, middle_side_px), 1.0));
+}
+
+Evidence evidence(EdgeField middle, const ImageSize& size) {
+  Evidence result;
+  result.middle_reduction = reduction_to(std::max(size.width, size.height), middle_side_px);
+  result.coarse_reduction = reduction_to(std::max(middle.width, middle.height), coarse_side_px);
+  result.coarse = reduced(middle, result.coarse_reduction);
+  result.middle = std::move(middle);
+  return result;
+}
+
+double distance_px(const PixelPoint& a, const PixelPoint& b) {
+  return std::hypot(a.u_px - b.u_px, a.v_px - b.v_px);
+}
+
+FieldCircle scaled(const FieldCircle& circle, double factor) {
+  return {circle.u * factor, circle.v * factor, circle.radius * factor};
+}
+
+CircleRange scaled(const CircleRange& range, double factor) {
+  return {range.lowest_radius * factor, range.highest_radius * factor, range.visible_part};
+}
+
+/// A circle of the middle field, fitted to the edges in the image's pixels.
+std::optional<FoundCircle> refined(const Evidence& seen, std::span<const SmoothPlanes> planes,
+                                   const FieldCircle& on_middle) {
+  const auto fit = fit_circle(planes, scaled(on_middle, seen.middle_reduction));
+  if (!fit) return std::nullopt;
+  return FoundCircle{
+      {fit->circle.u, fit->circle.v}, fit->circle.radius, fit->support, fit->residual};
+}
+
+/// Mean slope along the circles between two radii, in grey levels per pixel: how much is to be seen
+/// there.
+double structure(std::span<const SmoothPlanes> images, const PixelPoint& centre, double from_px,
+                 double to_px) {
+  double sum = 0;
+  std::size_t count = 0;
+  for (const SmoothPlanes& image : images) {
+    for (double r = from_px; r <= to_px; r += std::max(1.0, (to_px - from_px) / 16)) {
+      const int steps = std::max(48, static_cast<int>(2 * pi * r / 2));
+      std::vector<float> last;
+      for (int i = 0; i <= steps; ++i) {
+        const double angle = 2 * pi * i / steps;
+        const double u = centre.u_px + r * std::cos(angle);
+        const double v = centre.v_px + r * std::sin(angle);
+        if (u < 0 || v < 0 || u >= image.width || v >= image.height) {
+          last.clear();
+          continue;
+        }
+        const std::size_t at = static_cast<std::size_t>(v) * static_cast<std::size_t>(image.width) +
+                               static_cast<std::size_t>(u);
+        std::vector<float> here;
+        for (const std::vector<float>& plane : image.channels) here.push_back(plane[at]);
+        if (!last.empty()) {
+          float slope = 0;
+          for (std::size_t c = 0; c < here.size(); ++c) {
+            slope = std::max(slope, std::abs(here[c] - last[c]));
+          }
+          sum += slope;
+          ++count;
+        }
+        last = std::move(here);
+      }
+    }
+  }
+  return count == 0 ? 0.0 : sum / static_cast<double>(count);
+}
+
+/// Of circles about one centre, ascending, the one where the mirrored scene ends.
+std::size_t rim_among(const std::vector<FoundCircle>& circles,
+                      std::span<const SmoothPlanes> planes) {
+  std::size_t rim = circles.size() - 1;
+  for (std::size_t inner = rim; inner-- > 0;) {
+    const double outer_px = circles[rim].radius_px;
+    const double inner_px = circles[inner].radius_px;
+    if (inner_px < (1 - widest_ring) * outer_px) break;
+    const double margin_px = std::max(2.0, 0.02 * outer_px);
+    if (outer_px - inner_px < 3 * margin_px) continue;
+    const double ring =
+        structure(planes, circles[rim].centre, inner_px + margin_px, outer_px - margin_px);
+    const double scene =
+        structure(planes, circles[inner].centre, 0.5 * inner_px, inner_px - margin_px);
+    if (ring < plain_ring * scene) rim = inner;
+  }
+  return rim;
+}
+
+/// Radius about the rim's centre that covers the dark disc or the camera's reflection in the
+/// middle.
+std::optional<double> disc_within(const Evidence& seen, std::span<const SmoothPlanes> planes,
+                                  const FoundCircle& rim) {
+  const double rim_radius = rim.radius_px / seen.middle_reduction;
+  CircleRange range;
+  range.lowest_radius = std::max(3.0, smallest_disc * rim_radius);
+  range.highest_radius = largest_disc * rim_radius;
+  range.visible_part = 0.75;
+  const double reach_px = std::max(2.0, disc_off_centre * rim.radius_px);
+  const PixelPoint centre{rim.centre.u_px / seen.middle_reduction,
+                          rim.centre.v_px / seen.middle_reduction};
+  double best_quality = 0;
+  std::optional<double> radius_px;
+  for (const FieldCircle& candidate : concentric_candidates(
+           seen.middle, centre.u_px, centre.v_px, reach_px / seen.middle_reduction, range, 1.0)) {
+    const auto found = refined(seen, planes, climb(seen.middle, candidate, range));
+    if (!found || found->radius_px > largest_disc * rim.radius_px) continue;
+    const double off_px = distance_px(found->centre, rim.centre);
+    if (off_px > reach_px) continue;
+    const double inside = structure(planes, found->centre, 0.0, 0.9 * found->radius_px);
+    const double outside =
+        structure(planes, rim.centre, 1.1 * found->radius_px, 0.95 * rim.radius_px);
+    const double needed = inside < plain_ring * outside ? least_plain_disc : least_disc;
+    if (found->quality >= needed && found->quality > best_quality) {
+      best_quality = found->quality;
+      radius_px = found->radius_px + off_px;
+    }
+  }
+  return radius_px;
+}
+
+struct Search {
+  FoundCircle rim;
+  std::optional<double> inner_radius_px;
+};
+
+std::optional<Search> search(const Evidence& seen, std::span<const SmoothPlanes> planes,
+                             const ImageSize& size, const MirrorSearchOptions& options) {
+  CircleRange range;
+  range.lowest_radius =
+      options.smallest_rim * std::min(size.width, size.height) / seen.middle_reduction;
+  range.highest_radius =
+      options.largest_rim * std::max(size.width, size.height) / seen.middle_reduction;
+  range.visible_part = options.visible_part;
+
+  FieldCircle best;
+  double best_merit = 0;
+  for (const FieldCircle& candidate :
+       circle_candidates(seen.coarse, scaled(range, 1.0 / seen.coarse_reduction), candidates)) {
+    const FieldCircle climbed = climb(seen.middle, scaled(candidate, seen.coarse_reduction), range);
+    const CircleScore found = score(seen.middle, climbed);
+    const double merit = found.quality * std::sqrt(found.visible);
+    if (climbed.radius >= range.lowest_radius && climbed.radius <= range.highest_radius &&
+        merit > best_merit) {
+      best_merit = merit;
+      best = climbed;
+    }
+  }
+  if (best_merit == 0) return std::nullopt;
+
+  const auto clearest = refined(seen, planes, best);
+  if (!clearest || clearest->quality < options.least_quality) return std::nullopt;
+
+  std::vector<FoundCircle> circles{*clearest};
+  for (const FieldCircle& candidate :
+       concentric_candidates(seen.middle, best.u, best.v, concentric * best.radius, range, 2.0)) {
+    const auto found = refined(seen, planes, climb(seen.middle, candidate, range));
+    if (!found || found->quality < std::max(options.least_quality, as_clear * clearest->quality) ||
+        distance_px(found->centre, clearest->centre) > concentric * found->radius_px) {
+      continue;
+    }
+    const bool known = std::any_of(circles.begin(), circles.end(), [&](const FoundCircle& other) {
+      return std::abs(other.radius_px - found->radius_px) < std::max(2.0, 0.01 * found->radius_px);
+    });
+    if (!known) circles.push_back(*found);
+  }
+  std::sort(circles.begin(), circles.end(),
+            [](const FoundCircle& a, const FoundCircle& b) { return a.radius_px < b.radius_px; });
+  Search result;
+  result.rim = circles[rim_among(circles, planes)];
+
+  result.inner_radius_px = disc_within(seen, planes, result.rim);
+  return result;
+}
+
+}  // namespace
+
+void visit_options(MirrorSearchOptions& options, OptionVisitor& visitor) {
+  visitor.visit({.name = "smallest_rim",
+                 .help = "smallest radius of the mirror's rim, in shorter sides of the image",
+                 .low = 0.0,
+                 .high = 2.0,
+                 .low_open = true},
+                options.smallest_rim);
+  visitor.visit({.name = "largest_rim",
+                 .help = "largest radius of the mirror's rim, in longer sides of the image",
+                 .low = 0.0,
+                 .high = 2.0,
+                 .low_open = true},
+                options.largest_rim);
+  visitor.visit({.name = "visible_part",
+                 .help = "least part of the rim that lies inside the frame",
+                 .low = 0.25,
+                 .high = 1.0},
+                options.visible_part);
+  visitor.visit(
+      {.name = "least_quality",
+       .help = "least quality of a rim, from 0 (any circle) to 1 (a sharp edge all around)",
+       .low = 0.0,
+       .high = 1.0,
+       .low_open = true},
+      options.least_quality);
+}
+
+std::optional<MirrorCircle> find_mirror(std::span<const ImageView> images,
+                                        const MirrorSearchOptions& options) {
+  validate(options);
+  require(!images.empty(), "number of images", 0, "at least 1");
+  const ImageSize size = images[0].size();
+  require(std::min(size.width, size.height) >= 32, "image size", std::min(size.width, size.height),
+          "sides of at least 32 px");
+  for (const ImageView& image : images) {
+    require(image.width == size.width, "image width", image.width,
+            "that of the first image, " + to_text(size.width));
+    require(image.height == size.height, "image height", image.height,
+            "that of the first image, " + to_text(size.height));
+  }
+  std::vector<SmoothPlanes> planes;
+  std::vector<EdgeField> fields;
+  for (const ImageView& image : images) {
+    planes.push_back(smooth_planes(image, 1, 1.0));
+    fields.push_back(middle_field(image));
+  }
+  MirrorCircle mirror;
+  mirror.image_size = size;
+  const auto all = search(evidence(mean_field(fields), size), planes, size, options);
+  if (!all) return std::nullopt;
+  if (images.size() == 1) {
+    mirror.rim_per_image.emplace_back(all->rim);
+  } else {
+    for (std::size_t i = 0; i < images.size(); ++i) {
+      const auto one =
+          search(evidence(fields[i], size), std::span(planes).subspan(i, 1), size, options);
+      mirror.rim_per_image.push_back(one ? std::optional(one->rim) : std::nullopt);
+    }
+  }
+  mirror.centre = all->rim.centre;
+  mirror.rim_radius_px = all->rim.radius_px;
+  mirror.inner_radius_px = all->inner_radius_px;
+  mirror.quality = all->rim.quality;
+  mirror.support = all->rim.support;
+  mirror.residual_px = all->rim.residual_px;
+  return mirror;
+}
+
+std::optional<MirrorAgreement> agreement(const MirrorCircle& mirror) {
+  std::vector<FoundCircle> rims;
+  for (const auto& rim : mirror.rim_per_image) {
+    if (rim) rims.push_back(*rim);
+  }
+  if (rims.size() < 2) return std::nullopt;
+  const auto deviation = [&](auto value) {
+    const auto count = static_cast<double>(rims.size());
+    double mean = 0;
+    for (const FoundCircle& rim : rims) mean += value(rim) / count;
+    double squares = 0;
+    for (const FoundCircle& rim : rims) squares += (value(rim) - mean) * (value(rim) - mean);
+    return std::sqrt(squares / (count - 1));
+  };
+  return MirrorAgreement{static_cast<int>(rims.size()),
+                         deviation([](const FoundCircle& rim) { return rim.centre.u_px; }),
+                         deviation([](const FoundCircle& rim) { return rim.centre.v_px; }),
+                         deviation([](const FoundCircle& rim) { return rim.radius_px; })};
+}
+
+}  // namespace panonav

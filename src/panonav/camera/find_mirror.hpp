@@ -1,0 +1,75 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "panonav/camera/camera.hpp"
+#include "panonav/core/image.hpp"
+#include "panonav/core/options.hpp"
+
+namespace panonav {
+
+/// A circle found in an image.
+struct FoundCircle {
+  PixelPoint centre;
+  double radius_px = 0.0;
+  /// Part of the visible circumference, 0 to 1, that has an edge on the circle: within 0.75 px or
+  /// 0.002 of the radius, whichever is more. About 0.3 for the best circle in textures without
+  /// circles.
+  double quality = 0.0;
+  /// Root mean square distance of the edge points used from the circle, across it.
+  double support = 0;
+  double residual_px = 0.0;
+  friend bool operator==(const FoundCircle&, const FoundCircle&) = default;
+};
+
+/// What `find_mirror` found. Invariant: rim_radius_px > 0; inner_radius_px, if any, is below it.
+struct MirrorCircle {
+  ImageSize image_size;
+  PixelPoint centre;           ///< of the rim
+  double rim_radius_px = 0.0;  ///< where the mirrored scene ends
+  /// Radius about `centre` that covers the dark disc or the camera's own reflection in the middle;
+  /// empty when no such circle stands out.
+  std::optional<double> inner_radius_px;
+  double quality = 0.0;  ///< of the rim, see FoundCircle
+  double support = 0;
+  double residual_px = 0.0;  ///< of the rim, see FoundCircle
+  /// The rim as each image alone shows it; empty where an image alone does not show it. One entry
+  /// for each image.
+  std::vector<std::optional<FoundCircle>> rim_per_image;
+  friend bool operator==(const MirrorCircle&, const MirrorCircle&) = default;
+};
+
+struct MirrorSearchOptions {
+  double smallest_rim = 0.2;    ///< smallest rim radius, in shorter sides of the image; (0, 2]
+  double largest_rim = 0.75;    ///< largest rim radius, in longer sides of the image; (0, 2]
+  double visible_part = 0.6;    ///< least part of the rim inside the frame; [0.25, 1]
+  double least_quality = 0.55;  ///< a rim below this is no rim; (0, 1]
+  friend bool operator==(const MirrorSearchOptions&, const MirrorSearchOptions&) = default;
+};
+void visit_options(MirrorSearchOptions& options, OptionVisitor& visitor);
+
+/// Finds the mirror in one or several raw images of one camera: circles along which edges run, over
+/// all centres inside the image and all radii, refined to a fraction of a pixel by a robust fit.
+/// Several images count together, so that what moves averages out and rim and camera remain. Of
+/// several circles about one centre the rim is the largest that has the scene's structure just
+/// inside: a plain ring around the mirror (its holder) does not belong to it. Empty when no circle
+/// reaches `least_quality`. Other round things that fill the picture are taken for a mirror: no
+/// picture can tell them apart. Throws ContractError when there is no image, sizes differ, or a
+/// side is shorter than 32 px; OptionError. Cost: about 0.1 s for each image of 640 x 480, twice
+/// that for the per-image results of several.
+[[nodiscard]] std::optional<MirrorCircle> find_mirror(std::span<const ImageView> images,
+                                                      const MirrorSearchOptions& options = {});
+
+/// How far the per-image rims agree: standard deviation over the images that show the rim.
+struct MirrorAgreement {
+  int images = 0;  ///< that show the rim on their own
+  double centre_u_px = 0.0;
+  double centre_v_px = 0.0;
+  double rim_radius_px = 0.0;
+};
+/// Empty with fewer than two such images.
+[[nodiscard]] std::optional<MirrorAgreement> agreement(const MirrorCircle& mirror);
+
+}  // namespace panonav
