@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <numeric>
 
 #include "panonav/core/error.hpp"
 
@@ -13,7 +14,7 @@ namespace panonav {
 namespace {
 
 constexpr double pi = std::numbers::pi;
-constexpr int coarse_directions = 72;
+constexpr int coarse_directions = 96;
 
 int samples_on(double radius) {
   return std::clamp(static_cast<int>(2 * pi * radius / 1.5), 48, 720);
@@ -60,24 +61,126 @@ std::array<Direction, coarse_directions> directions() {
   return result;
 }
 
-/// Score by the nearest pixels in 72 directions, for exhaustive search.
+/// Adds up what is seen around one circle.
+class SectorScore {
+ public:
+  static constexpr int sectors = 12;
+
+  void add(int sample_number, int count, float value) {
+    const auto sector = static_cast<std::size_t>(sample_number * sectors / count);
+    sum_[sector] += value;
+    ++samples_[sector];
+    ++visible_;
+  }
+  [[nodiscard]] CircleScore result(int count, Evenness evenness) const {
+    if (visible_ == 0) return {};
+    const double visible = static_cast<double>(visible_) / count;
+    if (evenness == Evenness::mean) {
+      return {static_cast<double>(std::accumulate(sum_.begin(), sum_.end(), 0.0F)) / visible_,
+              visible};
+    }
+    float roots = 0;
+    int seen = 0;
+    for (std::size_t i = 0; i < sectors; ++i) {
+      if (samples_[i] == 0) continue;
+      ++seen;
+      if (sum_[i] > 0) roots += std::sqrt(sum_[i] / static_cast<float>(samples_[i]));
+    }
+    const double mean_root = static_cast<double>(roots) / seen;
+    return {mean_root * mean_root, visible};
+  }
+
+ private:
+  std::array<float, sectors> sum_{};
+  std::array<int, sectors> samples_{};
+  int visible_ = 0;
+};
+
+/// Score by the nearest pixels in 96 directions, for exhaustive search.
 double coarse_merit(const EdgeField& field, const std::array<Direction, coarse_directions>& rays,
                     const FieldCircle& circle, const CircleRange& range) {
-  float sum = 0;
-  int visible = 0;
-  for (const Direction& ray : rays) {
+  SectorScore total;
+  for (int i = 0; i < coarse_directions; ++i) {
+    const Direction& ray = rays[static_cast<std::size_t>(i)];
     const double u = circle.u + circle.radius * ray.cosine;
     const double v = circle.v + circle.radius * ray.sine;
     if (u < 0 || v < 0 || u >= field.width || v >= field.height) continue;
-    const std::size_t i = index(field.width, static_cast<int>(u), static_cast<int>(v));
-    sum += field.cosine[i] * ray.double_cosine + field.sine[i] * ray.double_sine;
-    ++visible;
+    const std::size_t at = index(field.width, static_cast<int>(u), static_cast<int>(v));
+    total.add(i, coarse_directions,
+              field.cosine[at] * ray.double_cosine + field.sine[at] * ray.double_sine);
   }
-  if (visible == 0) return -1.0;
-  return figure_of_merit(
-      {static_cast<double>(sum) / visible, static_cast<double>(visible) / coarse_directions},
-      range);
+  return figure_of_merit(total.result(coarse_directions, range.evenness), range);
 }
+
+/// The same for all centres at once: a circle about every pixel is a sum of the field shifted by
+/// its radius in each direction, in loops that a compiler vectorises.
+class ShiftedSums {
+ public:
+  explicit ShiftedSums(const EdgeField& field) : width_(field.width), height_(field.height) {
+    for (int i = 0; i < coarse_directions / 2; ++i) {
+      const Direction& ray = rays_[static_cast<std::size_t>(i)];
+      std::vector<float> plane(field.cosine.size());
+      for (std::size_t k = 0; k < plane.size(); ++k) {
+        plane[k] = field.cosine[k] * ray.double_cosine + field.sine[k] * ray.double_sine;
+      }
+      across_.push_back(std::move(plane));
+    }
+  }
+
+  /// The merit of the circles of one radius about every pixel's centre.
+  void merits(int radius, const CircleRange& range, std::span<float> merit) const {
+    std::vector<float> sum(merit.size());
+    std::vector<float> samples(merit.size());
+    std::vector<float> roots(merit.size(), 0.0F);
+    std::vector<float> sectors_seen(merit.size(), 0.0F);
+    std::vector<float> visible(merit.size(), 0.0F);
+    constexpr int in_sector = coarse_directions / SectorScore::sectors;
+    for (int sector = 0; sector < SectorScore::sectors; ++sector) {
+      std::fill(sum.begin(), sum.end(), 0.0F);
+      std::fill(samples.begin(), samples.end(), 0.0F);
+      for (int i = sector * in_sector; i < (sector + 1) * in_sector; ++i) {
+        add_shifted(i, radius, sum, samples);
+      }
+      for (std::size_t k = 0; k < merit.size(); ++k) {
+        const float mean = std::max(0.0F, sum[k]) / std::max(1.0F, samples[k]);
+        roots[k] += std::sqrt(mean);
+        sectors_seen[k] += samples[k] > 0 ? 1.0F : 0.0F;
+        visible[k] += samples[k];
+      }
+    }
+    for (std::size_t k = 0; k < merit.size(); ++k) {
+      const float mean_root = roots[k] / std::max(1.0F, sectors_seen[k]);
+      merit[k] = static_cast<float>(
+          figure_of_merit({mean_root * mean_root, visible[k] / coarse_directions}, range));
+    }
+  }
+
+ private:
+  void add_shifted(int direction, int radius, std::vector<float>& sum,
+                   std::vector<float>& samples) const {
+    const Direction& ray = rays_[static_cast<std::size_t>(direction)];
+    const std::vector<float>& plane =
+        across_[static_cast<std::size_t>(direction % (coarse_directions / 2))];
+    const int du = static_cast<int>(std::lround(radius * ray.cosine));
+    const int dv = static_cast<int>(std::lround(radius * ray.sine));
+    const int from = std::max(0, -du);
+    const int to = std::min(width_, width_ - du);
+    for (int v = std::max(0, -dv); v < std::min(height_, height_ - dv); ++v) {
+      float* out = sum.data() + index(width_, 0, v);
+      float* seen = samples.data() + index(width_, 0, v);
+      const float* in = plane.data() + static_cast<std::ptrdiff_t>(v + dv) * width_ + du;
+      for (int u = from; u < to; ++u) {
+        out[u] += in[u];
+        seen[u] += 1.0F;
+      }
+    }
+  }
+
+  int width_;
+  int height_;
+  std::array<Direction, coarse_directions> rays_ = directions();
+  std::vector<std::vector<float>> across_;  ///< opposite directions share a plane
+};
 
 struct EdgePoint {
   double u = 0.0;
@@ -193,67 +296,79 @@ std::optional<CircleFit> fit_points(const std::vector<EdgePoint>& points, FieldC
 
 }  // namespace
 
-CircleScore score(const EdgeField& field, const FieldCircle& circle) {
+CircleScore score(const EdgeField& field, const FieldCircle& circle, Evenness evenness) {
   const int count = samples_on(circle.radius);
-  double sum = 0;
-  int visible = 0;
+  SectorScore total;
+  // One turn in equal steps by rotating a unit vector; the rounding of 720 steps stays below 1e-12.
+  const double step_cosine = std::cos(2 * pi / count);
+  const double step_sine = std::sin(2 * pi / count);
+  double next_cosine = 1;
+  double next_sine = 0;
   for (int i = 0; i < count; ++i) {
-    const double angle = 2 * pi * i / count;
-    const double cosine = std::cos(angle);
-    const double sine = std::sin(angle);
+    const double cosine = next_cosine;
+    const double sine = next_sine;
+    next_cosine = cosine * step_cosine - sine * step_sine;
+    next_sine = sine * step_cosine + cosine * step_sine;
     const double u = circle.u + circle.radius * cosine;
     const double v = circle.v + circle.radius * sine;
     if (u < 0 || v < 0 || u > field.width || v > field.height) continue;
-    ++visible;
-    sum += sample(field.cosine, field.width, field.height, u, v) * (cosine * cosine - sine * sine) +
-           sample(field.sine, field.width, field.height, u, v) * (2 * cosine * sine);
+    const auto across = static_cast<float>(cosine * cosine - sine * sine);
+    const auto along = static_cast<float>(2 * cosine * sine);
+    total.add(i, count,
+              sample(field.cosine, field.width, field.height, u, v) * across +
+                  sample(field.sine, field.width, field.height, u, v) * along);
   }
-  if (visible == 0) return {};
-  return {sum / visible, static_cast<double>(visible) / count};
+  return total.result(count, evenness);
 }
 
 std::vector<FieldCircle> circle_candidates(const EdgeField& field, const CircleRange& range,
                                            int count) {
-  const auto rays = directions();
   const int lowest = std::max(2, static_cast<int>(std::floor(range.lowest_radius)));
   const int highest = std::max(lowest, static_cast<int>(std::ceil(range.highest_radius)));
   const int radii = highest - lowest + 1;
+  const std::size_t area =
+      static_cast<std::size_t>(field.width) * static_cast<std::size_t>(field.height);
   const auto at = [&](int u, int v, int r) {
-    return (static_cast<std::size_t>(v) * static_cast<std::size_t>(field.width) +
-            static_cast<std::size_t>(u)) *
-               static_cast<std::size_t>(radii) +
-           static_cast<std::size_t>(r);
+    return static_cast<std::size_t>(r) * area + index(field.width, u, v);
   };
-  std::vector<float> merit(at(0, field.height, 0));
-  for (int v = 0; v < field.height; ++v) {
-    for (int u = 0; u < field.width; ++u) {
-      for (int r = 0; r < radii; ++r) {
-        merit[at(u, v, r)] = static_cast<float>(
-            coarse_merit(field, rays, {u + 0.5, v + 0.5, static_cast<double>(lowest + r)}, range));
-      }
-    }
+  const ShiftedSums sums(field);
+  std::vector<float> merit(area * static_cast<std::size_t>(radii));
+  for (int r = 0; r < radii; ++r) {
+    sums.merits(lowest + r, range,
+                std::span(merit).subspan(static_cast<std::size_t>(r) * area, area));
   }
   struct Candidate {
     float merit;
     FieldCircle circle;
   };
+  const auto highest_around = [&](int u, int v, int r) {
+    const float here = merit[at(u, v, r)];
+    for (int k = std::max(0, r - 1); k <= std::min(radii - 1, r + 1); ++k) {
+      for (int y = std::max(0, v - 1); y <= std::min(field.height - 1, v + 1); ++y) {
+        for (int x = std::max(0, u - 1); x <= std::min(field.width - 1, u + 1); ++x) {
+          if (merit[at(x, y, k)] > here) return false;
+        }
+      }
+    }
+    return true;
+  };
+  // About the centre of a mirror there is more than one circle: disc, holder, arcs of the scene. A
+  // circle counts by its own merit and by half of what its whole centre has.
+  std::vector<float> about_centre(area, 0.0F);
+  for (int r = 0; r < radii; ++r) {
+    for (std::size_t k = 0; k < area; ++k) {
+      const float here = std::max(0.0F, merit[static_cast<std::size_t>(r) * area + k]);
+      about_centre[k] += here * here;
+    }
+  }
   std::vector<Candidate> candidates;
-  for (int v = 0; v < field.height; ++v) {
-    for (int u = 0; u < field.width; ++u) {
-      for (int r = 0; r < radii; ++r) {
+  for (int r = 0; r < radii; ++r) {
+    for (int v = 0; v < field.height; ++v) {
+      for (int u = 0; u < field.width; ++u) {
         const float here = merit[at(u, v, r)];
-        if (here <= 0) continue;
-        bool highest_around = true;
-        for (int y = std::max(0, v - 1); y <= std::min(field.height - 1, v + 1); ++y) {
-          for (int x = std::max(0, u - 1); x <= std::min(field.width - 1, u + 1); ++x) {
-            for (int k = std::max(0, r - 1); k <= std::min(radii - 1, r + 1); ++k) {
-              highest_around = highest_around && merit[at(x, y, k)] <= here;
-            }
-          }
-        }
-        if (highest_around) {
-          candidates.push_back({here, {u + 0.5, v + 0.5, static_cast<double>(lowest + r)}});
-        }
+        if (here <= 0 || !highest_around(u, v, r)) continue;
+        const float total = here + 0.5F * std::sqrt(about_centre[index(field.width, u, v)]);
+        candidates.push_back({total, {u + 0.5, v + 0.5, static_cast<double>(lowest + r)}});
       }
     }
   }
@@ -300,7 +415,7 @@ std::vector<FieldCircle> concentric_candidates(const EdgeField& field, double u,
 
 FieldCircle climb(const EdgeField& field, const FieldCircle& start, const CircleRange& range) {
   FieldCircle best = start;
-  double best_merit = figure_of_merit(score(field, best), range);
+  double best_merit = figure_of_merit(score(field, best, range.evenness), range);
   for (double step = 4; step >= 0.25; step /= 2) {
     for (int round = 0; round < 20; ++round) {
       const FieldCircle from = best;
@@ -310,7 +425,7 @@ FieldCircle climb(const EdgeField& field, const FieldCircle& start, const Circle
           for (int dr = -1; dr <= 1; ++dr) {
             const FieldCircle next{from.u + du * step, from.v + dv * step, from.radius + dr * step};
             if (next.radius < 2) continue;
-            const double merit = figure_of_merit(score(field, next), range);
+            const double merit = figure_of_merit(score(field, next, range.evenness), range);
             if (merit > best_merit) {
               best_merit = merit;
               best = next;

@@ -15,25 +15,34 @@ struct FieldCircle {
   double radius = 0.0;
 };
 
+/// How the edge around a circle is summed up.
+enum class Evenness {
+  mean,  ///< the plain mean: long gaps are expected
+  even,  ///< square of the mean root over 12 sectors: an edge all around counts more than the same
+         ///< amount of edge on one strong arc
+};
+
 struct CircleScore {
-  double quality =
-      0.0;  ///< mean over the visible circumference of w cos(2 d), w the weight of the edge
-            ///< there and d the angle between its gradient and the radius: about 0 for any circle
-            ///< in an image without circles, towards 1 for a sharp edge all around
+  /// Over the visible circumference, of w cos(2 d), w the weight of the edge there and d the angle
+  /// between its gradient and the radius: about 0 for any circle in an image without circles,
+  /// towards 1 for a sharp edge all around.
+  double quality = 0.0;
   double visible = 0.0;  ///< part of the circumference inside the frame
 };
 
 /// Scores a circle on about one sample for each 1.5 px of circumference, 48 to 720.
-[[nodiscard]] CircleScore score(const EdgeField& field, const FieldCircle& circle);
+[[nodiscard]] CircleScore score(const EdgeField& field, const FieldCircle& circle,
+                                Evenness evenness);
 
 struct CircleRange {
   double lowest_radius = 0.0;
   double highest_radius = 0.0;
   double visible_part = 0.5;
+  Evenness evenness = Evenness::even;
 };
 
 /// Looks at all centres (a grid of the field's pixels) and radii; the local maxima of the score,
-/// best first, at most `count`. Meant for small fields: the cost is pixels * radii * 72.
+/// best first, at most `count`. Meant for small fields: the cost is pixels * radii * 96.
 [[nodiscard]] std::vector<FieldCircle> circle_candidates(const EdgeField& field,
                                                          const CircleRange& range, int count);
 

@@ -16,8 +16,10 @@ constexpr double pi = std::numbers::pi;
 
 /// The longest side of the fields on which circles are climbed, and on which all of them are tried.
 constexpr int middle_side_px = 400;
-constexpr int coarse_side_px = 96;
-constexpr int candidates = 24;
+constexpr int coarse_side_px = 200;
+constexpr int candidates = 48;
+/// How many of those are fitted to the pixels.
+constexpr int fitted = 8;
 /// A ring around the mirror is narrower than this part of its outer radius. Wider plain bands are
 /// sky or ceiling above a horizon.
 constexpr double widest_ring = 0.2;
@@ -38,7 +40,7 @@ constexpr double disc_off_centre = 0.02;
 /// Least quality of its circle: lower when its inside is plain, because the scene around it is
 /// often as dark as the disc, which leaves gaps in its edge.
 constexpr double least_disc = 0.5;
-constexpr double least_plain_disc = 0.25;
+constexpr double least_plain_disc = 0.3;
 
 /// What one search needs of one or several images.
 struct Evidence {
@@ -75,7 +77,8 @@ FieldCircle scaled(const FieldCircle& circle, double factor) {
 }
 
 CircleRange scaled(const CircleRange& range, double factor) {
-  return {range.lowest_radius * factor, range.highest_radius * factor, range.visible_part};
+  return {range.lowest_radius * factor, range.highest_radius * factor, range.visible_part,
+          range.evenness};
 }
 
 /// A circle of the middle field, fitted to the edges in the image's pixels.
@@ -87,11 +90,11 @@ std::optional<FoundCircle> refined(const Evidence& seen, std::span<const SmoothP
       {fit->circle.u, fit->circle.v}, fit->circle.radius, fit->support, fit->residual};
 }
 
-/// Mean slope along the circles between two radii, in grey levels per pixel: how much is to be seen
-/// there.
+/// Part of the samples along the circles between two radii where the grey changes by an edge's
+/// slope: how much is to be seen there.
 double structure(std::span<const SmoothPlanes> images, const PixelPoint& centre, double from_px,
                  double to_px) {
-  double sum = 0;
+  std::size_t steep = 0;
   std::size_t count = 0;
   for (const SmoothPlanes& image : images) {
     for (double r = from_px; r <= to_px; r += std::max(1.0, (to_px - from_px) / 16)) {
@@ -114,14 +117,14 @@ double structure(std::span<const SmoothPlanes> images, const PixelPoint& centre,
           for (std::size_t c = 0; c < here.size(); ++c) {
             slope = std::max(slope, std::abs(here[c] - last[c]));
           }
-          sum += slope;
+          if (slope >= image.slope_scale) ++steep;
           ++count;
         }
         last = std::move(here);
       }
     }
   }
-  return count == 0 ? 0.0 : sum / static_cast<double>(count);
+  return count == 0 ? 0.0 : static_cast<double>(steep) / static_cast<double>(count);
 }
 
 /// Of circles about one centre, ascending, the one where the mirrored scene ends.
@@ -132,8 +135,8 @@ std::size_t rim_among(const std::vector<FoundCircle>& circles,
     const double outer_px = circles[rim].radius_px;
     const double inner_px = circles[inner].radius_px;
     if (inner_px < (1 - widest_ring) * outer_px) break;
-    const double margin_px = std::max(2.0, 0.02 * outer_px);
-    if (outer_px - inner_px < 3 * margin_px) continue;
+    // Blur of the two edges; a thin ring has less to spare.
+    const double margin_px = std::min(std::max(2.0, 0.02 * outer_px), 0.35 * (outer_px - inner_px));
     const double ring =
         structure(planes, circles[rim].centre, inner_px + margin_px, outer_px - margin_px);
     const double scene =
@@ -152,6 +155,7 @@ std::optional<double> disc_within(const Evidence& seen, std::span<const SmoothPl
   range.lowest_radius = std::max(3.0, smallest_disc * rim_radius);
   range.highest_radius = largest_disc * rim_radius;
   range.visible_part = 0.75;
+  range.evenness = Evenness::mean;  // where the scene is dark, the dark disc has no edge
   const double reach_px = std::max(2.0, disc_off_centre * rim.radius_px);
   const PixelPoint centre{rim.centre.u_px / seen.middle_reduction,
                           rim.centre.v_px / seen.middle_reduction};
@@ -175,6 +179,38 @@ std::optional<double> disc_within(const Evidence& seen, std::span<const SmoothPl
   return radius_px;
 }
 
+/// The circles of the middle field with the most edge on them, different from each other, best
+/// first.
+std::vector<FieldCircle> best_circles(const Evidence& seen, const CircleRange& range) {
+  struct Scored {
+    double merit;
+    FieldCircle circle;
+  };
+  std::vector<Scored> climbed;
+  for (const FieldCircle& candidate :
+       circle_candidates(seen.coarse, scaled(range, 1.0 / seen.coarse_reduction), candidates)) {
+    const FieldCircle circle = climb(seen.middle, scaled(candidate, seen.coarse_reduction), range);
+    if (circle.radius < range.lowest_radius || circle.radius > range.highest_radius) continue;
+    const CircleScore found = score(seen.middle, circle, range.evenness);
+    if (found.visible < range.visible_part) continue;
+    climbed.push_back({found.quality * std::sqrt(found.visible), circle});
+  }
+  std::stable_sort(climbed.begin(), climbed.end(),
+                   [](const Scored& a, const Scored& b) { return a.merit > b.merit; });
+  std::vector<FieldCircle> result;
+  for (const Scored& scored : climbed) {
+    const bool known = std::any_of(result.begin(), result.end(), [&](const FieldCircle& other) {
+      return std::abs(other.u - scored.circle.u) + std::abs(other.v - scored.circle.v) +
+                 std::abs(other.radius - scored.circle.radius) <
+             3;
+    });
+    if (known) continue;
+    result.push_back(scored.circle);
+    if (static_cast<int>(result.size()) == fitted) break;
+  }
+  return result;
+}
+
 struct Search {
   FoundCircle rim;
   std::optional<double> inner_radius_px;
@@ -189,29 +225,28 @@ std::optional<Search> search(const Evidence& seen, std::span<const SmoothPlanes>
       options.largest_rim * std::max(size.width, size.height) / seen.middle_reduction;
   range.visible_part = options.visible_part;
 
-  FieldCircle best;
-  double best_merit = 0;
-  for (const FieldCircle& candidate :
-       circle_candidates(seen.coarse, scaled(range, 1.0 / seen.coarse_reduction), candidates)) {
-    const FieldCircle climbed = climb(seen.middle, scaled(candidate, seen.coarse_reduction), range);
-    const CircleScore found = score(seen.middle, climbed);
-    const double merit = found.quality * std::sqrt(found.visible);
-    if (climbed.radius >= range.lowest_radius && climbed.radius <= range.highest_radius &&
-        merit > best_merit) {
-      best_merit = merit;
-      best = climbed;
+  std::optional<FoundCircle> clearest;
+  double clearest_merit = 0;
+  FieldCircle start;
+  for (const FieldCircle& circle : best_circles(seen, range)) {
+    const auto found = refined(seen, planes, circle);
+    if (!found || found->quality < options.least_quality) continue;
+    const double merit =
+        found->quality * std::sqrt(score(seen.middle, circle, range.evenness).visible);
+    if (merit > clearest_merit) {
+      clearest_merit = merit;
+      clearest = found;
+      start = circle;
     }
   }
-  if (best_merit == 0) return std::nullopt;
-
-  const auto clearest = refined(seen, planes, best);
-  if (!clearest || clearest->quality < options.least_quality) return std::nullopt;
+  if (!clearest) return std::nullopt;
 
   std::vector<FoundCircle> circles{*clearest};
-  for (const FieldCircle& candidate :
-       concentric_candidates(seen.middle, best.u, best.v, concentric * best.radius, range, 2.0)) {
+  for (const FieldCircle& candidate : concentric_candidates(
+           seen.middle, start.u, start.v, concentric * start.radius, range, 2.0)) {
     const auto found = refined(seen, planes, climb(seen.middle, candidate, range));
-    if (!found || found->quality < std::max(options.least_quality, as_clear * clearest->quality) ||
+    if (!found || found->quality < as_clear * clearest->quality ||
+        (found->radius_px > clearest->radius_px && found->quality < options.least_quality) ||
         distance_px(found->centre, clearest->centre) > concentric * found->radius_px) {
       continue;
     }
@@ -294,7 +329,6 @@ std::optional<MirrorCircle> find_mirror(std::span<const ImageView> images,
   mirror.rim_radius_px = all->rim.radius_px;
   mirror.inner_radius_px = all->inner_radius_px;
   mirror.quality = all->rim.quality;
-  mirror.support = all->rim.support;
   mirror.residual_px = all->rim.residual_px;
   return mirror;
 }

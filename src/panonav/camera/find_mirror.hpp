@@ -19,7 +19,6 @@ struct FoundCircle {
   /// circles.
   double quality = 0.0;
   /// Root mean square distance of the edge points used from the circle, across it.
-  double support = 0;
   double residual_px = 0.0;
   friend bool operator==(const FoundCircle&, const FoundCircle&) = default;
 };
@@ -32,8 +31,7 @@ struct MirrorCircle {
   /// Radius about `centre` that covers the dark disc or the camera's own reflection in the middle;
   /// empty when no such circle stands out.
   std::optional<double> inner_radius_px;
-  double quality = 0.0;  ///< of the rim, see FoundCircle
-  double support = 0;
+  double quality = 0.0;      ///< of the rim, see FoundCircle
   double residual_px = 0.0;  ///< of the rim, see FoundCircle
   /// The rim as each image alone shows it; empty where an image alone does not show it. One entry
   /// for each image.
@@ -55,10 +53,12 @@ void visit_options(MirrorSearchOptions& options, OptionVisitor& visitor);
 /// Several images count together, so that what moves averages out and rim and camera remain. Of
 /// several circles about one centre the rim is the largest that has the scene's structure just
 /// inside: a plain ring around the mirror (its holder) does not belong to it. Empty when no circle
-/// reaches `least_quality`. Other round things that fill the picture are taken for a mirror: no
-/// picture can tell them apart. Throws ContractError when there is no image, sizes differ, or a
-/// side is shorter than 32 px; OptionError. Cost: about 0.1 s for each image of 640 x 480, twice
-/// that for the per-image results of several.
+/// reaches `least_quality`.
+/// Limits: other round things that fill the picture are taken for a mirror, no picture can tell
+/// them apart; in surroundings as patterned as the scene a mirror may be missed; a ring whose inner
+/// edge hardly differs from the scene counts as part of the mirror.
+/// Throws ContractError when there is no image, sizes differ, or a side is shorter than 32 px;
+/// OptionError. Cost: about 0.4 s for each image of 640 x 480.
 [[nodiscard]] std::optional<MirrorCircle> find_mirror(std::span<const ImageView> images,
                                                       const MirrorSearchOptions& options = {});
 

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <optional>
+
+#include "panonav/camera/camera.hpp"
+#include "panonav/camera/find_mirror.hpp"
+
+namespace panonav {
+
+/// What a user knows of a mirror camera beyond its picture.
+struct MirrorKnowledge {
+  /// Any but EquirectangularModel. When the mirror's shape is unknown: EquiangularModel with the
+  /// elevations seen at the inner radius and at the rim.
+  CameraModel model;
+  std::optional<double>
+      inner_radius_px;  ///< overrides what was found; needed when nothing was found
+  ColumnDirection direction = ColumnDirection::clockwise;
+  double forward_angle_rad = 0.0;  ///< see Camera
+};
+
+/// The camera of a mirror found in an image. Where no inner radius is known or found it is 0.
+/// Throws ContractError when model and circle do not fit together, see validate(const Camera&).
+[[nodiscard]] Camera camera_from_mirror(const MirrorCircle& mirror,
+                                        const MirrorKnowledge& knowledge);
+
+/// The same mirror with the focal length with which `elevation_rad` is seen `radius_px` from the
+/// centre: how a focal length follows from the rim when the elevation at the mirror's edge is
+/// known. Throws ContractError unless the model sees that elevation and radius_px > 0.
+[[nodiscard]] HyperboloidalModel with_elevation_at(HyperboloidalModel model, double radius_px,
+                                                   double elevation_rad);
+[[nodiscard]] UnifiedModel with_elevation_at(UnifiedModel model, double radius_px,
+                                             double elevation_rad);
+
+}  // namespace panonav
