@@ -1,0 +1,184 @@
+#include "panonav/simulation/load_mesh.hpp"
+
+#include <assimp/material.h>
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+
+#include <algorithm>
+#include <assimp/Importer.hpp>
+#include <cctype>
+#include <cmath>
+
+#include "panonav/core/error.hpp"
+#include "panonav/simulation/mesh_library.hpp"
+
+namespace panonav {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+Affine3 affine(const aiMatrix4x4& m) {
+  return {{m.a1, m.a2, m.a3, m.b1, m.b2, m.b3, m.c1, m.c2, m.c3}, {m.a4, m.b4, m.c4}};
+}
+
+// What turns the importer's axes into z up. It has turned COLLADA files to y up already.
+Affine3 upright(UpAxis up, const fs::path& path) {
+  std::string ending = path.extension().string();
+  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const bool y_up_format = ending == ".dae" || ending == ".gltf" || ending == ".glb";
+  const bool y_up = up == UpAxis::y || (up == UpAxis::of_format && y_up_format);
+  if (!y_up) return {};
+  return {{1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0}, {}};
+}
+
+std::array<float, 3> colour(const aiColor3D& c) {
+  const auto clamp = [](float value) {
+    return std::isfinite(value) ? std::clamp(value, 0.0F, 1.0F) : 0.0F;
+  };
+  return {clamp(c.r), clamp(c.g), clamp(c.b)};
+}
+
+Material material_of(const aiMaterial& source, const fs::path& path, TextureStore& textures) {
+  Material material;
+  aiColor3D diffuse;
+  if (source.Get(AI_MATKEY_COLOR_DIFFUSE, diffuse) == AI_SUCCESS) material.colour = colour(diffuse);
+  aiString file;
+  for (const aiTextureType type : {aiTextureType_DIFFUSE, aiTextureType_BASE_COLOR}) {
+    if (material.texture || source.GetTexture(type, 0, &file) != AI_SUCCESS) continue;
+    material.texture = textures.find(file.C_Str(), path.parent_path());
+  }
+  // Formats differ in whether the colour tints the texture, and exporters write black or grey
+  // beside a texture that is meant to be seen as it is.
+  if (material.texture) material.colour = {1.0F, 1.0F, 1.0F};
+  aiColor3D emissive;
+  if (!material.texture && source.Get(AI_MATKEY_COLOR_EMISSIVE, emissive) == AI_SUCCESS) {
+    const auto shine = colour(emissive);
+    const float strength = std::max({shine[0], shine[1], shine[2]});
+    const float body = std::max({material.colour[0], material.colour[1], material.colour[2]});
+    if (strength > body) {
+      material.colour = shine;
+      material.emission = 1.0F;
+    }
+  }
+  return material;
+}
+
+Mesh mesh_of(const aiMesh& source, const Affine3& world_from_mesh) {
+  Mesh mesh;
+  mesh.vertices.reserve(source.mNumVertices);
+  for (unsigned i = 0; i < source.mNumVertices; ++i) {
+    const aiVector3D& v = source.mVertices[i];
+    mesh.vertices.push_back(world_from_mesh * Vector3{v.x, v.y, v.z});
+  }
+  if (source.HasTextureCoords(0)) {
+    mesh.texture_coordinates.reserve(source.mNumVertices);
+    for (unsigned i = 0; i < source.mNumVertices; ++i) {
+      const aiVector3D& t = source.mTextureCoords[0][i];
+      mesh.texture_coordinates.push_back({t.x, t.y});
+    }
+  }
+  for (unsigned i = 0; i < source.mNumFaces; ++i) {
+    const aiFace& face = source.mFaces[i];
+    if (face.mNumIndices != 3) continue;
+    mesh.triangles.push_back({face.mIndices[0], face.mIndices[1], face.mIndices[2]});
+  }
+  return mesh;
+}
+
+bool all_finite(const Mesh& mesh) {
+  return std::all_of(mesh.vertices.begin(), mesh.vertices.end(),
+                     [](const Vector3& v) {
+                       return std::isfinite(v.x_m) && std::isfinite(v.y_m) && std::isfinite(v.z_m);
+                     }) &&
+         std::all_of(mesh.texture_coordinates.begin(), mesh.texture_coordinates.end(),
+                     [](const auto& t) { return std::isfinite(t[0]) && std::isfinite(t[1]); });
+}
+
+struct Collector {
+  const aiScene& source;
+  const fs::path& path;
+  std::vector<Material> materials;
+  std::vector<FileMesh> meshes;
+
+  void visit(const aiNode& node, const Affine3& world_from_parent) {
+    const Affine3 world_from_node = world_from_parent * affine(node.mTransformation);
+    for (unsigned i = 0; i < node.mNumMeshes; ++i) {
+      const aiMesh& mesh = *source.mMeshes[node.mMeshes[i]];
+      FileMesh result{node.mName.C_Str(), mesh.mName.C_Str(), materials.at(mesh.mMaterialIndex),
+                      mesh_of(mesh, world_from_node)};
+      if (result.mesh.triangles.empty()) continue;
+      if (!all_finite(result.mesh)) {
+        throw FileError(path.string(), "mesh \"" + result.geometry +
+                                           "\" has a coordinate that is not a finite number");
+      }
+      meshes.push_back(std::move(result));
+    }
+    for (unsigned i = 0; i < node.mNumChildren; ++i) visit(*node.mChildren[i], world_from_node);
+  }
+};
+
+std::string one_line(std::string text) {
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) < 0x20) c = ' ';
+  }
+  return text;
+}
+
+}  // namespace
+
+const std::vector<FileMesh>& MeshLibrary::read(const fs::path& path, UpAxis up) {
+  const auto key = std::make_pair(path.lexically_normal().string(), up);
+  if (const auto known = files_.find(key); known != files_.end()) return known->second;
+  std::error_code code;
+  if (!fs::is_regular_file(path, code)) throw FileError(path.string(), "no such mesh file");
+  Assimp::Importer importer;
+  importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE,
+                              aiPrimitiveType_LINE | aiPrimitiveType_POINT);
+  importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS,
+                              aiComponent_NORMALS | aiComponent_TANGENTS_AND_BITANGENTS |
+                                  aiComponent_COLORS | aiComponent_BONEWEIGHTS |
+                                  aiComponent_ANIMATIONS | aiComponent_LIGHTS |
+                                  aiComponent_CAMERAS);
+  const aiScene* source = importer.ReadFile(
+      path.string(), aiProcess_RemoveComponent | aiProcess_Triangulate | aiProcess_SortByPType |
+                         aiProcess_JoinIdenticalVertices | aiProcess_ValidateDataStructure);
+  if (source == nullptr || source->mRootNode == nullptr) {
+    throw FileError(path.string(),
+                    "not a readable mesh file: " + one_line(importer.GetErrorString()));
+  }
+  Collector collector{*source, path, {}, {}};
+  for (unsigned i = 0; i < source->mNumMaterials; ++i) {
+    collector.materials.push_back(material_of(*source->mMaterials[i], path, textures_));
+  }
+  collector.visit(*source->mRootNode, upright(up, path));
+  if (collector.meshes.empty()) throw FileError(path.string(), "holds no triangles");
+  return files_.emplace(key, std::move(collector.meshes)).first->second;
+}
+
+Scene load_mesh(const fs::path& path, const MeshOptions& options) {
+  require(options.scale > 0.0 && std::isfinite(options.scale), "scale", options.scale, "> 0");
+  TextureStore textures(options.textures);
+  MeshLibrary library(textures);
+  Scene scene;
+  scene.name = path.stem().string();
+  const Affine3 scaling = Affine3::scaling(options.scale, options.scale, options.scale);
+  for (const FileMesh& part : library.read(path, options.up)) {
+    scene.materials.push_back(part.material);
+    place_mesh(scene, part.mesh, scaling, part.node.empty() ? part.geometry : part.node,
+               static_cast<int>(scene.materials.size()) - 1);
+  }
+  const auto [low, high] = *extent(scene);
+  scene.floor_low = {low.x_m, low.y_m};
+  scene.floor_high = {high.x_m, high.y_m};
+  // Like a ceiling lamp: in the middle, a tenth below the top, as bright at the floor as the
+  // ambient light.
+  const double height = high.z_m - low.z_m;
+  const double lamp = low.z_m + 0.9 * height;
+  scene.lights.push_back({{0.5 * (low.x_m + high.x_m), 0.5 * (low.y_m + high.y_m), lamp},
+                          static_cast<float>(0.5 * (lamp - low.z_m) * (lamp - low.z_m))});
+  scene.warnings = textures.warnings();
+  return scene;
+}
+
+}  // namespace panonav

@@ -1,0 +1,10 @@
+#include "panonav/core/error.hpp"
+#include "panonav/simulation/load_mesh.hpp"
+
+namespace panonav {
+
+Scene load_mesh(const std::filesystem::path& path, const MeshOptions& /*options*/) {
+  throw FileError(path.string(), "mesh files cannot be read: panonav was built without assimp");
+}
+
+}  // namespace panonav

@@ -1,0 +1,267 @@
+#include "panonav/simulation/load_gazebo.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "panonav/core/error.hpp"
+#include "panonav/simulation/free_space.hpp"
+#include "panonav/simulation/mesh_library.hpp"
+
+namespace panonav {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path data = fs::path(__FILE__).parent_path() / "data";
+
+GazeboOptions options() {
+  GazeboOptions result;
+  result.textures.read = [](const fs::path& path) {
+    return Image(static_cast<int>(path.stem().string().size()), 3, 1);
+  };
+  return result;
+}
+
+std::pair<Vector3, Vector3> extent_of(const Scene& scene, const std::string& object) {
+  Scene part;
+  for (const Mesh& mesh : scene.meshes) {
+    if (mesh.object == object) part.meshes.push_back(mesh);
+  }
+  const auto found = extent(part);
+  if (!found) throw Error("no object " + object);
+  return *found;
+}
+
+void expect_box(const std::pair<Vector3, Vector3>& found, const Vector3& low, const Vector3& high) {
+  for (const auto& [a, b] : {std::pair(found.first, low), std::pair(found.second, high)}) {
+    EXPECT_NEAR(a.x_m, b.x_m, 1e-6);
+    EXPECT_NEAR(a.y_m, b.y_m, 1e-6);
+    EXPECT_NEAR(a.z_m, b.z_m, 1e-6);
+  }
+}
+
+const Material& material_of(const Scene& scene, const std::string& object, std::size_t number) {
+  for (const Mesh& mesh : scene.meshes) {
+    if (mesh.object == object && number-- == 0)
+      return scene.materials.at(static_cast<std::size_t>(mesh.material));
+  }
+  throw Error("no such part of " + object);
+}
+
+class GazeboWorld : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() /
+              ("panonav_world_" +
+               std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+    try {
+      (void)load_gazebo(data / "worlds/tiny.world");
+    } catch (const FileError& error) {
+      if (std::string(error.what()).find("built without sdformat") == std::string::npos) throw;
+      GTEST_SKIP() << "built without sdformat or assimp";
+    }
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  fs::path write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name, std::ios::binary) << text;
+    return folder_ / name;
+  }
+  fs::path folder_;
+};
+
+TEST_F(GazeboWorld, PosesScalesAndUnitsAreComposed) {
+  const Scene scene = load_gazebo(data / "worlds/tiny.world", options());
+  EXPECT_NO_THROW(validate(scene));
+  EXPECT_EQ(scene.name, "tiny");
+  // 100 x 50 x 25 cm, twice as long, raised by 0.5 m, turned by 90 degrees at (2, 1).
+  expect_box(extent_of(scene, "crate_turned"), {1.5, 1.0, 0.5}, {2.0, 3.0, 0.75});
+  // Modelled with y up, 1 x 0.5 x 0.25 m; the large glass ball is left out.
+  expect_box(extent_of(scene, "stand"), {-3.0, -0.25, 1.0}, {-2.0, 0.0, 1.5});
+  expect_box(extent_of(scene, "red_wall"), {-4.0, 3.9, 0.0}, {4.0, 4.1, 2.0});
+  expect_box(extent_of(scene, "ground"), {-50.0, -50.0, 0.0}, {50.0, 50.0, 0.0});
+  // The plate lies first, then stands: rolled by 90 degrees, its y side points up.
+  expect_box(extent_of(scene, "painted"), {-2.5, -4.5, 0.0}, {2.25, -3.5, 1.0});
+  // The floor is where things stand, not the whole ground plane.
+  EXPECT_NEAR(scene.floor_low.x_m, -4.0, 1e-6);
+  EXPECT_NEAR(scene.floor_low.y_m, -4.5, 1e-6);
+  EXPECT_NEAR(scene.floor_high.y_m, 4.1, 1e-6);
+}
+
+TEST_F(GazeboWorld, MaterialsComeFromScriptsColoursAndTextures) {
+  const Scene scene = load_gazebo(data / "worlds/tiny.world", options());
+  EXPECT_EQ(material_of(scene, "red_wall", 0).colour, (std::array<float, 3>{1.0F, 0.0F, 0.0F}));
+  EXPECT_EQ(material_of(scene, "painted", 0).colour, (std::array<float, 3>{0.25F, 0.5F, 0.75F}));
+  ASSERT_NE(material_of(scene, "painted", 1).texture, nullptr);
+  EXPECT_EQ(material_of(scene, "painted", 1).texture->width(), 5);
+  EXPECT_EQ(material_of(scene, "painted", 2).colour, (std::array<float, 3>{0.1F, 0.9F, 0.3F}));
+  ASSERT_NE(material_of(scene, "crate_turned", 0).texture, nullptr);
+  EXPECT_EQ(material_of(scene, "stand", 0).texture, nullptr);
+  ASSERT_EQ(scene.warnings.size(), 1U);
+  EXPECT_NE(scene.warnings[0].find("lost.png"), std::string::npos);
+}
+
+TEST_F(GazeboWorld, LightsKeepTheirPlaceAndTheirFading) {
+  const Scene scene = load_gazebo(data / "worlds/tiny.world", options());
+  EXPECT_NEAR(scene.ambient, 0.2, 1e-6);
+  EXPECT_NEAR(scene.background[2], 0.3, 1e-6);
+  ASSERT_EQ(scene.directional_lights.size(), 1U);
+  EXPECT_NEAR(scene.directional_lights[0].towards_light.z, 1.0, 1e-6);
+  EXPECT_NEAR(scene.directional_lights[0].intensity, 0.5, 1e-6);
+  ASSERT_EQ(scene.lights.size(), 1U);
+  EXPECT_EQ(scene.lights[0].position, (Vector3{1.0, 2.0, 2.0}));
+  // 0.2 / (0.5 + 0.5 d^2)
+  EXPECT_NEAR(scene.lights[0].intensity, 0.4, 1e-6);
+  EXPECT_NEAR(scene.lights[0].radius_m, 1.0, 1e-6);
+}
+
+TEST_F(GazeboWorld, LightBeyondWhiteIsScaledDownAsAWhole) {
+  const auto world = write("bright.world", R"(<sdf version="1.6"><world name="bright">
+    <scene><ambient>1 1 1 1</ambient></scene>
+    <light name="sun" type="directional"><diffuse>1 1 1 1</diffuse><direction>0 0 -1</direction></light>
+    <model name="m"><static>true</static><link name="l"><visual name="v"><geometry><box><size>1 1 1</size></box>
+    </geometry></visual></link></model></world></sdf>)");
+  const Scene scene = load_gazebo(world);
+  EXPECT_NEAR(scene.ambient, 0.5, 1e-6);
+  EXPECT_NEAR(scene.directional_lights.at(0).intensity, 0.5, 1e-6);
+}
+
+TEST_F(GazeboWorld, ModelFoldersMayLieElsewhere) {
+  const std::string text = R"(<sdf version="1.6"><world name="far">
+    <include><uri>model://crate</uri></include></world></sdf>)";
+  const auto world = write("far.world", text);
+  try {
+    (void)load_gazebo(world, options());
+    FAIL() << "no error";
+  } catch (const FileError& error) {
+    EXPECT_NE(std::string(error.what()).find("model://crate"), std::string::npos) << error.what();
+  }
+  GazeboOptions with_folder = options();
+  with_folder.model_folders.push_back(data / "models");
+  expect_box(extent_of(load_gazebo(world, with_folder), "crate"), {0.0, 0.0, 0.5},
+             {2.0, 0.5, 0.75});
+  ASSERT_EQ(setenv("GAZEBO_MODEL_PATH", ("/nowhere::" + (data / "models").string()).c_str(), 1), 0);
+  const auto folders = gazebo_model_folders_of_environment();
+  unsetenv("GAZEBO_MODEL_PATH");
+  ASSERT_GE(folders.size(), 2U);
+  EXPECT_EQ(folders[1], data / "models");
+}
+
+TEST_F(GazeboWorld, ASingleModelIsAScene) {
+  const Scene scene = load_gazebo(data / "models/crate/model.sdf", [] {
+    GazeboOptions result = options();
+    result.model_folders.push_back(data / "models");
+    return result;
+  }());
+  EXPECT_EQ(scene.name, "crate");
+  EXPECT_EQ(scene.meshes.size(), 1U);
+}
+
+TEST_F(GazeboWorld, BrokenFilesGiveOneClearLineAndNothingOnTheConsole) {
+  const std::string head = R"(<sdf version="1.6"><world name="w">)";
+  const std::string visual = R"(<model name="m"><link name="l"><visual name="v"><geometry>)";
+  const std::string visual_end = "</geometry></visual></link></model></world></sdf>";
+  std::vector<fs::path> files{
+      folder_ / "nothing.world",
+      folder_,
+      write("empty.world", ""),
+      write("text.world", "not xml"),
+      write("cut.world", head),
+      write("no_world.world", R"(<sdf version="1.6"></sdf>)"),
+      write("no_visual.world", head + "</world></sdf>"),
+      write("newer.world", R"(<sdf version="99.0"><world name="w"></world></sdf>)"),
+      write("no_mesh.world",
+            head + visual + "<mesh><uri>model://a/b.dae</uri></mesh>" + visual_end),
+      write("no_model.world", head + "<include><uri>model://absent</uri></include></world></sdf>"),
+      write(
+          "twins.world",
+          head +
+              R"(<model name="m"><link name="l"/></model><model name="m"><link name="l"/></model></world></sdf>)"),
+      write(
+          "pose.world",
+          head +
+              R"(<model name="m"><pose>nan 0 0 0 0 0</pose><link name="l"><visual name="v"><geometry>)" +
+              "<box><size>1 1 1</size></box>" + visual_end),
+  };
+  {
+    std::ifstream stream(data / "worlds/tiny.world");
+    const std::string good(std::istreambuf_iterator<char>(stream), {});
+    for (std::size_t length = 100; length + 10 < good.size(); length += 331) {
+      files.push_back(write("cut" + std::to_string(length) + ".world", good.substr(0, length)));
+    }
+  }
+  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
+  std::vector<std::string> failures;
+  for (const fs::path& file : files) {
+    try {
+      (void)load_gazebo(file, options());
+      failures.push_back(file.string() + " was read");
+    } catch (const FileError& error) {
+      const std::string text = error.what();
+      if (text.find(file.string()) != 0 || text.find('\n') != std::string::npos)
+        failures.push_back(text);
+    }
+  }
+  EXPECT_EQ(testing::internal::GetCapturedStdout(), "");
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  for (const auto& failure : failures) ADD_FAILURE() << failure;
+}
+
+TEST_F(GazeboWorld, AModelThatIncludesItselfIsRefused) {
+  const auto world = write("loop.world", R"(<sdf version="1.6"><world name="w">
+    <include><uri>model://loop</uri></include></world></sdf>)");
+  GazeboOptions with_folder = options();
+  with_folder.model_folders.push_back(data / "models");
+  try {
+    (void)load_gazebo(world, with_folder);
+    FAIL() << "no error";
+  } catch (const FileError& error) {
+    EXPECT_NE(std::string(error.what()).find("includes itself"), std::string::npos) << error.what();
+  }
+}
+
+TEST_F(GazeboWorld, RealWorldsLoadWithTheirWalls) {
+  const char* root = std::getenv("PANONAV_DATA");
+  if (root == nullptr) GTEST_SKIP() << "PANONAV_DATA is not set: no Gazebo worlds to read";
+  struct Expected {
+    const char* path;
+    std::size_t objects, least_textures, most_warnings;
+    double size_x_m, size_y_m, least_free_m2, most_free_m2;
+  };
+  // Sizes are those that the wall models state; free areas by counting squares of the floor plans.
+  for (const Expected& expected :
+       {Expected{"scenes/small_warehouse/worlds/small_warehouse.world", 26, 20, 0, 14.0, 20.9,
+                 170.0, 230.0},
+        Expected{"scenes/small_warehouse/worlds/no_roof_small_warehouse.world", 25, 20, 0, 14.0,
+                 20.9, 170.0, 230.0},
+        Expected{"scenes/small_house/worlds/small_house.world", 70, 60, 4, 19.0, 11.4, 100.0,
+                 150.0}}) {
+    const fs::path path = fs::path(root) / expected.path;
+    ASSERT_TRUE(fs::exists(path)) << path;
+    const Scene scene = load_gazebo(path, options());
+    EXPECT_NO_THROW(validate(scene));
+    std::vector<std::string> objects;
+    for (const Mesh& mesh : scene.meshes) objects.push_back(mesh.object);
+    std::sort(objects.begin(), objects.end());
+    objects.erase(std::unique(objects.begin(), objects.end()), objects.end());
+    EXPECT_GE(objects.size(), expected.objects) << path;
+    const auto textured = std::count_if(scene.materials.begin(), scene.materials.end(),
+                                        [](const Material& m) { return m.texture != nullptr; });
+    EXPECT_GE(static_cast<std::size_t>(textured), expected.least_textures) << path;
+    EXPECT_LE(scene.warnings.size(), expected.most_warnings) << path;
+    EXPECT_NEAR(scene.floor_high.x_m - scene.floor_low.x_m, expected.size_x_m, 0.1);
+    EXPECT_NEAR(scene.floor_high.y_m - scene.floor_low.y_m, expected.size_y_m, 0.1);
+    const FreeSpace space(scene);
+    EXPECT_GE(space.area_m2(), expected.least_free_m2) << path;
+    EXPECT_LE(space.area_m2(), expected.most_free_m2) << path;
+  }
+}
+
+}  // namespace
+}  // namespace panonav

@@ -1,0 +1,152 @@
+#include "panonav/simulation/load_mesh.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "panonav/core/error.hpp"
+#include "panonav/simulation/mesh_library.hpp"
+
+namespace panonav {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path meshes = fs::path(__FILE__).parent_path() / "data/models/crate/meshes";
+
+// Says which file it was asked for by the size of the picture.
+TextureOptions fake_textures() {
+  return {.read = [](const fs::path& path) {
+    return Image(static_cast<int>(path.stem().string().size()), 3, 1);
+  }};
+}
+
+void expect_extent(const Scene& scene, const Vector3& low, const Vector3& high) {
+  const auto found = extent(scene);
+  ASSERT_TRUE(found.has_value());
+  for (const auto& [a, b] : {std::pair(found->first, low), std::pair(found->second, high)}) {
+    EXPECT_NEAR(a.x_m, b.x_m, 1e-6);
+    EXPECT_NEAR(a.y_m, b.y_m, 1e-6);
+    EXPECT_NEAR(a.z_m, b.z_m, 1e-6);
+  }
+}
+
+class MeshFile : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() /
+              ("panonav_mesh_" +
+               std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+    try {
+      (void)load_mesh(meshes / "crate_z_up_cm.dae");
+    } catch (const FileError& error) {
+      if (std::string(error.what()).find("built without assimp") == std::string::npos) throw;
+      GTEST_SKIP() << "built without assimp";
+    }
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  fs::path write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name, std::ios::binary) << text;
+    return folder_ / name;
+  }
+  fs::path folder_;
+};
+
+TEST_F(MeshFile, ColladaUnitIsAppliedAndZStaysUp) {
+  const Scene scene = load_mesh(meshes / "crate_z_up_cm.dae", {.textures = fake_textures()});
+  expect_extent(scene, {0.0, 0.0, 0.0}, {1.0, 0.5, 0.25});
+  EXPECT_NO_THROW(validate(scene));
+  ASSERT_EQ(scene.meshes.size(), 1U);
+  EXPECT_EQ(scene.meshes[0].triangles.size(), 12U);
+  EXPECT_EQ(scene.meshes[0].texture_coordinates.size(), scene.meshes[0].vertices.size());
+  EXPECT_EQ(scene.floor_low, (Point2{0.0, 0.0}));
+  EXPECT_NEAR(scene.floor_high.x_m, 1.0, 1e-6);
+  EXPECT_FALSE(scene.lights.empty());
+}
+
+TEST_F(MeshFile, TextureIsFoundByItsBaseNameWhateverTheEndingAndFolder) {
+  const Scene scene = load_mesh(meshes / "crate_z_up_cm.dae", {.textures = fake_textures()});
+  ASSERT_EQ(scene.materials.size(), 1U);
+  ASSERT_NE(scene.materials[0].texture,
+            nullptr);  // written as C:\artist\crate.tga; there is Crate.png
+  EXPECT_EQ(scene.materials[0].texture->width(), 5);
+  EXPECT_EQ(scene.materials[0].colour, (std::array<float, 3>{1.0F, 1.0F, 1.0F}));
+  EXPECT_TRUE(scene.warnings.empty());
+}
+
+TEST_F(MeshFile, YUpIsTurnedUprightAndAMissingTextureIsAWarning) {
+  const Scene scene = load_mesh(meshes / "crate_y_up_m.dae", {.textures = fake_textures()});
+  expect_extent(scene, {0.0, -0.25, 0.0}, {1.0, 0.0, 0.5});
+  ASSERT_EQ(scene.warnings.size(), 1U);
+  EXPECT_NE(scene.warnings[0].find("lost.png"), std::string::npos);
+  EXPECT_EQ(scene.materials[0].texture, nullptr);
+}
+
+TEST_F(MeshFile, AnUnreadableTextureIsAWarningToo) {
+  const TextureOptions textures{
+      .read = [](const fs::path& path) -> Image { throw FileError(path.string(), "damaged"); }};
+  const Scene scene = load_mesh(meshes / "crate_z_up_cm.dae", {.textures = textures});
+  ASSERT_EQ(scene.warnings.size(), 1U);
+  EXPECT_NE(scene.warnings[0].find("Crate.png: damaged"), std::string::npos);
+  EXPECT_EQ(scene.materials[0].texture, nullptr);
+}
+
+TEST_F(MeshFile, LargeTexturesAreHalved) {
+  TextureOptions textures{.read = [](const fs::path&) {
+    Image image(64, 7, 3);
+    for (auto& value : image.pixels()) value = 100;
+    return image;
+  }};
+  textures.largest_side_px = 20;
+  const Scene scene = load_mesh(meshes / "crate_z_up_cm.dae", {.textures = textures});
+  ASSERT_NE(scene.materials[0].texture, nullptr);
+  EXPECT_EQ(scene.materials[0].texture->size(), (ImageSize{16, 1}));
+  EXPECT_EQ(scene.materials[0].texture->at(15, 0, 2), 100);
+  textures.largest_side_px = 0;
+  EXPECT_THROW((void)load_mesh(meshes / "crate_z_up_cm.dae", {.textures = textures}),
+               ContractError);
+}
+
+TEST_F(MeshFile, ObjAndStlAreZUpUnlessSaidOtherwise) {
+  const auto obj =
+      write("part.obj", "o part\nv 0 0 0\nv 2 0 0\nv 0 3 0\nv 0 0 4\nf 1 2 3\nf 1 2 4\n");
+  expect_extent(load_mesh(obj), {0.0, 0.0, 0.0}, {2.0, 3.0, 4.0});
+  expect_extent(load_mesh(obj, {.up = UpAxis::y}), {0.0, -4.0, 0.0}, {2.0, 0.0, 3.0});
+  expect_extent(load_mesh(obj, {.scale = 0.5}), {0.0, 0.0, 0.0}, {1.0, 1.5, 2.0});
+  EXPECT_THROW((void)load_mesh(obj, {.scale = 0.0}), ContractError);
+}
+
+TEST_F(MeshFile, BrokenFilesGiveOneClearLine) {
+  const std::string good = [] {
+    std::ifstream stream(meshes / "crate_z_up_cm.dae");
+    return std::string(std::istreambuf_iterator<char>(stream), {});
+  }();
+  std::vector<fs::path> files{write("empty.dae", ""),
+                              write("text.obj", "no mesh at all\n"),
+                              write("noise.stl", "\x01\x02\x03"),
+                              write("unknown.xyz", "1 2 3"),
+                              write("nan.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+                              write("index.obj", "v 0 0 0\nv 1 0 0\nf 1 2 99\n"),
+                              folder_,
+                              folder_ / "nothing.dae"};
+  for (std::size_t length = 0; length < good.size(); length += 397) {
+    files.push_back(write("cut" + std::to_string(length) + ".dae", good.substr(0, length)));
+  }
+  ASSERT_GT(files.size(), 10U);
+  for (const fs::path& file : files) {
+    try {
+      (void)load_mesh(file);
+      ADD_FAILURE() << file << " was read";
+    } catch (const FileError& error) {
+      const std::string text = error.what();
+      EXPECT_EQ(text.find(file.string()), 0U) << text;
+      EXPECT_EQ(text.find('\n'), std::string::npos) << text;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace panonav
