@@ -1,0 +1,54 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "panonav/core/options.hpp"
+#include "panonav/geometry/alignment.hpp"
+#include "panonav/motion/trajectory.hpp"
+
+namespace panonav {
+
+struct TrajectoryErrorOptions {
+  /// The truth is interpolated to the stamps of the estimate; estimates in a gap of the truth
+  /// longer than this are left out.
+  double longest_gap_s = 1.0;
+  /// How far apart the poses of a relative error lie along the true path.
+  double relative_distance_m = 1.0;
+  bool align = true;              ///< false: both are in one frame already
+  bool align_scale = false;       ///< with `align`: the estimate's unit of length is free
+  bool align_reflection = false;  ///< with `align`: maps whose handedness nobody fixed
+  friend bool operator==(const TrajectoryErrorOptions&, const TrajectoryErrorOptions&) = default;
+};
+void visit_options(TrajectoryErrorOptions& options, OptionVisitor& visitor);
+
+/// Statistics of errors that are not negative.
+struct ErrorSummary {
+  double rms = 0.0;
+  double mean = 0.0;
+  double median = 0.0;
+  double p95 = 0.0;  ///< 95 % are at most this
+  double largest = 0.0;
+};
+
+/// How far an estimated trajectory is from the truth (Sturm et al. 2012).
+struct TrajectoryError {
+  std::size_t pairs = 0;     ///< estimates with a true pose at their stamp
+  std::size_t left_out = 0;  ///< estimates without one
+  Alignment truth_from_estimate;
+  ErrorSummary position_m;   ///< absolute error of position, after alignment
+  ErrorSummary heading_rad;  ///< absolute error of heading, after alignment; a reflected alignment
+                             ///< turns headings round
+  std::size_t relative_pairs = 0;    ///< 0: the path is shorter than relative_distance_m
+  ErrorSummary relative_position_m;  ///< of the motion over relative_distance_m, scale applied
+  ErrorSummary relative_heading_rad;
+  std::vector<double> position_errors_m;  ///< one for each pair, in time
+};
+
+/// Associates by stamp, aligns by least squares over the positions, and compares. Empty when fewer
+/// than two estimates have a true pose at their stamp. Throws OptionError.
+[[nodiscard]] std::optional<TrajectoryError> trajectory_error(
+    const Trajectory& estimate, const Trajectory& truth,
+    const TrajectoryErrorOptions& options = {});
+
+}  // namespace panonav
