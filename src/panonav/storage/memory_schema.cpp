@@ -142,7 +142,7 @@ void create_schema(Database& database) {
 void require_schema(Database& database) {
   Statement rows(database,
                  "SELECT type, name, sql FROM sqlite_schema WHERE name NOT LIKE 'sqlite\\_%' "
-                 "ESCAPE '\\' ORDER BY type DESC, name");
+                 "ESCAPE '\\' ORDER BY type <> 'table', name");
   for (const auto& [name, text] : tables) {
     if (!rows.step() || rows.text(0) != "table" || rows.text(1) != name || rows.text(2) != text) {
       database.fail_damaged("table " + std::string(name) + " is missing or not as it was made");

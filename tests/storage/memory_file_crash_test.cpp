@@ -1,0 +1,282 @@
+// What happens to a memory file when its writer dies or its disk is full.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <functional>
+#include <map>
+#include <thread>
+
+#include "panonav/core/error.hpp"
+#include "panonav/storage/memory_file.hpp"
+#include "storage/memory_samples.hpp"
+#include "support/temporary_folder.hpp"
+
+namespace panonav {
+namespace {
+
+using test::message_of;
+using test::random_view;
+using test::small_header;
+using test::TemporaryFolder;
+
+// The view of that number, the same in every process.
+NewView numbered_view(SignatureShape shape, int number) {
+  Random random(99, static_cast<std::uint64_t>(number));
+  return random_view(random, shape, number);
+}
+
+// Runs `body` in a child process; its return value is the child's exit code.
+pid_t start_child(const std::function<int()>& body) {
+  const pid_t child = ::fork();
+  if (child != 0) return child;
+  int code = 99;
+  try {
+    code = body();
+  } catch (...) {
+  }
+  std::_Exit(code);
+}
+
+int exit_code_of(pid_t child) {
+  int status = 0;
+  if (::waitpid(child, &status, 0) != child || !WIFEXITED(status)) return -1;
+  return WEXITSTATUS(status);
+}
+
+struct Acknowledgement {
+  int number;
+  std::uint32_t id;
+};
+
+TEST(MemoryFileCrash, EveryAcknowledgedViewSurvivesAKill) {
+  const TemporaryFolder folder;
+  const auto path = folder / "m.panonav";
+  const SignatureShape shape = small_header().shape;
+  { (void)MemoryFile::create(path, small_header()); }
+
+  std::map<int, std::uint32_t> acknowledged;
+  int next = 0;
+  Random random(1);
+  constexpr int kills = 50;
+  int kills_while_appending = 0;
+  for (int round = 0; round < kills; ++round) {
+    int ends[2];
+    ASSERT_EQ(::pipe(ends), 0);
+    const pid_t child = start_child([&] {
+      MemoryFile file = MemoryFile::open(path, Access::read_write);
+      for (int number = next;; ++number) {
+        // A name may be there already: written by a process that was killed before it could say so.
+        const NewView view = numbered_view(shape, number);
+        const auto known = file.find(view.info.name);
+        const Acknowledgement done{number, known ? known->value : file.append(view).value};
+        if (::write(ends[1], &done, sizeof(done)) != sizeof(done)) return 1;
+      }
+    });
+    ASSERT_GT(child, 0);
+    ::close(ends[1]);
+    std::this_thread::sleep_for(std::chrono::microseconds(random.index(60000)));
+    ASSERT_EQ(::kill(child, SIGKILL), 0);
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFSIGNALED(status)) << "the writer ended by itself";
+    Acknowledgement done{};
+    int in_this_round = 0;
+    while (::read(ends[0], &done, sizeof(done)) == sizeof(done)) {
+      acknowledged[done.number] = done.id;
+      next = done.number + 1;
+      ++in_this_round;
+    }
+    ::close(ends[0]);
+    kills_while_appending += in_this_round > 0;
+
+    const MemoryFile file = MemoryFile::open(path, Access::read_only);
+    ASSERT_TRUE(file.verify().empty());
+    const VisualMemory memory = file.load();
+    for (const auto& [number, id] : acknowledged) {
+      const NewView expected = numbered_view(shape, number);
+      const ViewId view{id};
+      ASSERT_TRUE(memory.contains(view)) << "view " << number << " was lost in round " << round;
+      ASSERT_EQ(memory.info(view), expected.info);
+      ASSERT_EQ(memory.packed(view), expected.signature);
+    }
+    // At most the one view that was written but not acknowledged is there besides.
+    ASSERT_LE(memory.size(), acknowledged.size() + 1);
+  }
+  EXPECT_GE(kills_while_appending, kills / 4) << "most kills came before the first append";
+  EXPECT_GT(acknowledged.size(), 50U);
+}
+
+// A write beyond the limit fails as on a full disk.
+TEST(MemoryFileCrash, AFullDiskLosesNothing) {
+  const TemporaryFolder folder;
+  const auto path = folder / "m.panonav";
+  MemoryHeader header = small_header();
+  header.shape = {80, 15};
+  header.panorama_columns = 512;
+  { (void)MemoryFile::create(path, header); }
+  constexpr rlim_t limit_bytes = 400000;
+  const int appended = exit_code_of(start_child([&] {
+    ::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{limit_bytes, limit_bytes};
+    if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) return 250;
+    MemoryFile file = MemoryFile::open(path, Access::read_write);
+    for (int number = 0; number < 200; ++number) {
+      const std::string message =
+          message_of<FileError>([&] { file.append(numbered_view(header.shape, number)); });
+      if (message == "no error") continue;
+      if (message.find(path.string() + ": cannot be ") != 0) return 251;
+      if (message.find('\n') != std::string::npos) return 252;
+      // The same object still reads what it had.
+      return file.load().size() == static_cast<std::size_t>(number) ? number : 253;
+    }
+    return 254;
+  }));
+  ASSERT_GE(appended, 10);
+  ASSERT_LT(appended, 200);
+
+  MemoryFile file = MemoryFile::open(path, Access::read_write);
+  EXPECT_TRUE(file.verify().empty());
+  const VisualMemory memory = file.load();
+  ASSERT_EQ(memory.size(), static_cast<std::size_t>(appended));
+  for (int number = 0; number < appended; ++number) {
+    const NewView expected = numbered_view(header.shape, number);
+    const auto view = memory.find(expected.info.name);
+    ASSERT_TRUE(view);
+    EXPECT_EQ(memory.packed(*view), expected.signature);
+  }
+  // With room again the work goes on.
+  EXPECT_GT(file.append(numbered_view(header.shape, appended)), memory.views().back());
+}
+
+TEST(MemoryFileCrash, AFullDiskWhileCreatingLeavesNothing) {
+  const TemporaryFolder folder;
+  const auto path = folder / "m.panonav";
+  EXPECT_EQ(exit_code_of(start_child([&] {
+              ::signal(SIGXFSZ, SIG_IGN);
+              const rlimit limit{20000, 20000};
+              if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) return 1;
+              const auto message =
+                  message_of<FileError>([&] { MemoryFile::create(path, small_header()); });
+              return message == "no error" ? 2 : 0;
+            })),
+            0);
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+// Runs `body` without the rights of the superuser, for whom no file is read-only.
+int as_ordinary_user(const std::function<int()>& body) {
+  return exit_code_of(start_child([&] {
+    if (::geteuid() == 0) {
+      constexpr uid_t nobody = 65534;
+      if (::setgid(nobody) != 0 || ::setuid(nobody) != 0) return 98;
+    }
+    return body();
+  }));
+}
+
+class ReadOnlyMemoryFile : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    MemoryFile file = MemoryFile::create(path, small_header());
+    for (int number = 0; number < 5; ++number) {
+      file.append(numbered_view(small_header().shape, number));
+    }
+  }
+  // What an ordinary user can do: 0 reads all and is refused to change.
+  [[nodiscard]] int read_and_try_to_change() const {
+    return as_ordinary_user([&] {
+      {
+        const MemoryFile file = MemoryFile::open(path, Access::read_only);
+        if (file.load().size() != 5 || !file.verify().empty()) return 1;
+        if (file.info().views != 5) return 2;
+      }
+      const std::string message =
+          message_of<FileError>([&] { (void)MemoryFile::open(path, Access::read_write); });
+      return message.find("no permission to write") != std::string::npos ? 0 : 3;
+    });
+  }
+  void set_permissions(const std::filesystem::path& what, unsigned mode) const {
+    std::filesystem::permissions(what, static_cast<std::filesystem::perms>(mode));
+  }
+
+  TemporaryFolder folder;
+  std::filesystem::path path = folder / "m.panonav";
+};
+
+TEST_F(ReadOnlyMemoryFile, FileAndFolderReadOnly) {
+  set_permissions(path, 0444);
+  set_permissions(folder.path(), 0555);
+  EXPECT_EQ(read_and_try_to_change(), 0);
+}
+
+TEST_F(ReadOnlyMemoryFile, FolderReadOnly) {
+  set_permissions(path, 0666);
+  set_permissions(folder.path(), 0555);
+  EXPECT_EQ(read_and_try_to_change(), 0);
+}
+
+TEST_F(ReadOnlyMemoryFile, FileReadOnly) {
+  set_permissions(path, 0444);
+  set_permissions(folder.path(), 0777);
+  EXPECT_EQ(read_and_try_to_change(), 0);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
+}
+
+TEST_F(ReadOnlyMemoryFile, BesideARunningWriter) {
+  const MemoryFile writer = MemoryFile::open(path, Access::read_write);
+  MemoryFile(MemoryFile::open(path, Access::read_write))
+      .set_parameter("written", "while others read");
+  set_permissions(folder.path(), 0555);
+  for (const char* suffix : {"", "-wal", "-shm"}) {
+    set_permissions(path.string() + suffix, 0444);
+  }
+  EXPECT_EQ(
+      as_ordinary_user([&] {
+        const MemoryFile file = MemoryFile::open(path, Access::read_only);
+        return file.parameter("written") == "while others read" && file.load().size() == 5 ? 0 : 1;
+      }),
+      0);
+}
+
+// A writer was killed and its log lies beside the file: without permission to write, what the log
+// says cannot be read, and must not be left out silently either.
+TEST_F(ReadOnlyMemoryFile, WithTheLogOfAKilledWriter) {
+  const int code = exit_code_of(start_child([&] {
+    MemoryFile file = MemoryFile::open(path, Access::read_write);
+    file.append(numbered_view(small_header().shape, 5));
+    std::_Exit(0);  // without closing
+    return 0;
+  }));
+  ASSERT_EQ(code, 0);
+  ASSERT_GT(std::filesystem::file_size(path.string() + "-wal"), 0U);
+  std::filesystem::remove(path.string() + "-shm");
+  set_permissions(folder.path(), 0555);
+  EXPECT_EQ(
+      as_ordinary_user([&] {
+        const auto message =
+            message_of<FileError>([&] { (void)MemoryFile::open(path, Access::read_only); });
+        return message.find("open the file once with that permission") != std::string::npos ? 0 : 1;
+      }),
+      0);
+  set_permissions(folder.path(), 0777);
+  EXPECT_EQ(MemoryFile::open(path, Access::read_only).load().size(), 6U);
+}
+
+TEST_F(ReadOnlyMemoryFile, CreatingNeedsPermission) {
+  set_permissions(folder.path(), 0555);
+  EXPECT_EQ(as_ordinary_user([&] {
+              const auto message = message_of<FileError>(
+                  [&] { (void)MemoryFile::create(folder / "new.panonav", small_header()); });
+              return message.find("no permission to write in") != std::string::npos ? 0 : 1;
+            }),
+            0);
+}
+
+}  // namespace
+}  // namespace panonav
