@@ -12,8 +12,8 @@ struct MirrorKnowledge {
   /// Any but EquirectangularModel. When the mirror's shape is unknown: EquiangularModel with the
   /// elevations seen at the inner radius and at the rim.
   CameraModel model;
-  std::optional<double>
-      inner_radius_px;  ///< overrides what was found; needed when nothing was found
+  /// Overrides what was found; for when nothing was found.
+  std::optional<double> inner_radius_px = std::nullopt;
   ColumnDirection direction = ColumnDirection::clockwise;
   double forward_angle_rad = 0.0;  ///< see Camera
 };
