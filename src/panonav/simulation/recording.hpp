@@ -1,0 +1,97 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <variant>
+#include <vector>
+
+#include "panonav/camera/camera.hpp"
+#include "panonav/core/executor.hpp"
+#include "panonav/core/image.hpp"
+#include "panonav/core/options.hpp"
+#include "panonav/motion/odometry.hpp"
+#include "panonav/simulation/free_space.hpp"
+#include "panonav/simulation/renderer.hpp"
+#include "panonav/simulation/sensor.hpp"
+
+namespace panonav {
+
+/// Where a simulated robot takes its pictures.
+enum class RecordingPath {
+  grid,    ///< every free place of a grid, row by row
+  zigzag,  ///< the same, every second row backwards
+  tour,    ///< along the scene's round trip, or way points of the caller
+  walk,    ///< a random walk
+  random,  ///< independent random poses
+};
+
+/// Which way the robot faces at each place.
+enum class RecordingHeading {
+  fixed,   ///< the same heading everywhere
+  path,    ///< the way it goes
+  random,  ///< any
+};
+
+struct RecordingOptions {
+  RecordingPath path = RecordingPath::grid;
+  RecordingHeading heading = RecordingHeading::fixed;
+  double heading_rad = 0.0;  ///< of fixed headings
+  double spacing_m = 0.5;    ///< of the grid, or along the path
+  int poses = 200;           ///< number of a walk or of random poses
+  double speed_m_s = 0.3;    ///< gives the stamps
+};
+void visit_options(RecordingOptions& options, OptionVisitor& visitor);
+
+/// One place of a recording and what the robot knows of it.
+struct RecordedPose {
+  double stamp_s = 0.0;
+  Pose2 pose;      ///< where it truly is
+  Pose2 odometry;  ///< where its odometry says that it is, in the odometry frame
+  friend bool operator==(const RecordedPose&, const RecordedPose&) = default;
+};
+
+/// The poses of a recording, all of them free. `way_points` replace the scene's tour. Straight ways
+/// that are not free are replaced by the shortest ones. The same seed gives the same poses.
+/// Throws OptionError; ContractError when no place is free at this spacing, a way point is not
+/// free, or a tour is asked for where there is none.
+[[nodiscard]] std::vector<RecordedPose> plan_recording(const Scene& scene, const FreeSpace& space,
+                                                       const RecordingOptions& options,
+                                                       const OdometryNoise& odometry,
+                                                       std::uint64_t seed,
+                                                       std::span<const Point2> way_points = {});
+
+/// What is rendered: a picture through a camera, or the panoramic cylinder directly.
+using RecordingCamera = std::variant<PanoramaRendering, Camera>;
+
+struct FrameOptions {
+  double camera_height_m = 0.6;
+  /// The robot leans by this much, in another random direction at each place.
+  double tilt_rad = 0.0;
+  int rays_per_axis = 2;  ///< for pictures through a camera
+};
+void visit_options(FrameOptions& options, OptionVisitor& visitor);
+
+/// The picture that the robot takes: a panorama for people (see `to_picture`), or the camera's
+/// image. The same options and seed give the same picture; give each frame its own seed.
+/// Throws OptionError, and ContractError as the renderer does.
+[[nodiscard]] Image take_picture(const Renderer& renderer, const Pose2& pose,
+                                 const RecordingCamera& camera, const FrameOptions& options,
+                                 const SensorOptions& sensor, std::uint64_t seed,
+                                 Executor& executor);
+
+/// The same as a panorama, without the way through a picture.
+[[nodiscard]] Panorama take_panorama(const Renderer& renderer, const Pose2& pose,
+                                     const PanoramaRendering& rendering,
+                                     const FrameOptions& options, const SensorOptions& sensor,
+                                     std::uint64_t seed, Executor& executor);
+
+/// Takes all pictures in order and hands each to `frame`, so that only one is in memory. Frame i
+/// has the random stream (seed, i).
+void record(
+    const Renderer& renderer, std::span<const RecordedPose> poses, const RecordingCamera& camera,
+    const FrameOptions& options, const SensorOptions& sensor, std::uint64_t seed,
+    Executor& executor,
+    const std::function<void(std::size_t number, const RecordedPose&, const Image&)>& frame);
+
+}  // namespace panonav

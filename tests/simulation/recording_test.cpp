@@ -1,0 +1,143 @@
+#include "panonav/simulation/recording.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "panonav/core/error.hpp"
+#include "panonav/simulation/scenes.hpp"
+
+namespace panonav {
+namespace {
+
+class Recording : public testing::Test {
+ protected:
+  const Scene scene_ = make_scene("lab");
+  const FreeSpace space_{scene_};
+  Executor executor_{1};
+  PanoramaRendering small_{.rows = 10, .columns = 64, .rays_per_axis = 1};
+};
+
+TEST_F(Recording, EveryKindOfPathIsFreeAndRepeatsWithItsSeed) {
+  RecordingOptions options;
+  options.poses = 50;
+  std::vector<Point2> way_points;
+  Random random(1);
+  for (int i = 0; i < 4; ++i) way_points.push_back(space_.random_pose(random).position());
+  for (const RecordingPath path : {RecordingPath::grid, RecordingPath::zigzag, RecordingPath::tour,
+                                   RecordingPath::walk, RecordingPath::random}) {
+    for (const RecordingHeading heading :
+         {RecordingHeading::fixed, RecordingHeading::path, RecordingHeading::random}) {
+      options.path = path;
+      options.heading = heading;
+      options.spacing_m = 0.25;
+      const auto poses = plan_recording(scene_, space_, options, {}, 7, way_points);
+      ASSERT_GT(poses.size(), 10U) << static_cast<int>(path);
+      EXPECT_EQ(poses, plan_recording(scene_, space_, options, {}, 7, way_points));
+      EXPECT_NE(poses, plan_recording(scene_, space_, options, {}, 8, way_points));
+      EXPECT_EQ(poses[0].odometry, Pose2{});
+      for (std::size_t i = 0; i < poses.size(); ++i) {
+        EXPECT_TRUE(space_.is_free(poses[i].pose.position()));
+        if (i > 0) {
+          EXPECT_GT(poses[i].stamp_s, poses[i - 1].stamp_s);
+        }
+      }
+    }
+  }
+}
+
+TEST_F(Recording, OdometryFollowsTheTrueMotion) {
+  RecordingOptions options{.path = RecordingPath::walk, .heading = RecordingHeading::path};
+  const OdometryNoise exact{.translation_from_translation = 0.0,
+                            .translation_from_rotation = 0.0,
+                            .rotation_from_translation = 0.0,
+                            .rotation_from_rotation = 0.0,
+                            .translation_scale_error = 0.0,
+                            .rotation_scale_error = 0.0};
+  options.spacing_m = 0.1;
+  const auto poses = plan_recording(scene_, space_, options, exact, 3);
+  for (const auto& recorded : poses) {
+    const Pose2 found = poses[0].pose * recorded.odometry;
+    EXPECT_NEAR(distance(found.position(), recorded.pose.position()), 0.0, 1e-9);
+    EXPECT_NEAR(angle_difference(found.heading_rad, recorded.pose.heading_rad), 0.0, 1e-9);
+  }
+  const auto noisy = plan_recording(scene_, space_, options, {}, 3);
+  EXPECT_EQ(noisy.back().pose, poses.back().pose);  // noise of the odometry does not move the robot
+  EXPECT_NE(noisy.back().odometry, poses.back().odometry);
+}
+
+TEST_F(Recording, StampsGiveTheSpeed) {
+  RecordingOptions options{.path = RecordingPath::zigzag};
+  options.speed_m_s = 0.5;
+  const auto poses = plan_recording(scene_, space_, options, {}, 1);
+  double length = 0.0;
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    length += distance(poses[i - 1].pose.position(), poses[i].pose.position());
+  }
+  EXPECT_NEAR(poses.back().stamp_s, length / 0.5, 1e-6);
+}
+
+TEST_F(Recording, FramesAreTheSameOneByOneAndInARow) {
+  const Renderer renderer(scene_);
+  RecordingOptions options{.path = RecordingPath::random};
+  options.poses = 3;
+  const auto poses = plan_recording(scene_, space_, options, {}, 2);
+  std::vector<Image> first;
+  record(renderer, poses, small_, {}, {}, 5, executor_,
+         [&](std::size_t number, const RecordedPose& pose, const Image& image) {
+           EXPECT_EQ(number, first.size());
+           EXPECT_EQ(pose, poses[number]);
+           first.push_back(image);
+         });
+  ASSERT_EQ(first.size(), 3U);
+  EXPECT_EQ(first[0].size(), (ImageSize{64, 10}));
+  EXPECT_NE(first[0], first[1]);
+  Executor two(2);
+  record(renderer, poses, small_, {}, {}, 5, two,
+         [&](std::size_t number, const RecordedPose&, const Image& image) {
+           EXPECT_EQ(image, first[number]);
+         });
+  record(renderer, poses, small_, {}, {}, 6, executor_,
+         [&](std::size_t number, const RecordedPose&, const Image& image) {
+           EXPECT_NE(image, first[number]);
+         });
+}
+
+TEST_F(Recording, TiltChangesTheViewAndNothingElseDoes) {
+  const Renderer renderer(scene_);
+  Random random(4);
+  const Pose2 pose = space_.random_pose(random);
+  const SensorOptions ideal{.read_noise = 0.0, .full_well = 1e12, .eight_bit = false};
+  const auto level = take_panorama(renderer, pose, small_, {}, ideal, 1, executor_);
+  const auto again = take_panorama(renderer, pose, small_, {}, ideal, 2, executor_);
+  const auto leaning =
+      take_panorama(renderer, pose, small_, {.tilt_rad = radians(5.0)}, ideal, 1, executor_);
+  double largest_again = 0.0;
+  double mean_leaning = 0.0;
+  for (std::size_t i = 0; i < level.values().size(); ++i) {
+    const auto value = static_cast<double>(level.values()[i]);
+    largest_again =
+        std::max(largest_again, std::abs(value - static_cast<double>(again.values()[i])));
+    mean_leaning += std::abs(value - static_cast<double>(leaning.values()[i]));
+  }
+  EXPECT_LT(largest_again, 1e-4);
+  EXPECT_GT(mean_leaning / static_cast<double>(level.values().size()), 0.005);
+}
+
+TEST_F(Recording, BadInputIsNamed) {
+  RecordingOptions options;
+  options.spacing_m = 0.0;
+  EXPECT_THROW((void)plan_recording(scene_, space_, options, {}, 1), OptionError);
+  options = {.path = RecordingPath::tour};
+  const std::vector<Point2> outside{{1e3, 0.0}, {0.0, 0.0}};
+  EXPECT_THROW((void)plan_recording(scene_, space_, options, {}, 1, outside), ContractError);
+  const std::vector<Point2> one{{0.0, 0.0}};
+  EXPECT_THROW((void)plan_recording(scene_, space_, options, {}, 1, one), ContractError);
+  const Renderer renderer(scene_);
+  EXPECT_THROW(
+      (void)take_picture(renderer, {}, small_, {.camera_height_m = -1.0}, {}, 1, executor_),
+      OptionError);
+}
+
+}  // namespace
+}  // namespace panonav
