@@ -49,12 +49,19 @@ TEST(Preprocess, EveryCombinationIsIndifferentToATurn) {
   EXPECT_EQ(combinations, 16);
 }
 
+TEST(Preprocess, MeanAndGainAreOnByDefault) {
+  const PreprocessingOptions options;
+  EXPECT_TRUE(options.remove_mean && options.normalise_gain);
+  EXPECT_TRUE(!options.edge_channel && options.masked_rows_top == 0 &&
+              options.masked_rows_bottom == 0);
+}
+
 TEST(Preprocess, GainAndMeanCancelLight) {
   Random random(2);
   const Panorama view = random_panorama(random, 8, 40);
   Panorama brighter = view;
   for (float& value : brighter.values()) value = 0.6F * value;
-  const PreprocessingOptions gain{.normalise_gain = true};
+  const PreprocessingOptions gain{.remove_mean = false, .normalise_gain = true};
   EXPECT_LT(largest_difference(preprocess(view, gain), preprocess(brighter, gain)), 1e-6);
   for (float& value : brighter.values()) value += 0.3F;
   EXPECT_GT(largest_difference(preprocess(view, gain), preprocess(brighter, gain)), 0.01);
@@ -85,7 +92,7 @@ TEST(Preprocess, ReachesTheMomentsItPromises) {
 
 TEST(Preprocess, LeavesAViewOfOneColourAlone) {
   const Panorama flat(3, 8, std::nullopt, std::vector<float>(24, 0.4F));
-  EXPECT_EQ(preprocess(flat, {.normalise_gain = true}), flat);
+  EXPECT_EQ(preprocess(flat, {.remove_mean = false, .normalise_gain = true}), flat);
 }
 
 TEST(Preprocess, EdgesAreTheLengthOfTheGradient) {
@@ -95,7 +102,8 @@ TEST(Preprocess, EdgesAreTheLengthOfTheGradient) {
     for (int c = 0; c < 8; ++c)
       view.at(y, c) = 0.1F * static_cast<float>(y) + (c < 4 ? 0.0F : 0.3F);
   }
-  const Panorama edges = preprocess(view, {.edge_channel = true});
+  const Panorama edges =
+      preprocess(view, {.edge_channel = true, .remove_mean = false, .normalise_gain = false});
   for (int y = 1; y < 4; ++y) {
     EXPECT_NEAR(edges.at(y, 1), 0.1F, 1e-6);
     EXPECT_NEAR(edges.at(y, 3), std::hypot(0.1F, 0.15F), 1e-6);

@@ -100,8 +100,9 @@ TEST(SignatureExtractor, AgreesWithTheDefinitionInDoublePrecision) {
   const UnwarperOptions cylinder{
       .rows = 150, .columns = 1536, .elevations = ElevationBand{radians(-50), radians(20)}};
   const Image image = blotchy_image(9);
-  const FourierSignature found =
-      SignatureExtractor(Unwarper(camera, cylinder)).signature_from_image(image.view());
+  const FourierSignature found = SignatureExtractor(Unwarper(camera, cylinder), 15,
+                                                    {.remove_mean = false, .normalise_gain = false})
+                                     .signature_from_image(image.view());
   const Panorama angles(150, 1536, cylinder.elevations);
   double worst = 0.0;
   for (int y = 0; y < 150; y += 7) {
