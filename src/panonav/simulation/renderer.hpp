@@ -24,7 +24,7 @@ struct Viewpoint {
 struct RendererOptions {
   /// Embree's instruction set, for example "sse4.2" for pictures that must be the same on every
   /// machine. Empty: the widest that the processor has.
-  std::string instructions;
+  std::string instructions{};
   /// Lamps cast shadows and corners are darker. Off: every surface is lit as if it stood alone.
   bool shadows = true;
   /// 1: grey. 3: images in colour, for people; panoramas are grey all the same.

@@ -1,0 +1,90 @@
+// The mirror image, unwarped, against the panorama rendered directly: two independent ways from a
+// scene to a cylinder.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "panonav/panorama/unwarper.hpp"
+#include "panonav/signature/compass.hpp"
+#include "panonav/simulation/mirror.hpp"
+#include "panonav/simulation/renderer.hpp"
+#include "panonav/simulation/scenes.hpp"
+#include "panonav/simulation/sensor.hpp"
+
+namespace panonav {
+namespace {
+
+double mean_difference(const Panorama& a, const Panorama& b) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < a.values().size(); ++i) {
+    sum += std::abs(a.values()[i] - b.values()[i]);
+  }
+  return sum / static_cast<double>(a.values().size());
+}
+
+// How far `seen` lies to the left of `expected` in a sector of columns, to first order: least
+// squares of their difference against the slope along the rows.
+double shift_in_sector(const Panorama& seen, const Panorama& expected, int first, int columns) {
+  double product = 0.0;
+  double energy = 0.0;
+  const int n = expected.columns();
+  for (int y = 0; y < expected.rows(); ++y) {
+    for (int c = first; c < first + columns; ++c) {
+      const double slope = 0.5 * (expected.at(y, (c + 1) % n) - expected.at(y, (c + n - 1) % n));
+      product += slope * (seen.at(y, c) - expected.at(y, c));
+      energy += slope * slope;
+    }
+  }
+  return product / energy;
+}
+
+struct Case {
+  std::string scene;
+  Pose2 pose;
+};
+
+class UnwarpedMirror : public testing::TestWithParam<Case> {};
+
+TEST_P(UnwarpedMirror, AgreesWithThePanorama) {
+  const Scene scene = make_scene(GetParam().scene, {.seed = 3});
+  Executor executor(2);
+  const Renderer renderer(scene, {.shadows = false});
+  const Viewpoint viewpoint{.pose = GetParam().pose, .height_m = scene.camera_height_m};
+  const Camera camera = simulated_mirror_camera();
+  const Unwarper unwarper(camera, {.rows = 80, .columns = 512});
+  const Panorama direct = renderer.render_panorama(
+      viewpoint,
+      {.rows = 80, .columns = 512, .elevations = unwarper.elevations(), .rays_per_axis = 3},
+      executor);
+  const Radiance rendered = renderer.render_image(viewpoint, camera, 2, executor);
+  const Image image = to_image(rendered);
+  const Panorama unwarped = unwarper.unwrap(image.view());
+
+  const auto reading = compass(compute_signature(unwarped, 64), compute_signature(direct, 64));
+  ASSERT_TRUE(reading.has_value());
+  EXPECT_GT(reading->correlation, 0.99);
+  const double column_rad = 2.0 * std::numbers::pi / 512.0;
+  EXPECT_LT(std::abs(reading->heading_rad), 0.1 * column_rad)
+      << reading->heading_rad / column_rad << " columns";
+
+  // The compass would not notice a mirror that is off centre: every side must agree by itself.
+  for (int first = 0; first < 512; first += 64) {
+    EXPECT_LT(std::abs(shift_in_sector(unwarped, direct, first, 64)), 0.1)
+        << "columns from " << first;
+  }
+  const double noise = mean_difference(apply_sensor(direct, {}, 1), direct);
+  EXPECT_LT(mean_difference(unwarped, direct), 1.5 * noise);
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, UnwarpedMirror,
+                         testing::Values(Case{"office", {2.5, 1.0, 0.4}},
+                                         Case{"office", {1.0, 0.5, -2.0}},
+                                         Case{"lab", {3.0, 2.0, 1.5}},
+                                         Case{"garden", {5.0, 4.0, 3.0}},
+                                         Case{"arena", {0.3, 0.2, -1.0}}));
+
+}  // namespace
+}  // namespace panonav
