@@ -231,10 +231,11 @@ void SketchIndex::insert(const ViewStore& store, Row row) {
   layout_.sum_blocks(store.magnitudes(row), sums);
   if (!encode(segment, place, sums)) ++segment.outside;
   ++segment.used;
-  constexpr std::size_t enough_to_learn = 16;
-  const bool grown = segment.used >= std::max(enough_to_learn, 4 * segment.learnt_from);
-  const bool drifted = segment.outside >= enough_to_learn + segment.used / 4;
-  if (grown || drifted) learn(segment, number * rows_per_segment, store);
+  // A scale that was learnt from fewer views is never too wide, so only those outside call for another.
+  constexpr std::size_t enough_to_learn = 64;
+  const bool first = segment.learnt_from == 0 && segment.used >= enough_to_learn;
+  const bool drifted = segment.learnt_from > 0 && segment.outside >= 8 + segment.used / 8;
+  if (first || drifted) learn(segment, number * rows_per_segment, store);
 }
 
 void SketchIndex::erase(Row row) {
