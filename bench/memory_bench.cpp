@@ -210,9 +210,7 @@ int run(int argc, char** argv) {
     return made;
   }();
   const auto add = [](const std::string& name, std::function<void(benchmark::State&)> body) {
-    benchmark::RegisterBenchmark(name.c_str(), std::move(body))
-        ->Unit(benchmark::kMillisecond)
-        ->UseRealTime();
+    benchmark::RegisterBenchmark(name.c_str(), std::move(body))->Unit(benchmark::kMillisecond);
   };
   const auto add_rival = [&add](const std::string& name, const ViewSet& set, bool approximate,
                                 std::function<KeptRival()> make) {

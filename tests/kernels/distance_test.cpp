@@ -43,6 +43,10 @@ TEST_P(Distance, MaskedL1IsTheSumOfDifferencesForEveryLengthAndOffset) {
     EXPECT_EQ(kernels.masked_l1(a.data() + offset, b.data() + offset, mask.data() + offset, count),
               expected)
         << count << " bytes";
+    const std::vector<std::uint8_t> all(count + offset, 255);
+    EXPECT_EQ(kernels.l1(a.data() + offset, b.data() + offset, count),
+              scalar.masked_l1(a.data() + offset, b.data() + offset, all.data() + offset, count))
+        << count << " bytes";
   }
 }
 
@@ -51,6 +55,7 @@ TEST_P(Distance, MaskedL1DoesNotOverflow) {
   const std::vector<std::uint8_t> zeros(count, 0);
   const std::vector<std::uint8_t> full(count, 255);
   EXPECT_EQ(kernels.masked_l1(zeros.data(), full.data(), full.data(), count), 255U * count);
+  EXPECT_EQ(kernels.l1(zeros.data(), full.data(), count), 255U * count);
 }
 
 struct SketchCase {

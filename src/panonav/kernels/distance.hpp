@@ -8,6 +8,9 @@ namespace panonav::kernels {
 /// The integer loops of the search in a visual memory, for one instruction set. All sets give the
 /// same numbers. None of them allocates or throws.
 struct DistanceKernels {
+  /// Sum of |a - b| over `count` bytes; any count below 2^22, any alignment.
+  uint32_t (*l1)(const uint8_t* a, const uint8_t* b, size_t count);
+
   /// Sum of |(a & mask) - (b & mask)| over `count` bytes; any count below 2^22, any alignment.
   uint32_t (*masked_l1)(const uint8_t* a, const uint8_t* b, const uint8_t* mask, size_t count);
 

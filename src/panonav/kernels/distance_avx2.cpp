@@ -21,6 +21,17 @@ int64_t sum_of_lanes(__m256i x) {
 
 }  // namespace
 
+uint32_t l1(const uint8_t* a, const uint8_t* b, size_t count) {
+  __m256i sum = _mm256_setzero_si256();
+  size_t i = 0;
+  for (; i + 32 <= count; i += 32) {
+    sum = _mm256_add_epi64(sum, _mm256_sad_epu8(load(a + i), load(b + i)));
+  }
+  uint32_t total = static_cast<uint32_t>(sum_of_lanes(sum));
+  for (; i < count; ++i) total += static_cast<uint32_t>(a[i] > b[i] ? a[i] - b[i] : b[i] - a[i]);
+  return total;
+}
+
 uint32_t masked_l1(const uint8_t* a, const uint8_t* b, const uint8_t* mask, size_t count) {
   __m256i sum = _mm256_setzero_si256();
   size_t i = 0;

@@ -21,6 +21,22 @@ int64_t sum_of_lanes(__m512i x) {
 
 }  // namespace
 
+uint32_t l1(const uint8_t* a, const uint8_t* b, size_t count) {
+  __m512i sum = _mm512_setzero_si512();
+  size_t i = 0;
+  for (; i + 64 <= count; i += 64) {
+    const __m512i sad = _mm512_sad_epu8(_mm512_loadu_si512(a + i), _mm512_loadu_si512(b + i));
+    sum = _mm512_add_epi64(sum, sad);
+  }
+  if (i < count) {
+    const __mmask64 rest = ~__mmask64{0} >> (64 - (count - i));
+    const __m512i x = _mm512_maskz_loadu_epi8(rest, a + i);
+    const __m512i y = _mm512_maskz_loadu_epi8(rest, b + i);
+    sum = _mm512_add_epi64(sum, _mm512_sad_epu8(x, y));
+  }
+  return static_cast<uint32_t>(sum_of_lanes(sum));
+}
+
 uint32_t masked_l1(const uint8_t* a, const uint8_t* b, const uint8_t* mask, size_t count) {
   __m512i sum = _mm512_setzero_si512();
   size_t i = 0;

@@ -18,6 +18,17 @@ uint32_t finish(uint64_t sum, int32_t slack, const SketchQuery& query) {
 
 }  // namespace
 
+uint32_t l1(const uint8_t* a, const uint8_t* b, size_t count) {
+  uint32x4_t sum = vdupq_n_u32(0);
+  size_t i = 0;
+  for (; i + 16 <= count; i += 16) {
+    sum = vpadalq_u16(sum, vpaddlq_u8(vabdq_u8(vld1q_u8(a + i), vld1q_u8(b + i))));
+  }
+  uint32_t total = vaddvq_u32(sum);
+  for (; i < count; ++i) total += static_cast<uint32_t>(a[i] > b[i] ? a[i] - b[i] : b[i] - a[i]);
+  return total;
+}
+
 uint32_t masked_l1(const uint8_t* a, const uint8_t* b, const uint8_t* mask, size_t count) {
   uint32x4_t sum = vdupq_n_u32(0);
   size_t i = 0;

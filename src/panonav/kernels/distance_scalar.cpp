@@ -17,6 +17,12 @@ uint32_t finish(uint64_t sum, int32_t slack, const SketchQuery& query) {
 
 }  // namespace
 
+uint32_t l1(const uint8_t* a, const uint8_t* b, size_t count) {
+  uint32_t sum = 0;
+  for (size_t i = 0; i < count; ++i) sum += difference(a[i], b[i], 255);
+  return sum;
+}
+
 uint32_t masked_l1(const uint8_t* a, const uint8_t* b, const uint8_t* mask, size_t count) {
   uint32_t sum = 0;
   for (size_t i = 0; i < count; ++i) sum += difference(a[i], b[i], mask[i]);

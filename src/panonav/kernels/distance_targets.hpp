@@ -21,6 +21,7 @@ struct SketchQuery {
 
 #define PANONAV_DECLARE_DISTANCE_BODIES(target)                                                    \
   namespace target {                                                                               \
+  uint32_t l1(const uint8_t* a, const uint8_t* b, size_t count);                                   \
   uint32_t masked_l1(const uint8_t* a, const uint8_t* b, const uint8_t* mask, size_t count);       \
   uint32_t sketch_bounds(const uint8_t* sketches, const int32_t* slacks, size_t octets,            \
                          const SketchQuery& query, uint32_t* bounds);                              \

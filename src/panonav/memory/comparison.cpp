@@ -40,13 +40,12 @@ Comparison::Comparison(const SearchedViews& searched, const PackedSignature& que
   require(mask.allowed_rows.empty() || mask.allowed_rows.size() == component_bytes_,
           "number of allowed rows", static_cast<double>(mask.allowed_rows.size()),
           "0 or " + std::to_string(component_bytes_));
-  padded_bytes_ = std::min((bytes() + 63) / 64 * 64, store_.stride());
-  query_.assign(store_.stride(), 0);
-  std::ranges::copy(query.magnitudes, query_.begin());
-  mask_.assign(store_.stride(), 0);
-  for (std::size_t i = 0; i < bytes(); ++i) {
-    const bool counts = mask.allowed_rows.empty() || mask.allowed_rows[i % component_bytes_] != 0;
-    mask_[i] = counts ? 255 : 0;
+  query_.assign(query.magnitudes.begin(), query.magnitudes.end());
+  if (!mask.allowed_rows.empty()) {
+    mask_.resize(bytes());
+    for (std::size_t i = 0; i < mask_.size(); ++i) {
+      mask_[i] = mask.allowed_rows[i % component_bytes_] != 0 ? 255 : 0;
+    }
   }
   for (const ViewId view : mask.excluded_views) {
     const auto found = std::ranges::lower_bound(searched.views, view);

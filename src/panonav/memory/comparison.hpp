@@ -23,18 +23,19 @@ class Comparison {
   Comparison(const SearchedViews& searched, const PackedSignature& query, int components,
              const SearchMask& mask, const kernels::DistanceKernels& kernels);
 
-  [[nodiscard]] std::uint32_t full(ViewStore::Row row) const {
-    return kernels_.masked_l1(store_.magnitudes(row), query_.data(), mask_.data(), padded_bytes_);
-  }
+  [[nodiscard]] std::uint32_t full(ViewStore::Row row) const { return part(row, 0, components_); }
   /// Over components begin .. end - 1.
   [[nodiscard]] std::uint32_t part(ViewStore::Row row, int begin, int end) const {
     const std::size_t first = begin * component_bytes_;
-    return kernels_.masked_l1(store_.magnitudes(row) + first, query_.data() + first,
-                              mask_.data() + first, (end - begin) * component_bytes_);
+    const std::size_t count = (end - begin) * component_bytes_;
+    const std::uint8_t* const view = store_.magnitudes(row) + first;
+    return mask_.empty()
+               ? kernels_.l1(view, query_.data() + first, count)
+               : kernels_.masked_l1(view, query_.data() + first, mask_.data() + first, count);
   }
   void prefetch(ViewStore::Row row) const noexcept {
     const std::uint8_t* const magnitudes = store_.magnitudes(row);
-    for (std::size_t i = 0; i < padded_bytes_; i += 64) __builtin_prefetch(magnitudes + i);
+    for (std::size_t i = 0; i < bytes(); i += 64) __builtin_prefetch(magnitudes + i);
   }
 
   [[nodiscard]] const std::uint8_t* query() const noexcept { return query_.data(); }
@@ -54,8 +55,7 @@ class Comparison {
   const kernels::DistanceKernels& kernels_;
   int components_;
   std::size_t component_bytes_;
-  std::size_t padded_bytes_;
-  AlignedVector<std::uint8_t> query_, mask_;  // padded like the store's rows
+  AlignedVector<std::uint8_t> query_, mask_;  // the mask is empty when all rows count
   std::vector<ViewStore::Row> excluded_rows_;
 };
 

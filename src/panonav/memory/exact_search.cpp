@@ -175,7 +175,10 @@ class Search {
         if (waiting.size() >= most_waiting || !benefit.pays()) compare(waiting, nearest);
       } else {
         for (std::size_t i = 0; i < passed; ++i) {
-          if (i + 1 < passed) comparison_.prefetch(static_cast<Row>(begin + found[i + 1]));
+          // The processor itself looks ahead from row to row.
+          if (i + 1 < passed && found[i + 1] != found[i] + 1) {
+            comparison_.prefetch(static_cast<Row>(begin + found[i + 1]));
+          }
           const auto row = static_cast<Row>(begin + found[i]);
           if (nearest.rules_out(bounds_[row], searched_.view_of_row[row])) continue;
           nearest.offer({searched_.view_of_row[row], full(row)});

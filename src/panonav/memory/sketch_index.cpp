@@ -231,7 +231,8 @@ void SketchIndex::insert(const ViewStore& store, Row row) {
   layout_.sum_blocks(store.magnitudes(row), sums);
   if (!encode(segment, place, sums)) ++segment.outside;
   ++segment.used;
-  // A scale that was learnt from fewer views is never too wide, so only those outside call for another.
+  // A scale that was learnt from fewer views is never too wide, so only those outside call for
+  // another.
   constexpr std::size_t enough_to_learn = 64;
   const bool first = segment.learnt_from == 0 && segment.used >= enough_to_learn;
   const bool drifted = segment.learnt_from > 0 && segment.outside >= 8 + segment.used / 8;
