@@ -3,9 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
-#include <iostream>
 #include <limits>
 #include <thread>
 
@@ -296,15 +294,16 @@ TEST(MemoryFile, TwoWritersTakeTurns) {
   EXPECT_THROW(second.append(random_view(random, shape, 0)), ContractError);
 }
 
-// The figure of docs/performance.md is measured by the benchmark; this keeps the order of magnitude
-// and the promise that a large memory comes back whole.
-TEST(MemoryFile, ALargeMemoryLoadsQuickly) {
+// Many pages and several levels of the tables; how long loading takes is bench/storage_bench's
+// question.
+TEST(MemoryFile, ALargeMemoryComesBackWhole) {
   const TemporaryFolder folder;
   const auto path = folder / "m.panonav";
   MemoryHeader header = small_header();
   header.shape = {80, 15};
   header.panorama_columns = 512;
-  constexpr int count = 20000;
+  constexpr int count = 3000;
+  VisualMemory expected(header.shape, header.full_scale, header.elevations);
   Random random(7);
   {
     MemoryFile file = MemoryFile::create(path, header);
@@ -312,14 +311,15 @@ TEST(MemoryFile, ALargeMemoryLoadsQuickly) {
     for (int number = 0; number < count; ++number) {
       views.push_back(random_view(random, header.shape, number));
     }
-    EXPECT_EQ(file.append(views).size(), static_cast<std::size_t>(count));
+    const std::vector<ViewId> ids = file.append(views);
+    ASSERT_EQ(ids.size(), views.size());
+    for (std::size_t i = 0; i < ids.size(); ++i) {
+      expected.append_as(ids[i], views[i].signature, views[i].info);
+    }
   }
-  const auto start = std::chrono::steady_clock::now();
-  const VisualMemory memory = MemoryFile::open(path, Access::read_only).load();
-  const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - start;
-  EXPECT_EQ(memory.size(), static_cast<std::size_t>(count));
-  RecordProperty("load_s", std::to_string(passed.count()));
-  std::cout << count << " views of 80 x 15 loaded in " << passed.count() << " s\n";
+  const MemoryFile file = MemoryFile::open(path, Access::read_only);
+  EXPECT_TRUE(same_content(file.load(), expected));
+  EXPECT_TRUE(file.verify().empty());
 }
 
 }  // namespace
