@@ -6,10 +6,10 @@
 #include <cmath>
 
 #include "io/picture_samples.hpp"
-#include "support/temporary_folder.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/io/atomic_file.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace panonav {
 namespace {

@@ -16,7 +16,7 @@ namespace panonav {
 
 namespace {
 
-constexpr std::array<std::string_view, 2> kDirections{"clockwise", "counter-clockwise"};
+constexpr std::array<std::string_view, 2> direction_names{"clockwise", "counter-clockwise"};
 
 int whole(TomlFields& fields, std::string_view field) {
   const double value = fields.required_number(field);
@@ -29,7 +29,7 @@ int whole(TomlFields& fields, std::string_view field) {
 }  // namespace
 
 CameraFile read_camera(const std::filesystem::path& path) {
-  const toml::table table = read_toml(path);
+  const TomlTable table = read_toml(path);
   TomlFields fields(path, "", table);
   CameraFile result;
   Camera& camera = result.camera;
@@ -58,7 +58,7 @@ CameraFile read_camera(const std::filesystem::path& path) {
     camera.inner_radius_px = fields.required_number("inner_radius_px");
     camera.forward_angle_rad = radians(fields.number("forward_angle_deg").value_or(0.0));
   }
-  if (const auto direction = fields.choice("columns", kDirections)) {
+  if (const auto direction = fields.choice("columns", direction_names)) {
     camera.direction =
         *direction == 0 ? ColumnDirection::clockwise : ColumnDirection::counter_clockwise;
   }
@@ -115,11 +115,12 @@ void write_camera(const std::filesystem::path& path, const CameraFile& file) {
     number("forward_angle_deg", degrees(camera.forward_angle_rad));
   }
   text += "columns = \"" +
-          std::string(kDirections[camera.direction == ColumnDirection::clockwise ? 0 : 1]) + "\"\n";
+          std::string(direction_names[camera.direction == ColumnDirection::clockwise ? 0 : 1]) +
+          "\"\n";
   if (file.mask) {
     const std::string name = path.stem().string() + "_mask.png";
     write_png(path.parent_path() / name, file.mask->view());
-    text += "mask = \"" + name + "\"\n";
+    text += "mask = " + toml_text(name) + "\n";
   }
   write_file(path, text);
 }

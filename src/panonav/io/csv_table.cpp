@@ -11,7 +11,7 @@ namespace panonav {
 
 namespace {
 
-constexpr std::size_t kLargestFile = 64U << 20U;
+constexpr std::size_t file_limit_bytes = 64U << 20U;
 
 std::string_view trimmed(std::string_view text) {
   const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
@@ -20,7 +20,7 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
-// Empty when a quote is not closed.
+// Empty when a quote is not closed or something follows it.
 std::optional<std::vector<std::string>> split(std::string_view line) {
   std::vector<std::string> fields;
   std::size_t i = 0;
@@ -38,7 +38,8 @@ std::optional<std::vector<std::string>> split(std::string_view line) {
         field += line[i++];
       }
       ++i;
-      while (i < line.size() && line[i] != ',') ++i;
+      while (i < line.size() && (line[i] == ' ' || line[i] == '\t')) ++i;
+      if (i < line.size() && line[i] != ',') return std::nullopt;
     } else {
       const std::size_t end = std::min(line.find(',', i), line.size());
       field = trimmed(line.substr(i, end - i));
@@ -53,7 +54,7 @@ std::optional<std::vector<std::string>> split(std::string_view line) {
 }  // namespace
 
 CsvTable CsvTable::read(const std::filesystem::path& path) {
-  const auto bytes = read_file(path, kLargestFile);
+  const auto bytes = read_file(path, file_limit_bytes);
   std::string_view rest(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   // A byte order mark is how some programs begin a table.
   if (rest.starts_with("\xEF\xBB\xBF")) rest.remove_prefix(3);
@@ -68,7 +69,9 @@ CsvTable CsvTable::read(const std::filesystem::path& path) {
     if (line.empty() || line.front() == '#') continue;
     auto fields = split(line);
     const std::string where = "line " + std::to_string(line_number);
-    if (!fields) throw FileError(path.string(), where + " has a quotation mark that is not closed");
+    if (!fields)
+      throw FileError(path.string(),
+                      where + " has quotation marks that do not enclose a whole field");
     if (table.columns_.empty()) {
       table.columns_ = std::move(*fields);
       for (std::size_t i = 0; i < table.columns_.size(); ++i) {
@@ -123,7 +126,7 @@ void CsvTable::fail(std::size_t row, std::string_view column, std::string_view f
 }
 
 std::string csv_field(std::string_view text) {
-  const bool quoted = text.empty() || text.find_first_of(",\"\n#") != std::string_view::npos ||
+  const bool quoted = text.empty() || text.find_first_of(",\"#") != std::string_view::npos ||
                       trimmed(text).size() != text.size();
   if (!quoted) return std::string(text);
   std::string result = "\"";

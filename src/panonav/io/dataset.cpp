@@ -19,9 +19,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array<std::string_view, 3> kKinds{"panorama", "equirectangular", "mirror"};
-constexpr std::array<std::string_view, 2> kDirections{"clockwise", "counter-clockwise"};
-constexpr std::array<std::string_view, 8> kColumns{
+constexpr std::array<std::string_view, 3> kind_names{"panorama", "equirectangular", "mirror"};
+constexpr std::array<std::string_view, 2> direction_names{"clockwise", "counter-clockwise"};
+constexpr std::array<std::string_view, 8> column_names{
     "file", "stamp_s", "x_m", "y_m", "heading_deg", "odom_x_m", "odom_y_m", "odom_heading_deg"};
 
 ElevationBand elevation_band(TomlFields& fields, const std::vector<double>& values) {
@@ -38,7 +38,7 @@ ElevationBand elevation_band(TomlFields& fields, const std::vector<double>& valu
 
 PictureSource read_source(TomlFields& images, const fs::path& folder) {
   PictureSource source;
-  const auto kind = images.choice("kind", kKinds);
+  const auto kind = images.choice("kind", kind_names);
   if (!kind) images.fail("kind", "missing", "\"panorama\", \"equirectangular\", \"mirror\"");
   source.kind = static_cast<PictureKind>(*kind);
   std::optional<ElevationBand> band;
@@ -51,7 +51,7 @@ PictureSource read_source(TomlFields& images, const fs::path& folder) {
     source.layout.kept_elevations = band;
     return source;
   }
-  if (const auto direction = images.choice("columns", kDirections)) {
+  if (const auto direction = images.choice("columns", direction_names)) {
     source.layout.direction =
         *direction == 0 ? ColumnDirection::clockwise : ColumnDirection::counter_clockwise;
   }
@@ -102,9 +102,9 @@ std::vector<DatasetEntry> read_entries(const fs::path& folder, const fs::path& p
                                        bool positions_wanted) {
   const CsvTable table = CsvTable::read(path);
   for (const auto& column : table.columns()) {
-    if (std::find(kColumns.begin(), kColumns.end(), column) == kColumns.end()) {
+    if (std::find(column_names.begin(), column_names.end(), column) == column_names.end()) {
       std::string known;
-      for (const auto name : kColumns) known += (known.empty() ? "" : ", ") + std::string(name);
+      for (const auto name : column_names) known += (known.empty() ? "" : ", ") + std::string(name);
       throw FileError(path.string(), "the column '" + column + "' is not known; known: " + known);
     }
   }
@@ -186,7 +186,7 @@ bool natural_less(const std::string& a, const std::string& b) {
 
 Dataset read_dataset(const fs::path& folder) {
   const fs::path path = folder / "dataset.toml";
-  const toml::table table = read_toml(path);
+  const TomlTable table = read_toml(path);
   TomlFields top(path, "", table);
   auto images = top.section("images");
   if (!images) top.fail("[images]", "missing", "a section that says what the pictures are");
@@ -267,6 +267,9 @@ void write_dataset(const Dataset& dataset) {
   if (odometry) table += ",odom_x_m,odom_y_m,odom_heading_deg";
   table += "\n";
   for (const auto& entry : entries) {
+    if (entry.file.empty() || entry.file.find_first_of("\r\n") != std::string::npos) {
+      throw ContractError("file", "a name that is empty or has a line break", "other names");
+    }
     table += csv_field(entry.file);
     const auto add = [&table](double value) { table += "," + to_text(value); };
     if (stamps) add(*entry.stamp_s);
@@ -284,15 +287,15 @@ void write_dataset(const Dataset& dataset) {
   }
 
   const PictureSource& source = dataset.source;
-  std::string text =
-      "[images]\nkind = \"" + std::string(kKinds[static_cast<std::size_t>(source.kind)]) + "\"\n";
+  std::string text = "[images]\nkind = \"" +
+                     std::string(kind_names[static_cast<std::size_t>(source.kind)]) + "\"\n";
   std::optional<ElevationBand> band = source.layout.kept_elevations;
   if (source.kind == PictureKind::panorama) band = source.layout.elevations;
   if (source.kind != PictureKind::mirror) {
-    text +=
-        "columns = \"" +
-        std::string(kDirections[source.layout.direction == ColumnDirection::clockwise ? 0 : 1]) +
-        "\"\nforward_column = " + to_text(source.layout.forward_column) + "\n";
+    text += "columns = \"" +
+            std::string(
+                direction_names[source.layout.direction == ColumnDirection::clockwise ? 0 : 1]) +
+            "\"\nforward_column = " + to_text(source.layout.forward_column) + "\n";
   }
   if (band) {
     text += "elevation_deg = [" + to_text(degrees(band->bottom_rad)) + ", " +

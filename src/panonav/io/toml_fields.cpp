@@ -1,7 +1,12 @@
 #include "panonav/io/toml_fields.hpp"
 
+#include <toml++/toml.h>
+
+#include <algorithm>
 #include <cmath>
 #include <sstream>
+#include <type_traits>
+#include <utility>
 
 #include "panonav/core/error.hpp"
 #include "panonav/io/atomic_file.hpp"
@@ -10,70 +15,183 @@ namespace panonav {
 
 namespace {
 
-constexpr std::size_t kLargestFile = 1U << 20U;
+constexpr std::size_t file_limit_bytes = 1U << 20U;
 
-std::string shown(const toml::node& node) {
-  std::ostringstream text;
-  node.visit([&text](const auto& value) { text << value; });
-  std::string result = text.str();
-  for (auto& c : result) c = c == '\n' ? ' ' : c;
-  if (result.size() > 60) result = result.substr(0, 57) + "...";
+std::string one_line(std::string text) {
+  for (auto& c : text) c = static_cast<unsigned char>(c) < ' ' ? ' ' : c;
+  return text;
+}
+
+TomlTable copy_of(const toml::table& table);
+
+TomlValue copy_of(const toml::node& node) {
+  TomlValue result;
+  std::ostringstream shown;
+  node.visit([&](const auto& value) {
+    using Value = std::remove_cvref_t<decltype(value)>;
+    if constexpr (std::is_same_v<Value, toml::table>) {
+      shown << "a section";
+      result.content = copy_of(value);
+    } else if constexpr (std::is_same_v<Value, toml::array>) {
+      std::vector<TomlValue> list;
+      for (const auto& element : value) {
+        list.push_back(copy_of(element));
+        shown << (list.size() > 1 ? ", " : "[") << list.back().shown;
+      }
+      shown << (list.empty() ? "[]" : "]");
+      result.content = std::move(list);
+    } else if constexpr (toml::is_string<Value> || toml::is_integer<Value> ||
+                         toml::is_floating_point<Value> || toml::is_boolean<Value>) {
+      shown << value;
+      result.content = value.get();
+    } else {
+      shown << value;
+    }
+  });
+  result.shown = one_line(shown.str());
+  constexpr std::size_t longest = 60;
+  if (result.shown.size() > longest) result.shown = result.shown.substr(0, longest - 3) + "...";
   return result;
+}
+
+TomlTable copy_of(const toml::table& table) {
+  TomlTable result;
+  for (const auto& [key, node] : table) {
+    result.push_back({std::string(key.str()), copy_of(node)});
+  }
+  return result;
+}
+
+// Names joined by dots make nested tables, and the parser follows them by recursion without a
+// bound. Throws FileError when any stretch of text could be a name of too many parts.
+void require_shallow_names(std::string_view text, const std::filesystem::path& path) {
+  constexpr int most_parts = 64;
+  std::size_t line_number = 0;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    const std::string_view line = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    ++line_number;
+    const std::size_t first = line.find_first_not_of(" \t\r");
+    if (first == std::string_view::npos || line[first] == '#') continue;
+    int dots = 0;
+    for (const char c : line) {
+      constexpr std::string_view borders = "=,[]{}";
+      if (borders.find(c) != std::string_view::npos) dots = 0;
+      if (c == '.' && ++dots >= most_parts) {
+        throw FileError(path.string(), "line " + std::to_string(line_number) +
+                                           " has a name of too many parts; allowed: up to " +
+                                           std::to_string(most_parts));
+      }
+    }
+  }
+}
+
+std::optional<double> as_number(const TomlValue& value) {
+  if (const auto* real = std::get_if<double>(&value.content)) return *real;
+  if (const auto* whole = std::get_if<std::int64_t>(&value.content)) {
+    return static_cast<double>(*whole);
+  }
+  return std::nullopt;
 }
 
 }  // namespace
 
-toml::table read_toml(const std::filesystem::path& path) {
-  const auto bytes = read_file(path, kLargestFile);
+TomlTable read_toml(const std::filesystem::path& path) {
+  const auto bytes = read_file(path, file_limit_bytes);
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  require_shallow_names(text, path);
   try {
-    return toml::parse(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+    return copy_of(toml::parse(text));
   } catch (const toml::parse_error& error) {
-    throw FileError(path.string(), "line " + std::to_string(error.source().begin.line) +
-                                       " is not TOML: " + std::string(error.description()));
+    throw FileError(path.string(),
+                    "line " + std::to_string(error.source().begin.line) +
+                        " is not TOML: " + one_line(std::string(error.description())));
   }
 }
 
-const toml::node* TomlFields::get(std::string_view field) {
+std::string toml_text(std::string_view text) {
+  constexpr std::string_view digits = "0123456789ABCDEF";
+  std::string result = "\"";
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (c == '"' || c == '\\') {
+      result += '\\';
+      result += c;
+    } else if (byte < ' ' || byte == 0x7F) {
+      result += "\\u00";
+      result += digits[byte >> 4U];
+      result += digits[byte & 15U];
+    } else {
+      result += c;
+    }
+  }
+  return result + "\"";
+}
+
+TomlFields::TomlFields(std::filesystem::path path, std::string section, const TomlTable& table)
+    : path_(std::move(path)), section_(std::move(section)), table_(&table) {}
+
+const TomlValue* TomlFields::get(std::string_view field) {
   asked_.emplace(field);
-  return table_.get(field);
+  const auto found = std::ranges::find(*table_, field, &TomlField::name);
+  return found == table_->end() ? nullptr : &found->value;
 }
 
 std::optional<double> TomlFields::number(std::string_view field) {
-  const toml::node* node = get(field);
-  if (node == nullptr) return std::nullopt;
-  const auto value = node->is_number() ? node->value<double>() : std::nullopt;
-  if (!value || !std::isfinite(*value)) fail(field, shown(*node), "a finite number");
-  return value;
+  const TomlValue* value = get(field);
+  if (value == nullptr) return std::nullopt;
+  const auto number = as_number(*value);
+  if (!number || !std::isfinite(*number)) fail(field, value->shown, "a finite number");
+  return number;
+}
+
+std::optional<std::int64_t> TomlFields::integer(std::string_view field) {
+  const TomlValue* value = get(field);
+  if (value == nullptr) return std::nullopt;
+  const auto* integer = std::get_if<std::int64_t>(&value->content);
+  if (integer == nullptr) fail(field, value->shown, "a whole number");
+  return *integer;
+}
+
+std::optional<bool> TomlFields::boolean(std::string_view field) {
+  const TomlValue* value = get(field);
+  if (value == nullptr) return std::nullopt;
+  const auto* boolean = std::get_if<bool>(&value->content);
+  if (boolean == nullptr) fail(field, value->shown, "true, false");
+  return *boolean;
 }
 
 std::optional<std::string> TomlFields::text(std::string_view field) {
-  const toml::node* node = get(field);
-  if (node == nullptr) return std::nullopt;
-  if (!node->is_string()) fail(field, shown(*node), "a text in quotation marks");
-  return node->value<std::string>();
+  const TomlValue* value = get(field);
+  if (value == nullptr) return std::nullopt;
+  const auto* text = std::get_if<std::string>(&value->content);
+  if (text == nullptr) fail(field, value->shown, "a text in quotation marks");
+  return *text;
 }
 
 std::optional<std::vector<double>> TomlFields::numbers(std::string_view field) {
-  const toml::node* node = get(field);
-  if (node == nullptr) return std::nullopt;
-  const toml::array* array = node->as_array();
-  if (array == nullptr) fail(field, shown(*node), "a list of numbers");
-  std::vector<double> values;
-  for (const auto& element : *array) {
-    const auto value = element.is_number() ? element.value<double>() : std::nullopt;
-    if (!value || !std::isfinite(*value)) fail(field, shown(*node), "a list of finite numbers");
-    values.push_back(*value);
+  const TomlValue* value = get(field);
+  if (value == nullptr) return std::nullopt;
+  const auto* list = std::get_if<std::vector<TomlValue>>(&value->content);
+  if (list == nullptr) fail(field, value->shown, "a list of numbers");
+  std::vector<double> numbers;
+  for (const TomlValue& element : *list) {
+    const auto number = as_number(element);
+    if (!number || !std::isfinite(*number)) fail(field, value->shown, "a list of finite numbers");
+    numbers.push_back(*number);
   }
-  return values;
+  return numbers;
 }
 
 std::optional<TomlFields> TomlFields::section(std::string_view field) {
-  const toml::node* node = get(field);
-  if (node == nullptr) return std::nullopt;
-  const toml::table* table = node->as_table();
-  if (table == nullptr) fail(field, shown(*node), "a section in square brackets");
-  return TomlFields(
-      path_, section_.empty() ? std::string(field) : section_ + "." + std::string(field), *table);
+  const TomlValue* value = get(field);
+  if (value == nullptr) return std::nullopt;
+  const auto* table = std::get_if<TomlTable>(&value->content);
+  if (table == nullptr) fail(field, value->shown, "a section in square brackets");
+  std::string name = section_.empty() ? "" : section_ + ".";
+  name += field;
+  return TomlFields(path_, std::move(name), *table);
 }
 
 double TomlFields::required_number(std::string_view field) {
@@ -97,7 +215,7 @@ std::optional<std::size_t> TomlFields::choice(std::string_view field,
     if (*value == choices[i]) return i;
     allowed += (i > 0 ? ", \"" : "\"") + std::string(choices[i]) + "\"";
   }
-  fail(field, "\"" + *value + "\"", allowed);
+  fail(field, one_line("\"" + *value + "\""), allowed);
 }
 
 void TomlFields::fail(std::string_view field, std::string_view found,
@@ -108,12 +226,12 @@ void TomlFields::fail(std::string_view field, std::string_view found,
 }
 
 void TomlFields::finish() const {
-  for (const auto& [key, value] : table_) {
-    if (asked_.contains(key.str())) continue;
+  for (const TomlField& field : *table_) {
+    if (asked_.contains(field.name)) continue;
     std::string known;
     for (const auto& name : asked_) known += (known.empty() ? "" : ", ") + name;
     throw FileError(path_.string(), (section_.empty() ? "" : "[" + section_ + "] ") +
-                                        std::string(key.str()) +
+                                        one_line(field.name) +
                                         " is not a known field; known: " + known);
   }
 }

@@ -1,33 +1,52 @@
 #pragma once
 
-#include <toml++/toml.h>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <set>
 #include <span>
 #include <string>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 namespace panonav {
 
-// Reading TOML tables with one clear line for everything that is wrong. For the .cpp files of this
-// module.
+struct TomlField;
+/// The fields of a TOML table in the order of the file.
+using TomlTable = std::vector<TomlField>;
+
+struct TomlValue {
+  /// Dates and times are monostate: nothing here uses them.
+  std::variant<std::monostate, bool, std::int64_t, double, std::string, std::vector<TomlValue>,
+               TomlTable>
+      content;
+  std::string shown;  ///< as an error message shows it: one line, not long
+};
+
+struct TomlField {
+  std::string name;
+  TomlValue value;
+};
 
 /// Parses the file. Throws FileError: missing, larger than 1 MB, not TOML (with the line).
-[[nodiscard]] toml::table read_toml(const std::filesystem::path& path);
+[[nodiscard]] TomlTable read_toml(const std::filesystem::path& path);
 
-/// One table of a file. Remembers which fields were asked for, so that `finish` can refuse the
-/// others: a misspelt field would otherwise be silently ignored.
+/// The text in quotation marks as TOML writes it.
+[[nodiscard]] std::string toml_text(std::string_view text);
+
+/// Reads one table of a file, with one clear line for everything that is wrong. Remembers which
+/// fields were asked for, so that `finish` can refuse the others: a misspelt field would otherwise
+/// be silently ignored. The table must outlive it.
 class TomlFields {
  public:
   /// `section` is its name for messages; empty for the top level.
-  TomlFields(const std::filesystem::path& path, std::string section, const toml::table& table)
-      : path_(path), section_(std::move(section)), table_(table) {}
+  TomlFields(std::filesystem::path path, std::string section, const TomlTable& table);
 
-  [[nodiscard]] bool has(std::string_view field) const { return table_.contains(field); }
   /// Empty when the field is absent; FileError when it is of another type.
   std::optional<double> number(std::string_view field);
+  std::optional<std::int64_t> integer(std::string_view field);
+  std::optional<bool> boolean(std::string_view field);
   std::optional<std::string> text(std::string_view field);
   std::optional<std::vector<double>> numbers(std::string_view field);
   std::optional<TomlFields> section(std::string_view field);
@@ -44,10 +63,10 @@ class TomlFields {
   void finish() const;
 
  private:
-  const toml::node* get(std::string_view field);
+  const TomlValue* get(std::string_view field);
   std::filesystem::path path_;
   std::string section_;
-  const toml::table& table_;
+  const TomlTable* table_;
   std::set<std::string, std::less<>> asked_;
 };
 

@@ -1,0 +1,97 @@
+#include "panonav/io/option_file.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+#include <variant>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav {
+
+namespace {
+
+const TomlTable* section_in(const TomlTable& table, std::string_view section) {
+  const auto found = std::ranges::find(table, section, &TomlField::name);
+  return found == table.end() ? nullptr : std::get_if<TomlTable>(&found->value.content);
+}
+
+class OptionReader final : public OptionVisitor {
+ public:
+  OptionReader(const std::filesystem::path& path, std::string_view section, const TomlTable& table)
+      : path_(path),
+        where_("[" + std::string(section) + "] "),
+        fields_(path, std::string(section), table) {}
+
+  void visit(const OptionInfo& info, int& value) override {
+    const auto found = fields_.integer(info.name);
+    if (!found) return;
+    check(info, static_cast<double>(*found));
+    if (*found < std::numeric_limits<int>::min() || *found > std::numeric_limits<int>::max()) {
+      fields_.fail(info.name, std::to_string(*found), "a whole number below 2^31");
+    }
+    value = static_cast<int>(*found);
+  }
+  void visit(const OptionInfo& info, double& value) override {
+    const auto found = fields_.number(info.name);
+    if (!found) return;
+    check(info, *found);
+    value = *found;
+  }
+  void visit(const OptionInfo& info, bool& value) override {
+    value = fields_.boolean(info.name).value_or(value);
+  }
+  void visit(const OptionInfo& info, std::span<const std::string_view> choices,
+             int& value) override {
+    if (const auto found = fields_.choice(info.name, choices)) value = static_cast<int>(*found);
+  }
+  void finish() const { fields_.finish(); }
+
+ private:
+  void check(const OptionInfo& info, double value) const {
+    for (const auto& fault : option_faults(info, value)) {
+      throw FileError(path_.string(), where_ + fault);
+    }
+  }
+  const std::filesystem::path& path_;
+  std::string where_;
+  TomlFields fields_;
+};
+
+}  // namespace
+
+OptionFile::OptionFile(std::filesystem::path path)
+    : path_(std::move(path)), table_(read_toml(path_)) {
+  for (const TomlField& field : table_) {
+    if (!std::holds_alternative<TomlTable>(field.value.content)) {
+      throw FileError(path_.string(), field.name +
+                                          " stands outside all sections; allowed: options "
+                                          "in a section, [name] above them");
+    }
+  }
+}
+
+void OptionFile::apply(std::string_view section,
+                       const std::function<void(OptionVisitor&)>& visit) const {
+  const TomlTable* table = section_in(table_, section);
+  if (table == nullptr) return;
+  OptionReader reader(path_, section, *table);
+  visit(reader);
+  reader.finish();
+}
+
+bool OptionFile::has(std::string_view section, std::string_view field) const {
+  const TomlTable* table = section_in(table_, section);
+  return table != nullptr && std::ranges::find(*table, field, &TomlField::name) != table->end();
+}
+
+void OptionFile::require_sections(std::span<const std::string_view> known) const {
+  for (const TomlField& field : table_) {
+    if (std::ranges::find(known, field.name) != known.end()) continue;
+    std::string all;
+    for (const auto name : known) all += (all.empty() ? "" : ", ") + std::string(name);
+    throw FileError(path_.string(), "[" + field.name + "] is not a known section; known: " + all);
+  }
+}
+
+}  // namespace panonav

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "panonav/core/options.hpp"
+#include "panonav/io/toml_fields.hpp"
+
+namespace panonav {
+
+/// A TOML file of options (docs/formats.md): one section for each options struct, in it one field
+/// for each member that the struct's `visit_options` shows.
+class OptionFile {
+ public:
+  /// Throws FileError: missing, not TOML, a field outside all sections.
+  explicit OptionFile(std::filesystem::path path);
+
+  /// Writes the fields of [section] into the members that `visit` shows; members without a field
+  /// stay as they are, and so does everything when the file has no such section. Throws FileError
+  /// with one line that names file, section, field, value and what is allowed: an unknown field, a
+  /// wrong type, a value out of range.
+  void apply(std::string_view section, const std::function<void(OptionVisitor&)>& visit) const;
+  template <class Options>
+  requires requires(Options& options, OptionVisitor& visitor) { visit_options(options, visitor); }
+  void apply(std::string_view section, Options& options) const {
+    apply(section, [&options](OptionVisitor& visitor) { visit_options(options, visitor); });
+  }
+
+  /// Whether the file gives this field.
+  [[nodiscard]] bool has(std::string_view section, std::string_view field) const;
+  /// Throws FileError when the file has a section that is not among `known`: a misspelt one would
+  /// otherwise do nothing.
+  void require_sections(std::span<const std::string_view> known) const;
+
+ private:
+  std::filesystem::path path_;
+  TomlTable table_;
+};
+
+}  // namespace panonav

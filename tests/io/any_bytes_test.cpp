@@ -1,0 +1,139 @@
+// Readers of text files meet bytes that nobody meant for them: a value or one clear line, never a
+// crash.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <string>
+
+#include "io/picture_samples.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/io/camera_file.hpp"
+#include "panonav/io/dataset.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav/io/option_file.hpp"
+#include "panonav/io/trajectory_file.hpp"
+#include "support/temporary_folder.hpp"
+
+namespace panonav {
+namespace {
+
+using test::TemporaryFolder;
+
+constexpr std::string_view dataset_text =
+    "[images]\nkind = \"equirectangular\"\ncolumns = \"clockwise\"\nforward_column = 0.5\n"
+    "elevation_deg = [-30.0, 40.0]\n[poses]\nfile = \"poses.csv\"\n";
+constexpr std::string_view poses_text =
+    "file,stamp_s,x_m,y_m,heading_deg\na.png,0.5,1,2,90\n\"b.png\",1.5,-3e-2,4,-180\n";
+constexpr std::string_view camera_text =
+    "model = \"polynomial\"\ncoefficients = [-120.0, 0.0, 0.002]\nwidth_px = 64\nheight_px = 48\n"
+    "centre_u_px = 32.5\ncentre_v_px = 24.0\nrim_radius_px = 22.0\ninner_radius_px = 5.0\n"
+    "forward_angle_deg = 17.0\ncolumns = \"clockwise\"\n";
+constexpr std::string_view tum_text =
+    "# stamp x y z qx qy qz qw\n0 1 2 0 0 0 0 1\n0.5 1 2 0 0 0 1 0\n";
+constexpr std::string_view csv_text = "stamp_s,x_m,y_m,heading_deg\n0,1,2,3\n1,2,3,4\n";
+
+class AnyBytes : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const Image picture = test::smooth_image(16, 8, 1);
+    write_png(folder / "a.png", picture.view());
+    write_png(folder / "b.png", picture.view());
+    folder.write("dataset.toml", dataset_text);
+    folder.write("poses.csv", poses_text);
+  }
+
+  // Damages `good`, writes it as `name` and reads; counts what was refused.
+  void expect_values_or_lines(std::string_view name, std::string_view good,
+                              const std::function<void(const std::filesystem::path&)>& read) {
+    read(folder.write(name, good));
+    Random random(1);
+    constexpr std::string_view special = "\"'[]{}=,#.\n\r\t\\\0 -+e09_nai\x80\xFF";
+    int refused = 0;
+    constexpr int trials = 400;
+    for (int trial = 0; trial < trials; ++trial) {
+      std::string bytes(good);
+      const auto any_byte = [&] {
+        return random.index(2) == 0 ? special[random.index(special.size())]
+                                    : static_cast<char>(random.index(256));
+      };
+      if (trial % 4 == 3) {
+        // Nothing but noise.
+        bytes.resize(random.index(200));
+        for (auto& byte : bytes) byte = any_byte();
+      } else {
+        for (std::uint64_t edits = 1 + random.index(4); edits > 0; --edits) {
+          const auto at = random.index(bytes.size());
+          switch (random.index(3)) {
+            case 0:
+              bytes[at] = any_byte();
+              break;
+            case 1:
+              bytes.insert(at, 1, any_byte());
+              break;
+            default:
+              bytes.erase(at, 1 + random.index(10));
+          }
+          if (bytes.empty()) break;
+        }
+      }
+      const auto path = folder.write(name, bytes);
+      try {
+        read(path);
+      } catch (const FileError& error) {
+        ++refused;
+        const std::string message = error.what();
+        EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+        EXPECT_EQ(message.rfind(folder.path().string(), 0), 0U) << message;
+      }
+    }
+    EXPECT_GT(refused, trials / 4);
+  }
+
+  TemporaryFolder folder;
+};
+
+TEST_F(AnyBytes, DatasetToml) {
+  expect_values_or_lines("dataset.toml", dataset_text, [this](const auto&) {
+    EXPECT_EQ(read_dataset(folder.path()).entries.size(), 2U);
+  });
+}
+
+TEST_F(AnyBytes, PoseTable) {
+  expect_values_or_lines("poses.csv", poses_text, [this](const auto&) {
+    EXPECT_GE(read_dataset(folder.path()).entries.size(), 1U);
+  });
+}
+
+TEST_F(AnyBytes, CameraFile) {
+  expect_values_or_lines("camera.toml", camera_text,
+                         [](const auto& path) { validate(read_camera(path).camera); });
+}
+
+TEST_F(AnyBytes, TumTrajectory) {
+  expect_values_or_lines("t.tum", tum_text,
+                         [](const auto& path) { EXPECT_GE(read_trajectory(path).size(), 1U); });
+}
+
+TEST_F(AnyBytes, CsvTrajectory) {
+  expect_values_or_lines("t.csv", csv_text,
+                         [](const auto& path) { EXPECT_GE(read_trajectory(path).size(), 1U); });
+}
+
+TEST_F(AnyBytes, OptionFile) {
+  expect_values_or_lines("o.toml", "[search]\ntop = 3\n[other]\nname = \"x\"\nlist = [1, [2, 3]]\n",
+                         [](const auto& path) { (void)OptionFile(path).has("search", "top"); });
+}
+
+TEST_F(AnyBytes, DeeplyNestedToml) {
+  const auto path = folder.write("deep.toml", "a = " + std::string(100000, '['));
+  EXPECT_THROW(OptionFile file(path), FileError);
+  std::string dotted = "a";
+  for (int i = 0; i < 50000; ++i) dotted += ".a";
+  EXPECT_THROW(OptionFile file(folder.write("dotted.toml", dotted + " = 1\n")), FileError);
+  EXPECT_THROW(OptionFile file(folder.write("section.toml", "[" + dotted + "]\nx = 1\n")),
+               FileError);
+}
+
+}  // namespace
+}  // namespace panonav
