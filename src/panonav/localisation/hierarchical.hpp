@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "panonav/core/options.hpp"
+#include "panonav/geometry/voronoi.hpp"
+#include "panonav/memory/visual_memory.hpp"
+
+namespace panonav {
+
+/// How much of the floor each reference view of a memory stands for: the Voronoi cells of the posed
+/// views, clipped at half the spacing. Copy of what it needs: the memory may change afterwards, and
+/// views that came later have no cell.
+class ReferenceAreas {
+ public:
+  /// Cost: the Voronoi cells of all posed views; some microseconds each.
+  explicit ReferenceAreas(const VisualMemory& memory);
+
+  [[nodiscard]] double spacing_m() const noexcept { return cells_.spacing_m(); }
+  /// All posed views together.
+  [[nodiscard]] double total_area_m2() const noexcept { return total_area_m2_; }
+  /// The cell of a view, corners counter-clockwise; empty when the view had no pose.
+  [[nodiscard]] std::vector<Point2> cell(ViewId view) const;
+  /// Area of the union of the views' cells; empty when one of them has no pose.
+  [[nodiscard]] std::optional<double> area_m2(std::span<const Match> views) const;
+  /// The smallest circle around the views' positions, and half a cell's diagonal more, so that it
+  /// covers their cells; empty when one of them has no pose or there is none.
+  [[nodiscard]] std::optional<Circle> enclosing_circle(std::span<const Match> views) const;
+
+ private:
+  [[nodiscard]] std::optional<std::size_t> site(ViewId view) const;
+
+  std::vector<ViewId> views_;  // posed ones, ascending; order of the positions given to `cells_`
+  VoronoiCells cells_;
+  std::vector<double> areas_m2_;  // by site
+  double total_area_m2_ = 0.0;
+};
+
+/// Where to stop.
+struct WantedAccuracy {
+  int components = 0;     ///< at most so many, 0: the memory's
+  double radius_m = 0.0;  ///< stop as soon as the circle is no larger; 0: never on this account
+  double tolerance =
+      0.0;  ///< candidates are kept up to (1 + tolerance) times the best dissimilarity
+};
+void visit_options(WantedAccuracy& accuracy, OptionVisitor& visitor);
+
+/// What is known of the place when so many components have been compared. Every level's candidates,
+/// area and radius are at most those of the level before.
+struct LocalisationLevel {
+  int components = 0;
+  std::vector<Match> candidates;  ///< ascending (partial dissimilarity, view)
+  std::optional<double> area_m2;  ///< of the candidates' cells; empty when a candidate has no pose
+  std::optional<Circle> region;   ///< circle that covers the candidates' cells
+  std::uint64_t bytes_read = 0;   ///< of signatures, by all levels so far
+};
+
+/// Hierarchical localisation [M04 section 2.3, figures 9 and 10]: few components give a large area,
+/// more components a smaller one, and only what the wanted accuracy needs is computed. Empty for an
+/// empty memory. Whether the place is known at all is not asked here (`Localiser`). Throws
+/// OptionError, ContractError on a query of another shape.
+[[nodiscard]] std::vector<LocalisationLevel> localise_hierarchically(
+    const VisualMemory& memory, const ReferenceAreas& areas, const PackedSignature& query,
+    const WantedAccuracy& accuracy = {}, const SearchMask& mask = {});
+
+}  // namespace panonav

@@ -1,0 +1,226 @@
+#include "panonav/localisation/position_model.hpp"
+
+#include <Eigen/Core>
+#include <Eigen/QR>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "panonav/geometry/voronoi.hpp"
+#include "panonav/localisation/sample.hpp"
+#include "panonav/signature/dissimilarity.hpp"
+
+namespace panonav {
+
+namespace {
+
+// Beyond this number further references change positions by less than their error.
+constexpr std::size_t most_neighbours = 16;
+// What the learning chooses from: neighbourhoods in spacings of the memory, exponents of the
+// variogram. 1 is exact for signatures that move as a random walk, 2 would be for signatures that
+// change linearly with the position but leaves the solution without a unique answer.
+constexpr std::array<double, 6> neighbourhoods = {1.6, 2.3, 3.2, 4.5, 6.5, 9.0};
+constexpr std::array<double, 3> exponents = {1.0, 1.25, 1.5};
+// Share of the typical kriging variance that stays even where the query equals a reference: sensor
+// noise.
+constexpr double least_variance = 0.1;
+constexpr double coverage = 0.95;
+
+// Posed views in ascending order of their dissimilarity to the query.
+struct Neighbours {
+  std::vector<ViewId> views;
+  std::vector<Point2> positions;
+  Eigen::VectorXd to_query;
+  Eigen::MatrixXd between;
+};
+
+Neighbours gather(const VisualMemory& memory, std::span<const Match> matches, int components) {
+  Neighbours n;
+  std::vector<double> to_query;
+  std::vector<PackedSignature> signatures;
+  for (const Match& match : matches) {
+    if (n.views.size() == PositionModel::candidates) break;
+    const auto& pose = memory.info(match.view).pose;
+    if (!pose) continue;
+    n.views.push_back(match.view);
+    n.positions.push_back(pose->position());
+    to_query.push_back(match.dissimilarity);
+    signatures.push_back(memory.packed(match.view));
+  }
+  const auto size = static_cast<Eigen::Index>(n.views.size());
+  n.to_query = Eigen::Map<const Eigen::VectorXd>(to_query.data(), size);
+  n.between = Eigen::MatrixXd::Zero(size, size);
+  for (Eigen::Index i = 0; i < size; ++i) {
+    for (Eigen::Index j = 0; j < i; ++j) {
+      n.between(i, j) = n.between(j, i) =
+          dissimilarity_packed(signatures[i], signatures[j], components);
+    }
+  }
+  return n;
+}
+
+struct Kriged {
+  Point2 position;
+  double variance = 0.0;  // in units of the variogram
+  std::vector<std::size_t> used;
+  std::vector<double> weights;
+};
+
+Kriged krige(const Neighbours& n, double neighbourhood_m, double exponent, double unit) {
+  Kriged result;
+  for (std::size_t i = 0; i < n.views.size() && result.used.size() < most_neighbours; ++i) {
+    if (distance(n.positions[i], n.positions[0]) <= neighbourhood_m) result.used.push_back(i);
+  }
+  const auto size = static_cast<Eigen::Index>(result.used.size());
+  const auto variogram = [&](double dissimilarity) {
+    return std::pow(dissimilarity / unit, exponent);
+  };
+  // The last row and column hold the multiplier of "weights sum to 1".
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Ones(size + 1, size + 1);
+  Eigen::VectorXd right = Eigen::VectorXd::Ones(size + 1);
+  matrix(size, size) = 0.0;
+  for (Eigen::Index i = 0; i < size; ++i) {
+    const auto a = static_cast<Eigen::Index>(result.used[i]);
+    right(i) = variogram(n.to_query(a));
+    for (Eigen::Index j = 0; j < size; ++j) {
+      matrix(i, j) = variogram(n.between(a, static_cast<Eigen::Index>(result.used[j])));
+    }
+  }
+  // Of least norm: references with equal signatures share their weight.
+  const Eigen::VectorXd solution = matrix.completeOrthogonalDecomposition().solve(right);
+  double total = 0.0;
+  for (Eigen::Index i = 0; i < size; ++i) total += solution(i);
+  for (Eigen::Index i = 0; i < size; ++i) {
+    const double weight = solution(i) / total;
+    result.weights.push_back(weight);
+    const Point2 p = n.positions[result.used[i]];
+    result.position = {result.position.x_m + weight * p.x_m, result.position.y_m + weight * p.y_m};
+  }
+  result.variance = std::max(0.0, solution.dot(right));
+  // dissimilarity^exponent above 1 need not be a valid variogram for the L1 distance; where it is
+  // not, the solution can leave the neighbourhood, which no position between references does.
+  if (!(distance(result.position, n.positions[0]) <= neighbourhood_m)) {
+    result.position = n.positions[0];
+    result.used = {0};
+    result.weights = {1.0};
+    result.variance = 2.0 * right(0);  // the variance of a single reference's error
+  }
+  return result;
+}
+
+}  // namespace
+
+void visit_options(PositionModelOptions& options, OptionVisitor& visitor) {
+  visitor.visit({.name = "components", .help = "Fourier components compared, 0 for all", .low = 0},
+                options.components);
+  visitor.visit({.name = "sampled_views", .help = "views used for learning", .low = 8, .high = 1e6},
+                options.sampled_views);
+  visitor.visit({.name = "seed", .help = "seed of the draw", .low = 0}, options.seed);
+}
+
+PositionModel learn_position_model(const VisualMemory& memory,
+                                   const PositionModelOptions& options) {
+  validate(options);
+  std::vector<ViewId> posed;
+  std::vector<Point2> positions;
+  for (const ViewId view : memory.views()) {
+    if (const auto& pose = memory.info(view).pose) {
+      posed.push_back(view);
+      positions.push_back(pose->position());
+    }
+  }
+  PositionModel model;
+  model.components = options.components;
+  const double spacing_m = VoronoiCells(positions).spacing_m();
+  if (posed.size() < PositionModel::least_views || spacing_m == 0.0) return model;
+
+  const std::vector<ViewId> sample =
+      sample_views(posed, options.sampled_views, static_cast<std::uint64_t>(options.seed));
+  std::vector<Neighbours> neighbours;
+  std::vector<Point2> truths;
+  std::vector<double> dissimilarities;
+  for (const ViewId view : sample) {
+    const std::array excluded = {view};
+    const SearchResult found = memory.search(
+        memory.packed(view), {.top = PositionModel::candidates, .components = options.components},
+        {.excluded_views = excluded, .allowed_rows = {}});
+    // As in an answer, the nearest view must have a pose.
+    if (found.matches.empty() || !memory.info(found.matches[0].view).pose) continue;
+    neighbours.push_back(gather(memory, found.matches, options.components));
+    truths.push_back(memory.info(view).pose->position());
+    dissimilarities.push_back(neighbours.back().to_query(0));
+  }
+  if (neighbours.size() < PositionModel::least_views) return model;
+  model.sampled_views = static_cast<int>(neighbours.size());
+  model.dissimilarity_unit = std::max(1.0, quantile(dissimilarities, 0.5));
+
+  // The mean error, where an error beyond all neighbourhoods counts no more than that: views that
+  // look alike far apart say nothing on how to interpolate.
+  const double largest_error_m = neighbourhoods.back() * spacing_m;
+  double best_mean_m = std::numeric_limits<double>::infinity();
+  std::vector<double> best_errors;
+  std::vector<double> best_variances;
+  for (const double spacings : neighbourhoods) {
+    for (const double exponent : exponents) {
+      std::vector<double> errors;
+      std::vector<double> variances;
+      double sum_m = 0.0;
+      for (std::size_t i = 0; i < neighbours.size(); ++i) {
+        const Kriged kriged =
+            krige(neighbours[i], spacings * spacing_m, exponent, model.dissimilarity_unit);
+        errors.push_back(distance(kriged.position, truths[i]));
+        variances.push_back(kriged.variance);
+        sum_m += std::min(errors.back(), largest_error_m);
+      }
+      const double mean_m = sum_m / static_cast<double>(neighbours.size());
+      if (mean_m < best_mean_m) {
+        best_mean_m = mean_m;
+        model.neighbourhood_m = spacings * spacing_m;
+        model.exponent = exponent;
+        best_errors = std::move(errors);
+        best_variances = std::move(variances);
+      }
+    }
+  }
+  model.variance_unit = quantile(best_variances, 0.5);
+  std::vector<double> ratios;
+  for (std::size_t i = 0; i < best_errors.size(); ++i) {
+    const double variance = best_variances[i] + least_variance * model.variance_unit;
+    if (variance > 0.0) ratios.push_back(best_errors[i] / std::sqrt(variance));
+  }
+  model.median_error_m = quantile(best_errors, 0.5);
+  model.error95_m = quantile(best_errors, coverage);
+  if (ratios.empty()) return model;
+  // The quantile of a sample of n that a further draw stays below with at least this probability.
+  const double n = static_cast<double>(ratios.size());
+  model.radius_m_per_deviation = quantile(ratios, std::min(1.0, coverage * (n + 1.0) / n));
+  model.learnt = true;
+  return model;
+}
+
+std::optional<PositionEstimate> interpolate_position(const VisualMemory& memory,
+                                                     const PositionModel& model,
+                                                     std::span<const Match> matches) {
+  if (matches.empty()) return std::nullopt;
+  const auto& nearest = memory.info(matches[0].view).pose;
+  if (!nearest) return std::nullopt;
+  PositionEstimate estimate;
+  if (!model.learnt) {
+    estimate.position = nearest->position();
+    estimate.shares = {{matches[0].view, 1.0}};
+    return estimate;
+  }
+  const Neighbours neighbours = gather(memory, matches, model.components);
+  const Kriged kriged =
+      krige(neighbours, model.neighbourhood_m, model.exponent, model.dissimilarity_unit);
+  estimate.position = kriged.position;
+  estimate.radius_m = model.radius_m_per_deviation *
+                      std::sqrt(kriged.variance + least_variance * model.variance_unit);
+  for (std::size_t i = 0; i < kriged.used.size(); ++i) {
+    estimate.shares.push_back({neighbours.views[kriged.used[i]], kriged.weights[i]});
+  }
+  return estimate;
+}
+
+}  // namespace panonav

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "panonav/core/options.hpp"
+#include "panonav/memory/visual_memory.hpp"
+
+namespace panonav {
+
+struct PositionModelOptions {
+  int components = 0;       ///< over which the matches will be compared; 0 takes all
+  int sampled_views = 200;  ///< of larger memories only so many views are used for learning
+  int seed = 1;             ///< of the draw
+};
+void visit_options(PositionModelOptions& options, OptionVisitor& visitor);
+
+/// How positions follow from dissimilarities in one memory; learnt from its posed views by leaving
+/// one out. Plain numbers, so that it can be kept beside the memory.
+struct PositionModel {
+  /// Fewest posed views to learn from.
+  static constexpr int least_views = 8;
+  /// Nearest views that may take part in an interpolation, before the far ones among them are left
+  /// out.
+  static constexpr int candidates = 24;
+
+  bool learnt = false;  ///< false: fewer than `least_views` posed views; the nearest view's
+                        ///< position is the answer
+  int components = 0;   ///< over which its matches must be compared; 0: all
+  int sampled_views = 0;
+  double neighbourhood_m = 0.0;  ///< references farther than this from the nearest one take no part
+  double exponent =
+      1.5;  ///< of the variogram: half the mean square distance ~ dissimilarity^exponent
+  double dissimilarity_unit = 1.0;
+  double variance_unit = 0.0;           ///< median kriging variance
+  double radius_m_per_deviation = 0.0;  ///< radius that holds 95 % over the kriging deviation
+  double median_error_m = 0.0;          ///< of the views left out
+  double error95_m = 0.0;               ///< 95 % of the views left out were nearer
+};
+
+/// Learns the neighbourhood and the exponent that place the views of the memory best when each is
+/// left out in turn, and then how large a radius holds 95 % of those errors. Views left out are
+/// farther from the other references than queries between the references are, so the radius rather
+/// holds too many than too few. Throws OptionError, ContractError on more components than the
+/// memory's. Cost: `sampled_views` searches and about 0.3 ms for each.
+[[nodiscard]] PositionModel learn_position_model(const VisualMemory& memory,
+                                                 const PositionModelOptions& options = {});
+
+/// A reference view's part in an interpolated position.
+struct PositionShare {
+  ViewId view;
+  double weight = 0.0;  ///< may be negative; all sum to 1
+};
+
+/// A position between reference views, finer than their spacing [M04 footnote 1].
+struct PositionEstimate {
+  Point2 position;
+  /// The true position lies within it in 95 % of the cases; empty when nothing could be learnt.
+  std::optional<double> radius_m;
+  std::vector<PositionShare> shares;  ///< nearest first
+};
+
+/// Ordinary kriging in the space of the signatures: the position is the weighted mean of the
+/// neighbouring references' positions whose expected squared error is smallest, when half the mean
+/// square distance between two views grows as dissimilarity^exponent. It accounts for references
+/// that tell the same twice, and at a memorised view it gives that view's position. [M04
+/// section 2.2: dissimilarity grows linearly with distance at short range.]
+///
+/// `matches` ascend in dissimilarity over `model.components` components; views without a pose and
+/// views far from the nearest one, which only look alike, take no part. Empty when the nearest view
+/// has no pose. Cost: pairwise dissimilarities and a dense solution of at most 17 unknowns.
+[[nodiscard]] std::optional<PositionEstimate> interpolate_position(const VisualMemory& memory,
+                                                                   const PositionModel& model,
+                                                                   std::span<const Match> matches);
+
+}  // namespace panonav

@@ -1,0 +1,42 @@
+#include "panonav/localisation/sample.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "panonav/core/random.hpp"
+
+namespace panonav {
+
+std::vector<ViewId> sample_views(std::span<const ViewId> views, int count, std::uint64_t seed) {
+  std::vector<ViewId> sample(views.begin(), views.end());
+  const auto wanted = static_cast<std::size_t>(count);
+  if (sample.size() <= wanted) return sample;
+  Random random(seed);
+  for (std::size_t i = 0; i < wanted; ++i) {
+    std::swap(sample[i], sample[i + random.index(sample.size() - i)]);
+  }
+  sample.resize(wanted);
+  std::ranges::sort(sample);
+  return sample;
+}
+
+double quantile(std::vector<double> values, double share) {
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  std::ranges::sort(values);
+  const double place = share * static_cast<double>(values.size() - 1);
+  const auto below = static_cast<std::size_t>(place);
+  const std::size_t above = std::min(below + 1, values.size() - 1);
+  return values[below] + (place - std::floor(place)) * (values[above] - values[below]);
+}
+
+PackedSignature with_rows(PackedSignature signature, std::span<const std::uint8_t> allowed_rows) {
+  if (allowed_rows.empty()) return signature;
+  for (std::size_t i = 0; i < signature.magnitudes.size(); ++i) {
+    if (allowed_rows[i % allowed_rows.size()] == 0) signature.magnitudes[i] = 0;
+  }
+  return signature;
+}
+
+}  // namespace panonav

@@ -1,0 +1,171 @@
+#include "panonav/localisation/localiser.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "localisation/ray_cast_room.hpp"
+#include "panonav/core/error.hpp"
+
+namespace panonav::testing {
+namespace {
+
+TEST(Localiser, FindsAMemorisedViewItsPositionAndTheTurn) {
+  const RememberedRoom place(51, {}, 0.4);
+  const Localiser localiser(place.memory);
+  Random random(1);
+  for (const ViewId view : place.memory.views()) {
+    const ReferencePose& truth = *place.memory.info(view).pose;
+    const Localisation same = localiser.localise(place.memory.packed(view));
+    EXPECT_TRUE(same.known);
+    EXPECT_EQ(same.matches[0].view, view);
+    EXPECT_EQ(same.matches[0].dissimilarity, 0U);
+    ASSERT_TRUE(same.position && same.heading_rad);
+    EXPECT_NEAR(distance(same.position->position, truth.position()), 0.0, 1e-6);
+    EXPECT_NEAR(angle_difference(*same.heading_rad, *truth.heading_rad), 0.0, 1e-6);
+
+    // A turn on the spot changes the heading and nothing else, but for rounding to bytes.
+    const double turned_rad = random.uniform(-std::numbers::pi, std::numbers::pi);
+    const Localisation turned = localiser.localise(
+        pack(turn(place.memory.signature(view), turned_rad), place.memory.full_scale()));
+    EXPECT_TRUE(turned.known);
+    ASSERT_EQ(turned.matches.size(), same.matches.size());
+    for (std::size_t i = 0; i < same.matches.size(); ++i) {
+      EXPECT_EQ(turned.matches[i].view, same.matches[i].view);
+      EXPECT_EQ(turned.matches[i].dissimilarity, same.matches[i].dissimilarity);
+    }
+    ASSERT_TRUE(turned.matches[0].evidence.compass);
+    EXPECT_NEAR(angle_difference(turned.matches[0].evidence.compass->heading_rad, turned_rad), 0.0,
+                radians(0.5));
+    ASSERT_TRUE(turned.heading_rad);
+    EXPECT_NEAR(angle_difference(*turned.heading_rad, *truth.heading_rad + turned_rad), 0.0,
+                radians(0.5));
+    EXPECT_EQ(turned.position->position, same.position->position);
+  }
+}
+
+TEST(Localiser, HeadingBetweenReferencesIsBetterThanByTheNearestAlone) {
+  const RememberedRoom place(52, {}, 0.3);
+  const Localiser localiser(place.memory);
+  Random random(2);
+  double sum_interpolated = 0.0;
+  double sum_nearest = 0.0;
+  int count = 0;
+  for (int i = 0; i < 80; ++i) {
+    const Pose2 pose = place.room.between(place.grid, place.step_m, random);
+    const Localisation found = localiser.localise(
+        pack(compute_signature(place.room.see(pose)), place.memory.full_scale()));
+    if (!found.heading_rad) continue;
+    const auto& nearest = found.matches[0];
+    const double of_nearest =
+        *place.memory.info(nearest.view).pose->heading_rad + nearest.evidence.compass->heading_rad;
+    sum_interpolated += std::abs(angle_difference(*found.heading_rad, pose.heading_rad));
+    sum_nearest += std::abs(angle_difference(of_nearest, pose.heading_rad));
+    ++count;
+  }
+  ASSERT_GE(count, 76);
+  EXPECT_LT(sum_interpolated, 0.9 * sum_nearest);
+  EXPECT_LT(sum_interpolated / count, radians(1.0));
+}
+
+TEST(Localiser, ListsMatchesOfAnUnknownPlaceButClaimsNothing) {
+  const RememberedRoom place(53, {}, 0.3);
+  const Localiser localiser(place.memory, {.top = 4});
+  const Room elsewhere(777, {6.0, 3.0, 6, 0.2});
+  const Localisation found = localiser.localise(
+      pack(compute_signature(elsewhere.see({3.0, 1.5, 0.0})), place.memory.full_scale()));
+  EXPECT_FALSE(found.known);
+  EXPECT_EQ(found.matches.size(), 4U);
+  EXPECT_FALSE(found.position);
+  EXPECT_FALSE(found.heading_rad);
+  EXPECT_GT(found.bytes_read, 0U);
+}
+
+TEST(Localiser, KnowsNoAbsoluteHeadingWithoutHeadingsAndNoPositionWithoutPoses) {
+  RememberedRoom place(54, {}, 0.4);
+  for (const ViewId view : place.memory.views()) {
+    ReferencePose pose = *place.memory.info(view).pose;
+    pose.heading_rad.reset();
+    place.memory.set_pose(view, pose);
+  }
+  const PackedSignature query = place.memory.packed(place.memory.views()[5]);
+  const Localisation without_heading = Localiser(place.memory).localise(query);
+  EXPECT_TRUE(without_heading.known && without_heading.position);
+  EXPECT_FALSE(without_heading.heading_rad);
+  EXPECT_TRUE(without_heading.matches[0].evidence.compass);
+  for (const ViewId view : place.memory.views()) place.memory.set_pose(view, std::nullopt);
+  const Localisation without_pose = Localiser(place.memory).localise(query);
+  EXPECT_TRUE(without_pose.known);
+  EXPECT_FALSE(without_pose.position);
+  EXPECT_FALSE(without_pose.heading_rad);
+}
+
+TEST(Localiser, LeavesOutExcludedViewsAndRowsThatDoNotCount) {
+  const RememberedRoom place(55, {}, 0.4);
+  const Localiser localiser(place.memory);
+  const ViewId view = place.memory.views()[7];
+  const std::array excluded = {view};
+  const Localisation others = localiser.localise(place.memory.packed(view),
+                                                 {.excluded_views = excluded, .allowed_rows = {}});
+  for (const LocalisedMatch& match : others.matches) EXPECT_NE(match.view, view);
+  // Four rows are spoilt; without them the view is found as if nothing had happened.
+  PackedSignature spoilt = place.memory.packed(view);
+  std::vector<std::uint8_t> allowed(16, 1);
+  for (std::size_t i = 0; i < spoilt.magnitudes.size(); ++i) {
+    if (i % 16 < 4) spoilt.magnitudes[i] = 255;
+  }
+  for (int row = 0; row < 4; ++row) allowed[row] = 0;
+  const Localisation found =
+      localiser.localise(spoilt, {.excluded_views = {}, .allowed_rows = allowed});
+  EXPECT_EQ(found.matches[0].view, view);
+  EXPECT_EQ(found.matches[0].dissimilarity, 0U);
+  EXPECT_GT(found.matches[0].evidence.value, 20.0);
+  EXPECT_TRUE(found.known);
+}
+
+TEST(Localiser, ComparesTheComponentsAskedFor) {
+  const RememberedRoom place(56, {}, 0.4);
+  const Localiser localiser(place.memory, {.components = 4});
+  const Localisation found = localiser.localise(place.memory.packed(place.memory.views()[3]));
+  EXPECT_EQ(found.components, 4);
+  EXPECT_EQ(found.matches[0].dissimilarity, 0U);
+  EXPECT_NEAR(distance(found.position->position,
+                       place.memory.info(place.memory.views()[3]).pose->position()),
+              0.0, 1e-6);
+}
+
+TEST(Localiser, GivesTheSameAnswerWithModelsLearntBefore) {
+  const RememberedRoom place(57, {}, 0.4);
+  const Localiser one(place.memory);
+  const Localiser two(place.memory, one.place_model(), one.position_model());
+  Random random(3);
+  const PackedSignature query =
+      pack(compute_signature(place.room.see(place.room.between(place.grid, 0.4, random))),
+           place.memory.full_scale());
+  const Localisation a = one.localise(query);
+  const Localisation b = two.localise(query);
+  EXPECT_EQ(a.evidence, b.evidence);
+  EXPECT_EQ(a.heading_rad, b.heading_rad);
+  ASSERT_EQ(a.position.has_value(), b.position.has_value());
+  if (a.position) {
+    EXPECT_EQ(a.position->position, b.position->position);
+  }
+  EXPECT_THROW(Localiser(place.memory, one.place_model(), one.position_model(), {.components = 3}),
+               ContractError);
+}
+
+TEST(Localiser, RefusesBadInput) {
+  const RememberedRoom place(58, {}, 0.5);
+  EXPECT_THROW(Localiser(place.memory, {.top = 0}), OptionError);
+  EXPECT_THROW(Localiser(place.memory, {.components = 16}), ContractError);
+  const Localiser localiser(place.memory);
+  EXPECT_THROW(
+      (void)localiser.localise(pack(compute_signature(place.room.see({1, 1, 0}), 10), 1.0F)),
+      ContractError);
+}
+
+}  // namespace
+}  // namespace panonav::testing

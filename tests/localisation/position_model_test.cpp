@@ -1,0 +1,147 @@
+#include "panonav/localisation/position_model.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "localisation/ray_cast_room.hpp"
+#include "panonav/core/error.hpp"
+
+namespace panonav::testing {
+namespace {
+
+double share_below(std::vector<double> values, double share) {
+  std::ranges::sort(values);
+  return values.at(static_cast<std::size_t>(share * static_cast<double>(values.size() - 1)));
+}
+
+TEST(InterpolatedPosition, OfAMemorisedViewIsItsPosition) {
+  const RememberedRoom place(21, {}, 0.4);
+  const PositionModel model = learn_position_model(place.memory);
+  ASSERT_TRUE(model.learnt);
+  for (const ViewId view : place.memory.views()) {
+    const SearchResult found =
+        place.memory.search(place.memory.packed(view), {.top = PositionModel::candidates});
+    ASSERT_EQ(found.matches[0].dissimilarity, 0U);
+    const auto estimate = interpolate_position(place.memory, model, found.matches);
+    ASSERT_TRUE(estimate);
+    EXPECT_NEAR(distance(estimate->position, place.memory.info(view).pose->position()), 0.0, 1e-6);
+    ASSERT_TRUE(estimate->radius_m);
+    EXPECT_GT(*estimate->radius_m, 0.0);
+  }
+}
+
+TEST(InterpolatedPosition, WeightsSumToOneAndGiveThePosition) {
+  const RememberedRoom place(22, {}, 0.4);
+  const PositionModel model = learn_position_model(place.memory);
+  Random random(1);
+  for (int i = 0; i < 20; ++i) {
+    const Pose2 pose = place.room.between(place.grid, place.step_m, random);
+    const PackedSignature query =
+        pack(compute_signature(place.room.see(pose)), place.memory.full_scale());
+    const auto estimate = interpolate_position(
+        place.memory, model,
+        place.memory.search(query, {.top = PositionModel::candidates}).matches);
+    ASSERT_TRUE(estimate);
+    double sum = 0.0;
+    Point2 mean;
+    for (const PositionShare& share : estimate->shares) {
+      const Point2 p = place.memory.info(share.view).pose->position();
+      sum += share.weight;
+      mean = {mean.x_m + share.weight * p.x_m, mean.y_m + share.weight * p.y_m};
+      EXPECT_LE(distance(p, place.memory.info(estimate->shares[0].view).pose->position()),
+                model.neighbourhood_m);
+    }
+    EXPECT_NEAR(sum, 1.0, 1e-9);
+    EXPECT_NEAR(distance(mean, estimate->position), 0.0, 1e-9);
+  }
+}
+
+TEST(InterpolatedPosition, BeatsTheNearestReferenceAndItsRadiusHolds95PerCent) {
+  std::vector<double> nearest_errors;
+  std::vector<double> errors;
+  int inside = 0;
+  for (std::uint64_t seed = 30; seed < 34; ++seed) {
+    const RememberedRoom place(seed, {5.0, 4.0, seed % 2 == 0 ? 2 : 8, 0.12}, 0.3);
+    const PositionModel model = learn_position_model(place.memory);
+    Random random(seed, 3);
+    for (int i = 0; i < 50; ++i) {
+      const Pose2 pose = place.room.between(place.grid, place.step_m, random);
+      const PackedSignature query =
+          pack(compute_signature(place.room.see(pose, 16, 96, {1.0, 0.01}, random.next())),
+               place.memory.full_scale());
+      const SearchResult found = place.memory.search(query, {.top = PositionModel::candidates});
+      const auto estimate = interpolate_position(place.memory, model, found.matches);
+      ASSERT_TRUE(estimate && estimate->radius_m);
+      nearest_errors.push_back(
+          distance(place.memory.info(found.matches[0].view).pose->position(), pose.position()));
+      errors.push_back(distance(estimate->position, pose.position()));
+      inside += errors.back() <= *estimate->radius_m ? 1 : 0;
+    }
+  }
+  EXPECT_LT(share_below(errors, 0.5), 0.6 * share_below(nearest_errors, 0.5));
+  EXPECT_LT(share_below(errors, 0.95), share_below(nearest_errors, 0.95));
+  // 95 % of 200, less three standard errors.
+  EXPECT_GE(inside, 180);
+}
+
+TEST(PositionModel, OfFewOrUnposedViewsIsTheNearestReference) {
+  const RememberedRoom place(23, {}, 0.5);
+  std::vector<FourierSignature> views;
+  std::vector<std::optional<ReferencePose>> poses;
+  for (int i = 0; i < PositionModel::least_views; ++i) {
+    views.push_back(place.memory.signature(place.memory.views()[i]));
+    poses.push_back(place.memory.info(place.memory.views()[i]).pose);
+  }
+  poses[3].reset();
+  const VisualMemory memory = make_memory(views, poses);
+  const PositionModel model = learn_position_model(memory);
+  EXPECT_FALSE(model.learnt);
+  const auto matches_of = [&](std::size_t i) {
+    return memory.search(memory.packed(memory.views()[i])).matches;
+  };
+  const auto estimate = interpolate_position(memory, model, matches_of(1));
+  ASSERT_TRUE(estimate);
+  EXPECT_EQ(estimate->position, poses[1]->position());
+  EXPECT_FALSE(estimate->radius_m);  // nothing to learn it from
+  EXPECT_FALSE(interpolate_position(memory, model, matches_of(3)));
+  EXPECT_FALSE(interpolate_position(memory, model, {}));
+}
+
+TEST(PositionModel, StandsCoincidentAndEqualViews) {
+  const Room room(24, {});
+  const std::vector<Point2> grid = room.grid(0.5);
+  std::vector<FourierSignature> views;
+  std::vector<std::optional<ReferencePose>> poses;
+  for (int i = 0; i < 30; ++i) {  // a robot that stands still now and then
+    const Point2 p = grid[static_cast<std::size_t>(i / 3)];
+    views.push_back(compute_signature(room.see({p.x_m, p.y_m, 0.0})));
+    poses.push_back(ReferencePose{p.x_m, p.y_m, 0.0});
+  }
+  const VisualMemory memory = make_memory(views, poses);
+  const PositionModel model = learn_position_model(memory);
+  for (const ViewId view : memory.views()) {
+    const auto estimate = interpolate_position(
+        memory, model, memory.search(memory.packed(view), {.top = 24}).matches);
+    ASSERT_TRUE(estimate);
+    EXPECT_NEAR(distance(estimate->position, memory.info(view).pose->position()), 0.0, 1e-6);
+  }
+  // All at one place: no spacing, nothing to interpolate.
+  for (auto& pose : poses) pose = ReferencePose{1.0, 1.0, 0.0};
+  EXPECT_FALSE(learn_position_model(make_memory(views, poses)).learnt);
+}
+
+TEST(PositionModel, IsTheSameForTheSameSeed) {
+  const RememberedRoom place(25, {}, 0.4);
+  const PositionModel a = learn_position_model(place.memory, {.sampled_views = 15});
+  const PositionModel b = learn_position_model(place.memory, {.sampled_views = 15});
+  EXPECT_EQ(a.sampled_views, 15);
+  EXPECT_EQ(a.radius_m_per_deviation, b.radius_m_per_deviation);
+  EXPECT_EQ(a.neighbourhood_m, b.neighbourhood_m);
+  EXPECT_THROW((void)learn_position_model(place.memory, {.sampled_views = 0}), OptionError);
+  EXPECT_THROW((void)learn_position_model(place.memory, {.components = 99}), ContractError);
+}
+
+}  // namespace
+}  // namespace panonav::testing
