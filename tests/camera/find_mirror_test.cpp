@@ -90,10 +90,10 @@ std::vector<NamedPicture> pictures() {
   add("noisy", [](MirrorPicture& p) { p.noise = 12; });
   add("blurred", [](MirrorPicture& p) { p.blur_px = 2.5; });
   add("large_square_sensor", [](MirrorPicture& p) {
-    p.size = {1280, 1280};
-    p.centre = {655.2, 620.8};
-    p.rim_px = 560;
-    p.disc_px = 130;
+    p.size = {960, 960};
+    p.centre = {491.2, 470.8};
+    p.rim_px = 420;
+    p.disc_px = 98;
   });
   add("small_sensor", [](MirrorPicture& p) {
     p.size = {160, 120};
@@ -157,7 +157,7 @@ TEST(FindMirror, ManySeedsOfAllKinds) {
   // Known limits, stated in find_mirror.hpp: between surroundings as patterned as the scene some
   // mirrors are not found, and a ring as grey as the scene beside it is taken for a part of the
   // mirror.
-  constexpr int count = 40;
+  constexpr int count = 24;
   int plain = 0;
   int plain_found = 0;
   int found = 0;
@@ -194,7 +194,7 @@ TEST(FindMirror, ManySeedsOfAllKinds) {
 TEST(FindMirror, PicturesWithoutAMirrorGiveNothing) {
   for (const Plain kind : {Plain::black, Plain::noise, Plain::gradient, Plain::patches,
                            Plain::checkerboard, Plain::stripes, Plain::discs}) {
-    for (std::uint64_t seed = 0; seed < 4; ++seed) {
+    for (std::uint64_t seed = 0; seed < 3; ++seed) {
       const auto mirror = find_in(paint_without_mirror(kind, {320, 240}, seed));
       EXPECT_FALSE(mirror) << "kind " << static_cast<int>(kind) << " seed " << seed << " quality "
                            << mirror->quality << " radius " << mirror->rim_radius_px;

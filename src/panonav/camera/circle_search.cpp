@@ -16,8 +16,9 @@ namespace {
 constexpr double pi = std::numbers::pi;
 constexpr int coarse_directions = 96;
 
-int samples_on(double radius) {
-  return std::clamp(static_cast<int>(2 * pi * radius / 1.5), 48, 720);
+/// One sample for each `spacing` of circumference, 48 to 720.
+int samples_on(double radius, double spacing) {
+  return std::clamp(static_cast<int>(2 * pi * radius / spacing), 48, 720);
 }
 
 std::size_t index(int width, int u, int v) {
@@ -297,7 +298,7 @@ std::optional<CircleFit> fit_points(const std::vector<EdgePoint>& points, FieldC
 }  // namespace
 
 CircleScore score(const EdgeField& field, const FieldCircle& circle, Evenness evenness) {
-  const int count = samples_on(circle.radius);
+  const int count = samples_on(circle.radius, 3.0);
   SectorScore total;
   // One turn in equal steps by rotating a unit vector; the rounding of 720 steps stays below 1e-12.
   const double step_cosine = std::cos(2 * pi / count);
@@ -416,7 +417,7 @@ std::vector<FieldCircle> concentric_candidates(const EdgeField& field, double u,
 FieldCircle climb(const EdgeField& field, const FieldCircle& start, const CircleRange& range) {
   FieldCircle best = start;
   double best_merit = figure_of_merit(score(field, best, range.evenness), range);
-  for (double step = 4; step >= 0.25; step /= 2) {
+  for (double step = 2; step >= 0.25; step /= 2) {
     for (int round = 0; round < 20; ++round) {
       const FieldCircle from = best;
       bool better = false;
@@ -452,7 +453,7 @@ std::optional<CircleFit> fit_circle(std::span<const SmoothPlanes> images,
   // Half the window at first: what the coarse search may be off; at last: the width of an edge.
   for (const double reach :
        {std::max(4.0, 0.03 * start.radius), std::max(3.0, 0.01 * start.radius), 2.5, 2.5}) {
-    const int count = samples_on(circle.radius);
+    const int count = samples_on(circle.radius, 1.5);
     std::vector<EdgePoint> points;
     int visible = 0;
     for (int i = 0; i < count; ++i) {

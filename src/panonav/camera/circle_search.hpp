@@ -30,7 +30,7 @@ struct CircleScore {
   double visible = 0.0;  ///< part of the circumference inside the frame
 };
 
-/// Scores a circle on about one sample for each 1.5 px of circumference, 48 to 720.
+/// Scores a circle on about one sample for each 3 px of circumference, 48 to 720.
 [[nodiscard]] CircleScore score(const EdgeField& field, const FieldCircle& circle,
                                 Evenness evenness);
 
@@ -53,7 +53,7 @@ struct CircleRange {
                                                              double v, double centre_reach,
                                                              const CircleRange& range, double step);
 
-/// Climbs from a circle to the nearest maximum of quality * sqrt(visible), steps 4 px down to 1/4
+/// Climbs from a circle to the nearest maximum of quality * sqrt(visible), steps 2 px down to 1/4
 /// px.
 [[nodiscard]] FieldCircle climb(const EdgeField& field, const FieldCircle& start,
                                 const CircleRange& range);
