@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -118,6 +119,72 @@ TEST_F(DatasetFolder, EveryFaultHasItsLine) {
   expect_error("elevation_deg is [40, -30]");
   write("dataset.toml", "[images\n");
   expect_error("is not TOML");
+}
+
+TEST_F(DatasetFolder, MirrorPicturesWithTheirCameraAndMask) {
+  Camera camera;
+  camera.model = EquiangularModel{-0.6, 0.4};
+  camera.image_size = {160, 120};
+  camera.centre = {80.5, 59.0};
+  camera.rim_radius_px = 55.0;
+  camera.inner_radius_px = 12.0;
+  camera.forward_angle_rad = 0.25;
+  Image mask(160, 120);
+  for (int v = 0; v < 120; ++v) {
+    for (int u = 0; u < 80; ++u) mask.at(u, v) = 255;
+  }
+  Dataset dataset;
+  dataset.folder = folder;
+  dataset.source.kind = PictureKind::mirror;
+  dataset.source.camera = camera;
+  dataset.source.mask = mask;
+  dataset.source.layout.kept_elevations = ElevationBand{-0.5, 0.25};
+  Image white(160, 120);
+  for (auto& value : white.pixels()) value = 255;
+  write_png(folder / "white, \"1\".png", white.view());
+  dataset.entries.push_back({.file = "white, \"1\".png",
+                             .path = folder / "white, \"1\".png",
+                             .stamp_s = 0.5,
+                             .pose = {},
+                             .odometry = {}});
+  write_dataset(dataset);
+  EXPECT_TRUE(fs::exists(folder / "images.csv"));
+  const Dataset back = read_dataset(folder);
+  ASSERT_EQ(back.entries.size(), 1U);
+  EXPECT_EQ(back.entries[0], dataset.entries[0]);
+  EXPECT_EQ(back.source.camera->centre, camera.centre);
+  EXPECT_NEAR(back.source.camera->forward_angle_rad, 0.25, 1e-12);
+  EXPECT_EQ(back.source.mask, mask);
+  EXPECT_NEAR(back.source.layout.kept_elevations->bottom_rad, -0.5, 1e-12);
+
+  // What the mask covers is black; what it leaves is as in the picture. Columns next to the mask's
+  // border mix both.
+  const Panorama view = PanoramaReader(back.source, {16, 64}).read(back.entries[0].path);
+  int seen = 0;
+  int covered = 0;
+  for (int column = 0; column < view.columns(); ++column) {
+    const auto point =
+        project(*back.source.camera,
+                Direction3::from_angles(view.azimuth_rad(column), view.elevation_rad(8)));
+    ASSERT_TRUE(point);
+    if (std::abs(point->u_px - 80.0) < 12.0) continue;
+    EXPECT_NEAR(view.at(8, column), point->u_px < 80.0 ? 1.0F : 0.0F, 0.02F) << column;
+    (point->u_px < 80.0 ? seen : covered) += 1;
+  }
+  EXPECT_GT(seen, 10);
+  EXPECT_GT(covered, 10);
+}
+
+TEST_F(DatasetFolder, WhatCannotBeReadBackIsNotWritten) {
+  Dataset dataset = read_dataset(folder);
+  dataset.entries[1].pose.reset();
+  EXPECT_THROW(write_dataset(dataset), ContractError);
+  dataset = read_dataset(folder);
+  dataset.entries[0].file = "two\nlines.png";
+  EXPECT_THROW(write_dataset(dataset), ContractError);
+  dataset.entries.clear();
+  EXPECT_THROW(write_dataset(dataset), ContractError);
+  EXPECT_EQ(read_dataset(folder).entries.size(), 2U);
 }
 
 TEST_F(DatasetFolder, APlainFolderIsReadInNaturalOrder) {

@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 #include <set>
+#include <span>
 #include <utility>
 
 #include "panonav/camera/model_parameters.hpp"
@@ -126,10 +127,9 @@ class SettingsReader {
             "0 .. 2^31 - 1");
     return static_cast<int>(value);
   }
-  template <std::size_t count>
-  std::size_t choice(const std::string& key, const std::array<std::string_view, count>& names) {
+  std::size_t choice(const std::string& key, std::span<const std::string_view> names) {
     const auto& name = get<std::string>(key);
-    for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t i = 0; i < names.size(); ++i) {
       if (names[i] == name) return i;
     }
     throw ContractError(key, name, "a name in docs/formats.md");
@@ -154,38 +154,24 @@ class SettingsReader {
   std::set<std::string> used_;
 };
 
+// Every option must be there: a default that changes must not change what a file means.
 class OptionReader final : public OptionVisitor {
  public:
   explicit OptionReader(SettingsReader& reader) : reader_(reader) {}
-  void visit(const OptionInfo& info, int& value) override {
-    if (const auto* found = reader_.find<std::int64_t>(joined(preprocessing_prefix, info.name))) {
-      for (const auto& fault : option_faults(info, static_cast<double>(*found))) {
-        throw OptionError(fault);
-      }
-      value = static_cast<int>(*found);
-    }
-  }
+  void visit(const OptionInfo& info, int& value) override { value = reader_.integer(key(info)); }
   void visit(const OptionInfo& info, double& value) override {
-    if (const auto* found = reader_.find<double>(joined(preprocessing_prefix, info.name))) {
-      value = *found;
-    }
+    value = reader_.get<double>(key(info));
   }
   void visit(const OptionInfo& info, bool& value) override {
-    if (const auto* found = reader_.find<std::int64_t>(joined(preprocessing_prefix, info.name))) {
-      value = *found != 0;
-    }
+    value = reader_.integer(key(info)) != 0;
   }
   void visit(const OptionInfo& info, std::span<const std::string_view> choices,
              int& value) override {
-    const auto* found = reader_.find<std::string>(joined(preprocessing_prefix, info.name));
-    if (found == nullptr) return;
-    value = -1;
-    for (std::size_t i = 0; i < choices.size(); ++i) {
-      if (choices[i] == *found) value = static_cast<int>(i);
-    }
+    value = static_cast<int>(reader_.choice(key(info), choices));
   }
 
  private:
+  static std::string key(const OptionInfo& info) { return joined(preprocessing_prefix, info.name); }
   SettingsReader& reader_;
 };
 
