@@ -85,6 +85,16 @@ TEST(PlaceModel, OfATinyMemoryIsNotLearnt) {
   EXPECT_FALSE(Localiser(empty).localise(pack(views[0], 1.0F)).known);
 }
 
+TEST(PlaceModel, OfARobotThatStoodStillKnowsItsPlaceTurnedAndNoOther) {
+  const FourierSignature view = compute_signature(some_view(8));
+  const std::vector<FourierSignature> views(20, view);
+  const VisualMemory memory = make_memory(views, std::vector<std::optional<ReferencePose>>(20));
+  const Localiser localiser(memory);
+  EXPECT_TRUE(localiser.localise(pack(turn(view, 2.0), memory.full_scale())).known);
+  EXPECT_FALSE(
+      localiser.localise(pack(compute_signature(some_view(9)), memory.full_scale())).known);
+}
+
 TEST(PlaceModel, IsTheSameForTheSameSeedAndBoundedInItsSample) {
   const RememberedRoom place(11, {}, 0.4);
   const PlaceModelOptions options{.sampled_views = 20};

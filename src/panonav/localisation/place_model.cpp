@@ -248,8 +248,8 @@ PlaceModel learn_place_model(const VisualMemory& memory, const PlaceModelOptions
   const double deviation = median - quantile(strangers, 0.1587);
   model.impostor_high =
       median + normal_quantile(1.0 - options.accepted_share / options.candidates) * deviation;
-  model.threshold =
-      std::min(model.genuine_low + 0.5 * model.density_gain, model.impostor_high + ample_margin);
+  model.threshold = std::min({model.genuine_low + 0.5 * model.density_gain,
+                              model.impostor_high + ample_margin, PlaceModel::highest_threshold});
   model.learnt = true;
   return model;
 }

@@ -40,6 +40,9 @@ void visit_options(PlaceModelOptions& options, OptionVisitor& visitor);
 struct PlaceModel {
   /// The threshold of a memory that is too small to learn from: both correlations 0.95.
   static constexpr double unlearnt_threshold = 5.9915;
+  /// Both correlations 0.9975. More is never asked for: of a memory of equal views, from a robot
+  /// that stood still, rounding would decide.
+  static constexpr double highest_threshold = 2.0 * unlearnt_threshold;
   /// Fewest views to learn from.
   static constexpr int least_views = 8;
 
