@@ -169,6 +169,22 @@ TEST(MemoryFileCrash, AFullDiskWhileCreatingLeavesNothing) {
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 
+TEST(MemoryFileCrash, AFullDiskDoesNotKeepAMemoryFromBeingRead) {
+  const TemporaryFolder folder;
+  const auto path = folder / "m.panonav";
+  {
+    MemoryFile file = MemoryFile::create(path, small_header());
+    file.append(numbered_view(small_header().shape, 0));
+  }
+  EXPECT_EQ(exit_code_of(start_child([&] {
+              ::signal(SIGXFSZ, SIG_IGN);
+              const rlimit limit{0, 0};
+              if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) return 1;
+              return MemoryFile::open(path, Access::read_only).load().size() == 1 ? 0 : 2;
+            })),
+            0);
+}
+
 // Runs `body` without the rights of the superuser, for whom no file is read-only.
 int as_ordinary_user(const std::function<int()>& body) {
   return exit_code_of(start_child([&] {

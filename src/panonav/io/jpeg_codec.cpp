@@ -122,6 +122,9 @@ ImageSize jpeg_size(std::span<const std::uint8_t> bytes, std::string_view name) 
 Image decode_jpeg(std::span<const std::uint8_t> bytes, std::string_view name) {
   Reader reader;
   const ImageSize size = open(reader, bytes, name);
+  if (reader.jpeg.jpeg_color_space == JCS_CMYK || reader.jpeg.jpeg_color_space == JCS_YCCK) {
+    throw FileError(name, "is a JPEG in printing colours (CMYK); allowed: grey, RGB");
+  }
   if (!start_steps(reader)) fail(reader, name);
   const int channels = reader.jpeg.output_components;
   if (static_cast<int>(reader.jpeg.output_width) != size.width ||

@@ -128,23 +128,29 @@ Database open_memory_database(const fs::path& path, Access access) {
     database.execute("PRAGMA synchronous=FULL");
     return database;
   }
-  if (may_write) {
-    // Opened for writing so that SQLite can clear its log away in the end; no statement may write.
-    Database database(file, DatabaseMode::change);
-    database.execute("PRAGMA query_only=ON");
-    return database;
-  }
   const fs::path log = with_suffix(file, "-wal");
-  const bool log_empty = !fs::exists(log, ignored) || fs::file_size(log, ignored) == 0;
-  const bool shared = fs::exists(with_suffix(file, "-shm"), ignored);
-  // Without a log nobody is writing, and a reader without permission cannot make one.
-  if (log_empty && !shared) return {file, DatabaseMode::immutable};
+  const auto empty = [&](const fs::path& part) {
+    return !fs::exists(part, ignored) || fs::file_size(part, ignored) == 0;
+  };
+  // Nobody has the file open for writing and nobody left changes behind.
+  const auto at_rest = [&] { return empty(log) && empty(with_suffix(file, "-shm")); };
+  // A reader without permission cannot make the log that SQLite wants to find.
+  if (!may_write && at_rest()) {
+    return {file, DatabaseMode::immutable};
+  }
   try {
-    Database database(file, DatabaseMode::read);
+    // Opened for writing, where that is possible, so that SQLite can clear its log away in the end;
+    // no statement may write.
+    Database database(file, may_write ? DatabaseMode::change : DatabaseMode::read);
+    database.execute("PRAGMA query_only=ON");
+    // The first look at the file: now SQLite makes or finds its log.
     static_cast<void>(database.integer("PRAGMA schema_version"));
     return database;
   } catch (const FileError&) {
-    if (log_empty) return {file, DatabaseMode::immutable};
+    // No room for a log on a full disk, or a file system that cannot share one. A file that is
+    // damaged is found to be so again.
+    if (at_rest()) return {file, DatabaseMode::immutable};
+    if (may_write || empty(log)) throw;
     throw FileError(name,
                     "has changes in " + log.string() +
                         " that can be read only with permission to write the folder; open the "
