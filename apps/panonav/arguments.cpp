@@ -11,6 +11,7 @@
 
 #include "option_values.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/io/option_file.hpp"
 
 namespace panonav::command {
 
@@ -23,7 +24,7 @@ struct Arguments::Implementation {
     std::string name;
     Visit visit;
     std::function<void()> check;
-    OptionTexts texts;  ///< what was typed, by option name
+    OptionEntries entries;
   };
   CLI::App& app;
   std::deque<Section> sections;  // a deque: the parser keeps references into it
@@ -41,8 +42,8 @@ std::string flag_of(std::string_view name) {
 /// Adds a flag for each member that it visits, and remembers what is typed as text.
 class FlagDeclarer final : public OptionVisitor {
  public:
-  FlagDeclarer(CLI::App& app, std::string group, std::string prefix, OptionTexts& texts)
-      : app_(app), group_(std::move(group)), prefix_(std::move(prefix)), texts_(texts) {}
+  FlagDeclarer(CLI::App& app, std::string group, std::string prefix, OptionEntries& entries)
+      : app_(app), group_(std::move(group)), prefix_(std::move(prefix)), entries_(entries) {}
 
   void visit(const OptionInfo& info, int& value) override {
     declare(info, "INT", std::to_string(value), range_text(info));
@@ -63,7 +64,7 @@ class FlagDeclarer final : public OptionVisitor {
  private:
   void declare(const OptionInfo& info, const std::string& type, const std::string& initial,
                const std::string& range) {
-    auto& text = texts_[std::string(info.name)];
+    auto& text = entries_[std::string(info.name)].text;
     std::string help(info.help);
     help += " (default " + initial;
     if (range != "any finite number") help += "; " + range;
@@ -74,7 +75,7 @@ class FlagDeclarer final : public OptionVisitor {
   CLI::App& app_;
   std::string group_;
   std::string prefix_;
-  OptionTexts& texts_;
+  OptionEntries& entries_;
 };
 
 int whole_number(const std::string& flag, const std::string& text, int low) {
@@ -193,6 +194,7 @@ void Arguments::option(const std::string& flag, std::optional<std::pair<double, 
           },
           help)
       ->type_size(2)
+      ->expected(1)
       ->type_name("LOW HIGH");
 }
 
@@ -233,23 +235,39 @@ void Arguments::add_section(const std::string& section, const std::string& prefi
   auto& added = implementation_->sections.emplace_back(
       Implementation::Section{section, std::move(visit), std::move(check), {}});
   FlagDeclarer declarer(implementation_->app, "Options of [" + section + "]",
-                        prefix.empty() ? "" : prefix + "_", added.texts);
+                        prefix.empty() ? "" : prefix + "_", added.entries);
   added.visit(declarer);
 }
 
-void Arguments::resolve(const std::optional<std::string>& /*config*/) {
+void Arguments::resolve(const std::optional<std::string>& config,
+                        std::span<const std::string_view> known_sections) {
+  std::optional<OptionFile> file;
+  if (config) {
+    file.emplace(*config);
+    file->require_sections(known_sections);
+  }
   for (auto& section : implementation_->sections) {
-    TextApplier applier(section.texts);
+    if (file) {
+      file->apply(section.name, section.visit);
+      for (auto& [option, entry] : section.entries) entry.in_file = file->has(section.name, option);
+    }
+    TextApplier applier(section.entries);
     section.visit(applier);
     section.check();
   }
 }
 
+std::vector<std::string_view> Arguments::sections() const {
+  std::vector<std::string_view> names;
+  for (const auto& section : implementation_->sections) names.emplace_back(section.name);
+  return names;
+}
+
 bool Arguments::given(const std::string& section, const std::string& name) const {
   for (const auto& candidate : implementation_->sections) {
     if (candidate.name != section) continue;
-    for (const auto& [option, text] : candidate.texts) {
-      if (text && (name.empty() || name == option)) return true;
+    for (const auto& [option, entry] : candidate.entries) {
+      if ((entry.text || entry.in_file) && (name.empty() || name == option)) return true;
     }
   }
   return false;
@@ -314,10 +332,16 @@ std::optional<ParsedCommand> parse(std::span<const Verb> verbs, int argc, const 
   } catch (const CLI::ParseError& error) {
     throw UsageError(one_line(error));
   }
+  // One file may serve several verbs, so the sections of all of them are allowed in it.
+  std::vector<std::string_view> sections;
+  for (const auto& entry : declared) {
+    const auto more = entry.arguments->sections();
+    sections.insert(sections.end(), more.begin(), more.end());
+  }
   for (std::size_t i = 0; i < declared.size(); ++i) {
     if (!declared[i].app->parsed()) continue;
     const auto& entry = declared[i];
-    entry.arguments->resolve(entry.common.config);
+    entry.arguments->resolve(entry.common.config, sections);
     return ParsedCommand{verbs[i].name, entry.common,
                          [arguments = entry.arguments, run = entry.run](Session& session) {
                            return run(session);  // with its arguments still alive

@@ -76,8 +76,11 @@ class Arguments {
   /// Meaningful once the verb runs.
   [[nodiscard]] bool given(const std::string& section, const std::string& name = "") const;
 
-  /// Fills the option structs once everything is typed: file first, then flags, then checks.
-  void resolve(const std::optional<std::string>& config);
+  /// Fills the option structs once everything is typed: file first, then flags, then checks. Other
+  /// sections of the file than `known_sections` are refused.
+  void resolve(const std::optional<std::string>& config,
+               std::span<const std::string_view> known_sections);
+  [[nodiscard]] std::vector<std::string_view> sections() const;
 
  private:
   using Visit = std::function<void(OptionVisitor&)>;

@@ -26,8 +26,8 @@ double number_from_text(std::string_view flag, std::string_view text) {
 }
 
 const std::string* TextApplier::text(const OptionInfo& info) const {
-  const auto found = texts_.find(std::string(info.name));
-  return found != texts_.end() && found->second ? &*found->second : nullptr;
+  const auto found = entries_.find(std::string(info.name));
+  return found != entries_.end() && found->second.text ? &*found->second.text : nullptr;
 }
 
 void TextApplier::visit(const OptionInfo& info, int& value) {

@@ -9,8 +9,14 @@
 
 namespace panonav::command {
 
-/// What was typed for each option of a struct, by the option's name; empty where nothing was.
-using OptionTexts = std::map<std::string, std::optional<std::string>>;
+/// What the user said of one option of a struct.
+struct OptionEntry {
+  std::optional<std::string> text;  ///< typed on the command line
+  bool in_file = false;             ///< given in the --config file
+};
+
+/// By the option's name.
+using OptionEntries = std::map<std::string, OptionEntry>;
 
 /// Throws UsageError unless the whole text is one finite number.
 [[nodiscard]] double number_from_text(std::string_view flag, std::string_view text);
@@ -19,7 +25,7 @@ using OptionTexts = std::map<std::string, std::optional<std::string>>;
 /// ranges are left to `validate`.
 class TextApplier final : public OptionVisitor {
  public:
-  explicit TextApplier(const OptionTexts& texts) : texts_(texts) {}
+  explicit TextApplier(const OptionEntries& entries) : entries_(entries) {}
   void visit(const OptionInfo& info, int& value) override;
   void visit(const OptionInfo& info, double& value) override;
   void visit(const OptionInfo& info, bool& value) override;
@@ -28,7 +34,7 @@ class TextApplier final : public OptionVisitor {
 
  private:
   [[nodiscard]] const std::string* text(const OptionInfo& info) const;
-  const OptionTexts& texts_;
+  const OptionEntries& entries_;
 };
 
 }  // namespace panonav::command

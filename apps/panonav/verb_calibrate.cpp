@@ -80,7 +80,7 @@ struct CalibrateArguments {
   MirrorOptions mirror;
 };
 
-std::vector<Image> read_images(const std::vector<std::string>& paths, Session& session) {
+std::vector<Image> read_images(const std::vector<std::string>& paths) {
   std::vector<Image> images;
   Progress progress("reading", paths.size());
   for (const auto& path : paths) {
@@ -165,7 +165,7 @@ void print_text(const Arguments& arguments, const CalibrateArguments& wanted,
 }
 
 ExitCode calibrate(const Arguments& arguments, const CalibrateArguments& wanted, Session& session) {
-  const auto images = read_images(wanted.images, session);
+  const auto images = read_images(wanted.images);
   std::vector<ImageView> views;
   for (const auto& image : images) views.push_back(image.view());
   const auto mirror = find_mirror(views, wanted.search);

@@ -4,7 +4,14 @@ namespace panonav::command {
 
 std::vector<Verb> all_verbs() {
   return {
-      unwrap_verb(),
+#ifdef PANONAV_COMMAND_SIMULATES
+      demo_verb(),      simulate_verb(),
+#endif
+      calibrate_verb(), unwrap_verb(),    memorise_verb(), info_verb(),
+      verify_verb(),    forget_verb(),    localise_verb(),
+#ifdef PANONAV_COMMAND_SIMULATES
+      evaluate_verb(),  reproduce_verb(),
+#endif
   };
 }
 

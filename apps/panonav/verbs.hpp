@@ -10,10 +10,14 @@ namespace panonav::command {
 [[nodiscard]] std::vector<Verb> all_verbs();
 
 [[nodiscard]] Verb calibrate_verb();
+[[nodiscard]] Verb demo_verb();
+[[nodiscard]] Verb evaluate_verb();
 [[nodiscard]] Verb forget_verb();
 [[nodiscard]] Verb info_verb();
 [[nodiscard]] Verb localise_verb();
 [[nodiscard]] Verb memorise_verb();
+[[nodiscard]] Verb reproduce_verb();
+[[nodiscard]] Verb simulate_verb();
 [[nodiscard]] Verb unwrap_verb();
 [[nodiscard]] Verb verify_verb();
 

@@ -48,6 +48,12 @@ Image LandmarkWorld::picture(const Pose2& pose, int columns, int rows) const {
   return image;
 }
 
+void LandmarkWorld::write_picture(const std::filesystem::path& path, const Pose2& pose, int columns,
+                                  int rows) const {
+  const Image image = picture(pose, columns, rows);
+  write_png(path, image.view());
+}
+
 std::vector<Pose2> grid_poses(int side) {
   std::vector<Pose2> poses;
   for (int i = 0; i < side; ++i) {
@@ -76,7 +82,7 @@ void write_dataset(const std::filesystem::path& folder, const LandmarkWorld& wor
   std::filesystem::create_directories(folder);
   std::string csv = "file,x_m,y_m,heading_deg\n";
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    write_png(folder / view_name(i), world.picture(poses[i]).view());
+    world.write_picture(folder / view_name(i), poses[i]);
     csv += view_name(i) + "," + to_text(poses[i].x_m) + "," + to_text(poses[i].y_m) + "," +
            to_text(degrees(poses[i].heading_rad)) + "\n";
   }

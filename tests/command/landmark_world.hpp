@@ -17,6 +17,8 @@ class LandmarkWorld {
   explicit LandmarkWorld(std::uint64_t seed);
   /// A grey panorama as a 360 degree camera writes it: clockwise, forward in the middle.
   [[nodiscard]] Image picture(const Pose2& pose, int columns = 96, int rows = 12) const;
+  void write_picture(const std::filesystem::path& path, const Pose2& pose, int columns = 96,
+                     int rows = 12) const;
 
  private:
   struct Post {

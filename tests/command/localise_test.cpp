@@ -7,7 +7,6 @@
 #include "command_runner.hpp"
 #include "landmark_world.hpp"
 #include "panonav/core/random.hpp"
-#include "panonav/io/image_file.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -198,8 +197,8 @@ TEST_F(Localise, WrongArgumentsAreRefused) {
 TEST_F(Localise, ViewsOfAnotherSizeAreRefused) {
   write_dataset(folder_->path() / "small", *world_, grid_poses(2));
   for (int i = 0; i < 4; ++i) {
-    write_png(folder_->path() / "small" / view_name(static_cast<std::size_t>(i)),
-              world_->picture({0.5 * i, 0.0, 0.0}, 96, 10).view());
+    world_->write_picture(folder_->path() / "small" / view_name(static_cast<std::size_t>(i)),
+                          {0.5 * i, 0.0, 0.0}, 96, 10);
   }
   const auto line = refusal({"localise", memory(), *folder_ / "small"});
   EXPECT_NE(line.find("view_000.png"), std::string::npos) << line;

@@ -6,7 +6,6 @@
 
 #include "command_runner.hpp"
 #include "landmark_world.hpp"
-#include "panonav/io/image_file.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -160,7 +159,7 @@ TEST_F(BadInput, ImageCutShort) {
 }
 
 TEST_F(BadInput, WrongSize) {
-  write_png(data() / view_name(5), world_.picture({0.0, 0.0, 0.0}, 96, 9).view());
+  world_.write_picture(data() / view_name(5), {0.0, 0.0, 0.0}, 96, 9);
   expect_refused({view_name(5), "9", "12"});
 }
 
@@ -203,14 +202,14 @@ TEST_F(BadInput, ZeroComponents) {
 
 TEST_F(BadInput, RowsThatDoNotMatchTheMemory) {
   for (std::size_t i = 0; i < 16; ++i) {
-    write_png(data() / view_name(i), world_.picture({0.0, 0.0, 0.0}, 96, 9).view());
+    world_.write_picture(data() / view_name(i), {0.0, 0.0, 0.0}, 96, 9);
   }
   expect_refused({"9", "12"});
 }
 
 TEST_F(BadInput, ColumnsThatDoNotMatchTheMemory) {
   for (std::size_t i = 0; i < 16; ++i) {
-    write_png(data() / view_name(i), world_.picture({0.0, 0.0, 0.0}, 80, 12).view());
+    world_.write_picture(data() / view_name(i), {0.0, 0.0, 0.0}, 80, 12);
   }
   expect_refused({"80", "96"});
 }

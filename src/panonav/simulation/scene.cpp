@@ -47,8 +47,8 @@ void validate(const Scene& scene) {
   for (const PointLight& light : scene.lights) {
     if (!finite(light.position)) throw ContractError("light position", "not finite", "finite");
     require(std::isfinite(light.intensity), "light intensity", light.intensity, "finite");
-    require(light.radius_m >= 0.0F && std::isfinite(light.radius_m), "light radius_m", light.radius_m,
-            ">= 0");
+    require(light.radius_m >= 0.0F && std::isfinite(light.radius_m), "light radius_m",
+            light.radius_m, ">= 0");
   }
   for (const DirectionalLight& light : scene.directional_lights) {
     require(std::isfinite(light.intensity), "light intensity", light.intensity, "finite");

@@ -1,0 +1,173 @@
+#include "simulated_recording.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+
+#include "panonav/core/error.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav/simulation/load_gazebo.hpp"
+#include "panonav/simulation/load_mesh.hpp"
+#include "panonav/simulation/mirror.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+Scene load_scene(const std::string& name, const SimulationOptions& options) {
+  const auto names = scene_names();
+  if (std::find(names.begin(), names.end(), name) != names.end()) {
+    return make_scene(name, {.seed = static_cast<std::uint64_t>(options.scene_seed),
+                             .moved_objects = options.moved_objects,
+                             .moved_seed = static_cast<std::uint64_t>(options.moved_seed),
+                             .light = options.light});
+  }
+  std::error_code ignored;
+  if (!fs::is_regular_file(name, ignored)) {
+    std::string all;
+    for (const auto known : names) all += (all.empty() ? "" : ", ") + std::string(known);
+    throw UsageError("'" + name + "' is neither a file nor a built-in scene; allowed: " + all);
+  }
+  Scene scene;
+  std::string ending = fs::path(name).extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (ending == ".world" || ending == ".sdf") {
+    GazeboOptions gazebo;
+    gazebo.textures.read = [](const fs::path& path) { return read_image(path); };
+    gazebo.model_folders = gazebo_model_folders_of_environment();
+    scene = load_gazebo(name, gazebo);
+  } else {
+    MeshOptions mesh;
+    mesh.textures.read = [](const fs::path& path) { return read_image(path); };
+    scene = load_mesh(name, mesh);
+  }
+  // Built-in scenes do this themselves.
+  const auto light = static_cast<float>(options.light);
+  scene.ambient *= light;
+  for (auto& lamp : scene.lights) lamp.intensity *= light;
+  for (auto& lamp : scene.directional_lights) lamp.intensity *= light;
+  return scene;
+}
+
+std::string picture_name(std::size_t index) {
+  const std::string digits = std::to_string(index);
+  constexpr std::size_t width = 5;
+  return "view_" + std::string(width - std::min(width, digits.size()), '0') + digits + ".png";
+}
+
+}  // namespace
+
+void visit_options(SimulationOptions& options, OptionVisitor& visitor) {
+  static constexpr std::array<std::string_view, 2> kinds{"mirror", "panorama"};
+  visitor.visit({.name = "kind", .help = "what the camera writes"}, kinds, options.kind);
+  visitor.visit({.name = "rows", .help = "rows of panoramas", .low = 1, .high = 4096},
+                options.rows);
+  visitor.visit({.name = "columns", .help = "columns of panoramas", .low = 4, .high = 16384},
+                options.columns);
+  visitor.visit(
+      {.name = "elevation_low_deg", .help = "lower edge of panoramas", .low = -90, .high = 90},
+      options.elevation_low_deg);
+  visitor.visit(
+      {.name = "elevation_high_deg", .help = "upper edge of panoramas", .low = -90, .high = 90},
+      options.elevation_high_deg);
+  visitor.visit({.name = "seed", .help = "of poses, noise, tilt and odometry", .low = 0},
+                options.seed);
+  visitor.visit({.name = "scene_seed", .help = "varies textures and furniture", .low = 0},
+                options.scene_seed);
+  visitor.visit({.name = "moved_objects",
+                 .help = "share of the movable objects that stand elsewhere",
+                 .low = 0,
+                 .high = 1},
+                options.moved_objects);
+  visitor.visit({.name = "moved_seed", .help = "which objects moved, and where to", .low = 0},
+                options.moved_seed);
+  visitor.visit({.name = "light",
+                 .help = "all lamps and the sky times this",
+                 .low = 0,
+                 .high = 100,
+                 .low_open = true},
+                options.light);
+}
+
+void declare_simulation(Arguments& arguments, SimulationArguments& wanted) {
+  arguments.options("recording", wanted.recording);
+  arguments.options("simulation", wanted.simulation);
+  arguments.options("frame", wanted.frame);
+  arguments.options("sensor", wanted.sensor);
+  arguments.options("free_space", wanted.free_space);
+  arguments.options("odometry", wanted.odometry, "odometry");
+}
+
+SimulatedWorld::SimulatedWorld(
+    const std::string& scene, SimulationArguments wanted,
+    const std::function<bool(const std::string&, const std::string&)>& given, Executor& executor)
+    : wanted_(wanted), scene_(load_scene(scene, wanted.simulation)) {
+  const auto& simulation = wanted_.simulation;
+  if (simulation.elevation_low_deg >= simulation.elevation_high_deg) {
+    throw OptionError("elevation_low_deg is " + to_text(simulation.elevation_low_deg) +
+                      "; allowed: below elevation_high_deg, which is " +
+                      to_text(simulation.elevation_high_deg));
+  }
+  if (!given("frame", "camera_height_m")) wanted_.frame.camera_height_m = scene_.camera_height_m;
+  if (!given("free_space", "robot_height_m")) {
+    wanted_.free_space.robot_height_m = wanted_.frame.camera_height_m;
+  }
+  free_space_ = std::make_unique<FreeSpace>(scene_, wanted_.free_space);
+  renderer_ = std::make_unique<Renderer>(scene_, RendererOptions{}, executor);
+}
+
+RecordingCamera SimulatedWorld::camera() const {
+  const auto& simulation = wanted_.simulation;
+  if (simulation.kind == 0) return simulated_mirror_camera();
+  return PanoramaRendering{
+      .rows = simulation.rows,
+      .columns = simulation.columns,
+      .elevations = {radians(simulation.elevation_low_deg), radians(simulation.elevation_high_deg)},
+      .rays_per_axis = wanted_.frame.rays_per_axis};
+}
+
+PictureSource SimulatedWorld::source() const {
+  PictureSource source;
+  const auto seen_by = camera();
+  if (const auto* mirror = std::get_if<Camera>(&seen_by)) {
+    source.kind = PictureKind::mirror;
+    source.camera = *mirror;
+  } else {
+    source.layout.elevations = std::get<PanoramaRendering>(seen_by).elevations;
+  }
+  return source;
+}
+
+Dataset record_dataset(const SimulatedWorld& world, const fs::path& folder,
+                       std::span<const RecordedPose> poses, bool with_path, Executor& executor,
+                       const std::function<void()>& advance) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw FileError(folder.string(), "cannot be made: " + error.message());
+
+  Dataset dataset{folder, world.source(), {}};
+  const auto& wanted = world.arguments();
+  record(
+      world.renderer(), poses, world.camera(), wanted.frame, wanted.sensor,
+      static_cast<std::uint64_t>(wanted.simulation.seed), executor,
+      [&](std::size_t number, const RecordedPose& recorded, const Image& image) {
+        DatasetEntry entry;
+        entry.file = picture_name(number);
+        entry.path = folder / entry.file;
+        entry.pose = ReferencePose{recorded.pose.x_m, recorded.pose.y_m, recorded.pose.heading_rad};
+        if (with_path) {
+          entry.stamp_s = recorded.stamp_s;
+          entry.odometry = recorded.odometry;
+        }
+        write_png(entry.path, image.view());
+        dataset.entries.push_back(std::move(entry));
+        advance();
+      });
+  write_dataset(dataset);
+  return dataset;
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,119 @@
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "arguments.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/evaluation/reproduction.hpp"
+#include "panonav/io/atomic_file.hpp"
+#include "report_page.hpp"
+#include "session.hpp"
+#include "verbs.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+struct ReproduceArguments {
+  std::string paper;
+  std::string out = "reproduction";
+  bool quick = false;
+  std::optional<std::uint64_t> seed;
+};
+
+std::string shown(const ResultRow& row) {
+  const double size = std::abs(row.ours);
+  return fixed(row.ours, size >= 100.0  ? 0
+                         : size >= 10.0 ? 1
+                                        : 3) +
+         (row.unit.empty() ? "" : " " + row.unit);
+}
+
+void write_page(const ReproduceArguments& wanted, const Reproduction& result) {
+  ReportPage page("The localisation experiments of [M04]",
+                  "Menegatti, Maeda, Ishiguro 2004, run on simulated offices with a 25 cm grid of "
+                  "reference views. "
+                  "Published figures beside ours.");
+  page.section("Pictures");
+  std::vector<ReportPicture> pictures;
+  for (const auto& picture : result.pictures) {
+    pictures.push_back({picture.file.string(), picture.caption});
+  }
+  page.pictures(pictures);
+  page.section("Figures");
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& row : result.rows) {
+    const std::string interval =
+        row.interval ? fixed(row.interval->first, 3) + " .. " + fixed(row.interval->second, 3)
+                     : "-";
+    const std::string published = row.published ? fixed(row.published->first, 2) : "-";
+    const std::string target =
+        row.target ? std::string(row.target->comparison == Comparison::at_most ? "at most "
+                                                                               : "at least ") +
+                         fixed(row.target->value, 3)
+                   : "reported";
+    rows.push_back({row.what, published, shown(row), interval, target,
+                    row.target ? (row.holds() ? "yes" : "NO") : "-"});
+  }
+  page.table({"what", "published", "ours", "95 % interval", "target", "holds"}, rows);
+  page.write(wanted.out);
+}
+
+ExitCode reproduce(const ReproduceArguments& wanted, Session& session) {
+  if (wanted.paper != "m04") {
+    throw OptionError("PAPER is '" + wanted.paper +
+                      "'; allowed: m04 (localisation; m03 f11 s06 y03 are to come)");
+  }
+  Progress progress("reproduce " + wanted.paper, 100);
+  std::size_t shown_percent = 0;
+  const Reproduction result =
+      reproduce_m04({.out = wanted.out, .quick = wanted.quick, .seed = wanted.seed.value_or(1)},
+                    session.executor(), [&](std::string_view, double fraction) {
+                      const auto percent = static_cast<std::size_t>(100.0 * fraction);
+                      if (percent > shown_percent) progress.advance(percent - shown_percent);
+                      shown_percent = std::max(shown_percent, percent);
+                    });
+  progress.clear();
+  const std::string json = to_json(result.rows);
+  const std::filesystem::path out(wanted.out);
+  write_file(out / "results.json", json);
+  write_file(out / "results.md", to_markdown(result.rows));
+  write_page(wanted, result);
+  if (session.json()) {
+    session.print(json.substr(0, json.size() - 1));
+    return ExitCode::done;
+  }
+  std::size_t failed = 0;
+  for (const auto& row : result.rows) {
+    std::string line = "  " + row.what + ": " + session.strong(shown(row));
+    if (row.target) {
+      line += row.holds() ? "  " + session.good("holds") : "  " + session.bad("DOES NOT HOLD");
+      failed += row.holds() ? 0 : 1;
+    }
+    session.print(line);
+  }
+  session.print(
+      std::to_string(result.rows.size()) + " rows, " + std::to_string(failed) +
+      " of them miss their target; pictures and tables: " + (out / "index.html").string());
+  return ExitCode::done;
+}
+
+Run declare(Arguments& arguments) {
+  auto wanted = std::make_shared<ReproduceArguments>();
+  arguments.positional("PAPER", wanted->paper, "m04");
+  arguments.option("-o,--out", wanted->out, "Folder for the report (default: reproduction)");
+  arguments.flag("--quick", wanted->quick, "A smoke run: two scenes, few queries");
+  arguments.option("--seed", wanted->seed, "First of the scene seeds (default: 1)");
+  return [wanted](Session& session) { return reproduce(*wanted, session); };
+}
+
+}  // namespace
+
+Verb reproduce_verb() {
+  return {"reproduce", "Run the experiments of a paper: published figures beside ours",
+          "Writes pictures, results.json, results.md and index.html into the folder. The full run "
+          "takes some minutes.",
+          "  panonav reproduce m04\n  panonav reproduce m04 --quick --json -o smoke", declare};
+}
+
+}  // namespace panonav::command
