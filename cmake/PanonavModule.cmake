@@ -25,7 +25,9 @@ endfunction()
 
 function(panonav_warnings target)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wconversion
-                                           -Wno-sign-conversion -Wnon-virtual-dtor)
+                                           -Wno-sign-conversion -Wnon-virtual-dtor
+                                           # Options are set by name; what is not named has its default.
+                                           -Wno-missing-field-initializers)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
     # gcc 12 warns of overlaps in std::string operations where there are none (its bug 105651).
     target_compile_options(${target} PRIVATE -Wno-restrict)
