@@ -1,5 +1,8 @@
 #include "panonav/io/toml_fields.hpp"
 
+// The parser asserts on some broken input that it then refuses properly; a damaged file must not
+// end a debug build either.
+#define TOML_ASSERT(expression) static_cast<void>(0)
 #include <toml++/toml.h>
 
 #include <algorithm>
