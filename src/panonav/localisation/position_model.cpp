@@ -155,10 +155,12 @@ PositionModel learn_position_model(const VisualMemory& memory,
   model.sampled_views = static_cast<int>(neighbours.size());
   model.dissimilarity_unit = std::max(1.0, quantile(dissimilarities, 0.5));
 
-  // The mean error, where an error beyond all neighbourhoods counts no more than that: views that
-  // look alike far apart say nothing on how to interpolate.
-  const double largest_error_m = neighbourhoods.back() * spacing_m;
-  double best_mean_m = std::numeric_limits<double>::infinity();
+  // Views whose nearest match only looks alike say nothing on how to interpolate; a wide
+  // neighbourhood would then win because the middle of many wrong places is wrong by less.
+  const auto is_near = [&](std::size_t i) {
+    return distance(neighbours[i].positions[0], truths[i]) <= 2.0 * spacing_m;
+  };
+  double best_sum_m = std::numeric_limits<double>::infinity();
   std::vector<double> best_errors;
   std::vector<double> best_variances;
   for (const double spacings : neighbourhoods) {
@@ -171,11 +173,10 @@ PositionModel learn_position_model(const VisualMemory& memory,
             krige(neighbours[i], spacings * spacing_m, exponent, model.dissimilarity_unit);
         errors.push_back(distance(kriged.position, truths[i]));
         variances.push_back(kriged.variance);
-        sum_m += std::min(errors.back(), largest_error_m);
+        if (is_near(i)) sum_m += errors.back();
       }
-      const double mean_m = sum_m / static_cast<double>(neighbours.size());
-      if (mean_m < best_mean_m) {
-        best_mean_m = mean_m;
+      if (sum_m < best_sum_m) {
+        best_sum_m = sum_m;
         model.neighbourhood_m = spacings * spacing_m;
         model.exponent = exponent;
         best_errors = std::move(errors);
