@@ -112,20 +112,31 @@ TEST_P(Distance, SketchBoundsFollowTheirDefinition) {
   EXPECT_GT(above_zero, 100);
 }
 
-TEST_P(Distance, SketchBoundOfOneViewIsThatOfTheInterleavedOnes) {
+TEST_P(Distance, SketchBoundsOfPickedViewsAreThoseOfTheInterleavedOnes) {
   Random random(13);
   for (std::size_t groups = 8; groups <= 40; groups += 8) {
-    const SketchCase made = random_case(random, 1, groups, groups);
-    std::vector<std::uint32_t> bounds(8);
-    scalar.sketch_bounds(made.sketches.data(), made.slacks.data(), 1, made.query, bounds.data());
-    for (std::size_t view = 0; view < 8; ++view) {
-      std::vector<std::uint8_t> alone;
-      for (std::size_t group = 0; group < groups; ++group) {
-        const auto from = made.sketches.begin() + static_cast<long>((group * 8 + view) * 8);
-        alone.insert(alone.end(), from, from + 8);
+    const std::size_t octets = 5;
+    const std::size_t stored = groups + 8 * random.index(2);
+    const SketchCase made = random_case(random, octets, groups, stored);
+    std::vector<std::uint32_t> all(octets * 8);
+    scalar.sketch_bounds(made.sketches.data(), made.slacks.data(), octets, made.query, all.data());
+    std::vector<std::uint8_t> apart;
+    for (std::size_t view = 0; view < all.size(); ++view) {
+      for (std::size_t group = 0; group < stored; ++group) {
+        const std::size_t at = view / 8 * stored * 64 + group * 64 + view % 8 * 8;
+        apart.insert(apart.end(), made.sketches.begin() + static_cast<long>(at),
+                     made.sketches.begin() + static_cast<long>(at + 8));
       }
-      EXPECT_EQ(kernels.sketch_bound(alone.data(), made.slacks[view], made.query), bounds[view]);
     }
+    std::vector<std::uint32_t> indices;
+    for (std::uint32_t view = 0; view < all.size(); ++view) {
+      if (random.index(3) != 0) indices.push_back(view);
+    }
+    ASSERT_GT(indices.size(), 8U);
+    std::vector<std::uint32_t> bounds(indices.size());
+    kernels.sketch_bounds_at(apart.data(), made.slacks.data(), indices.data(), indices.size(),
+                             made.query, bounds.data());
+    for (std::size_t i = 0; i < indices.size(); ++i) EXPECT_EQ(bounds[i], all[indices[i]]);
   }
 }
 

@@ -1,9 +1,9 @@
 #include "panonav/kernels/distance.hpp"
 
-#define PANONAV_DISTANCE_KERNELS(target)                                        \
-  {                                                                             \
-    target::l1, target::masked_l1, target::sketch_bounds, target::sketch_bound, \
-        target::collect_at_most                                                 \
+#define PANONAV_DISTANCE_KERNELS(target)                                            \
+  {                                                                                 \
+    target::l1, target::masked_l1, target::sketch_bounds, target::sketch_bounds_at, \
+        target::collect_at_most                                                     \
   }
 
 namespace panonav::kernels {

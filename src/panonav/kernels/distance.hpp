@@ -21,8 +21,11 @@ struct DistanceKernels {
   uint32_t (*sketch_bounds)(const uint8_t* sketches, const int32_t* slacks, size_t octets,
                             const SketchQuery& query, uint32_t* bounds);
 
-  /// The same for one view whose groups lie one after the other. query.groups is a multiple of 8.
-  uint32_t (*sketch_bound)(const uint8_t* sketch, int32_t slack, const SketchQuery& query);
+  /// The same for views indices[0 .. count - 1] out of sketches that lie one after the other, each
+  /// with its groups one after the other: bounds[i] belongs to view indices[i]. query.groups is a
+  /// multiple of 8.
+  void (*sketch_bounds_at)(const uint8_t* sketches, const int32_t* slacks, const uint32_t* indices,
+                           size_t count, const SketchQuery& query, uint32_t* bounds);
 
   /// Writes the positions of the values <= limit, ascending, and returns their number. `indices`
   /// has room for `count` entries and 16 more.

@@ -83,16 +83,27 @@ uint32_t sketch_bounds(const uint8_t* sketches, const int32_t* slacks, size_t oc
   return static_cast<uint32_t>(_mm_cvtsi128_si32(four));
 }
 
-uint32_t sketch_bound(const uint8_t* sketch, int32_t slack, const SketchQuery& query) {
-  __m256i sum = _mm256_setzero_si256();
-  for (size_t group = 0; group < query.groups; group += 4) {
-    const __m256i x = _mm256_and_si256(load(sketch + group * 8), load(query.mask + group * 8));
-    const __m256i sad = _mm256_sad_epu8(x, load(query.values + group * 8));
-    sum = _mm256_add_epi64(sum, _mm256_mul_epu32(sad, load(query.steps + group)));
+void sketch_bounds_at(const uint8_t* sketches, const int32_t* slacks, const uint32_t* indices,
+                      size_t count, const SketchQuery& query, uint32_t* bounds) {
+  constexpr size_t ahead = 8;
+  for (size_t i = 0; i < count; ++i) {
+    if (i + ahead < count) {
+      const uint8_t* const next = sketches + indices[i + ahead] * query.stored_groups * 8;
+      for (size_t group = 0; group < query.groups; group += 8)
+        _mm_prefetch(next + group * 8, _MM_HINT_T0);
+    }
+    const uint8_t* const sketch = sketches + indices[i] * query.stored_groups * 8;
+    __m256i sum = _mm256_setzero_si256();
+    for (size_t group = 0; group < query.groups; group += 4) {
+      const __m256i x = _mm256_and_si256(load(sketch + group * 8), load(query.mask + group * 8));
+      const __m256i sad = _mm256_sad_epu8(x, load(query.values + group * 8));
+      sum = _mm256_add_epi64(sum, _mm256_mul_epu32(sad, load(query.steps + group)));
+    }
+    const int32_t slack = slacks[indices[i]];
+    const int32_t taken = slack < query.largest_slack ? slack : query.largest_slack;
+    const int64_t bound = sum_of_lanes(sum) + query.constant - taken;
+    bounds[i] = bound < 0 ? 0U : static_cast<uint32_t>(bound);
   }
-  const int32_t taken = slack < query.largest_slack ? slack : query.largest_slack;
-  const int64_t bound = sum_of_lanes(sum) + query.constant - taken;
-  return bound < 0 ? 0U : static_cast<uint32_t>(bound);
 }
 
 size_t collect_at_most(const uint32_t* values, size_t count, uint32_t limit, uint32_t* indices) {

@@ -56,18 +56,35 @@ uint32_t masked_l1(const uint8_t* a, const uint8_t* b, const uint8_t* mask, size
   return static_cast<uint32_t>(sum_of_lanes(sum));
 }
 
-uint32_t sketch_bounds(const uint8_t* sketches, const int32_t* slacks, size_t octets,
-                       const SketchQuery& query, uint32_t* bounds) {
+namespace {
+
+/// `fixed_groups` > 0: that many groups, whose part of the query then stays in registers.
+template <size_t fixed_groups, bool masked>
+uint32_t interleaved_bounds(const uint8_t* sketches, const int32_t* slacks, size_t octets,
+                            const SketchQuery& query, uint32_t* bounds) {
+  constexpr size_t kept = fixed_groups > 0 ? fixed_groups : 1;
+  __m512i kept_values[kept];
+  __m512i kept_steps[kept];
+  for (size_t group = 0; group < fixed_groups; ++group) {
+    kept_values[group] = _mm512_set1_epi64(load_group(query.values + group * 8));
+    kept_steps[group] = _mm512_set1_epi64(static_cast<long long>(query.steps[group]));
+  }
+  const size_t groups = fixed_groups > 0 ? fixed_groups : query.groups;
   const __m256i constant = _mm256_set1_epi32(query.constant);
   const __m256i largest = _mm256_set1_epi32(query.largest_slack);
   __m256i smallest = _mm256_set1_epi32(-1);
   for (size_t octet = 0; octet < octets; ++octet) {
     __m512i sum = _mm512_setzero_si512();
-    for (size_t group = 0; group < query.groups; ++group) {
-      const __m512i m = _mm512_set1_epi64(load_group(query.mask + group * 8));
-      const __m512i q = _mm512_set1_epi64(load_group(query.values + group * 8));
-      const __m512i step = _mm512_set1_epi64(static_cast<long long>(query.steps[group]));
-      const __m512i x = _mm512_and_si512(_mm512_loadu_si512(sketches + group * 64), m);
+    for (size_t group = 0; group < groups; ++group) {
+      const __m512i q = fixed_groups > 0 ? kept_values[group]
+                                         : _mm512_set1_epi64(load_group(query.values + group * 8));
+      const __m512i step = fixed_groups > 0
+                               ? kept_steps[group]
+                               : _mm512_set1_epi64(static_cast<long long>(query.steps[group]));
+      __m512i x = _mm512_loadu_si512(sketches + group * 64);
+      if (masked) {
+        x = _mm512_and_si512(x, _mm512_set1_epi64(load_group(query.mask + group * 8)));
+      }
       sum = _mm512_add_epi64(sum, _mm512_maskz_mul_epu32(0xFF, _mm512_sad_epu8(x, q), step));
     }
     sketches += query.stored_groups * 64;
@@ -85,18 +102,47 @@ uint32_t sketch_bounds(const uint8_t* sketches, const int32_t* slacks, size_t oc
   return static_cast<uint32_t>(_mm_cvtsi128_si32(four));
 }
 
-uint32_t sketch_bound(const uint8_t* sketch, int32_t slack, const SketchQuery& query) {
-  __m512i sum = _mm512_setzero_si512();
-  for (size_t group = 0; group < query.groups; group += 8) {
-    const __m512i m = _mm512_loadu_si512(query.mask + group * 8);
-    const __m512i x = _mm512_and_si512(_mm512_loadu_si512(sketch + group * 8), m);
-    const __m512i sad = _mm512_sad_epu8(x, _mm512_loadu_si512(query.values + group * 8));
-    sum = _mm512_add_epi64(
-        sum, _mm512_maskz_mul_epu32(0xFF, sad, _mm512_loadu_si512(query.steps + group)));
+bool counts_everywhere(const SketchQuery& query) {
+  for (size_t group = 0; group < query.groups; ++group) {
+    if (load_group(query.mask + group * 8) != -1) return false;
   }
-  const int32_t taken = slack < query.largest_slack ? slack : query.largest_slack;
-  const int64_t bound = sum_of_lanes(sum) + query.constant - taken;
-  return bound < 0 ? 0U : static_cast<uint32_t>(bound);
+  return true;
+}
+
+}  // namespace
+
+uint32_t sketch_bounds(const uint8_t* sketches, const int32_t* slacks, size_t octets,
+                       const SketchQuery& query, uint32_t* bounds) {
+  // 15 components make 5 groups; other shapes take the general body.
+  if (query.groups == 5 && counts_everywhere(query)) {
+    return interleaved_bounds<5, false>(sketches, slacks, octets, query, bounds);
+  }
+  return interleaved_bounds<0, true>(sketches, slacks, octets, query, bounds);
+}
+
+void sketch_bounds_at(const uint8_t* sketches, const int32_t* slacks, const uint32_t* indices,
+                      size_t count, const SketchQuery& query, uint32_t* bounds) {
+  constexpr size_t ahead = 8;
+  for (size_t i = 0; i < count; ++i) {
+    if (i + ahead < count) {
+      const uint8_t* const next = sketches + indices[i + ahead] * query.stored_groups * 8;
+      for (size_t group = 0; group < query.groups; group += 8)
+        _mm_prefetch(next + group * 8, _MM_HINT_T0);
+    }
+    const uint8_t* const sketch = sketches + indices[i] * query.stored_groups * 8;
+    __m512i sum = _mm512_setzero_si512();
+    for (size_t group = 0; group < query.groups; group += 8) {
+      const __m512i m = _mm512_loadu_si512(query.mask + group * 8);
+      const __m512i x = _mm512_and_si512(_mm512_loadu_si512(sketch + group * 8), m);
+      const __m512i sad = _mm512_sad_epu8(x, _mm512_loadu_si512(query.values + group * 8));
+      const __m512i steps = _mm512_loadu_si512(query.steps + group);
+      sum = _mm512_add_epi64(sum, _mm512_maskz_mul_epu32(0xFF, sad, steps));
+    }
+    const int32_t slack = slacks[indices[i]];
+    const int32_t taken = slack < query.largest_slack ? slack : query.largest_slack;
+    const int64_t bound = sum_of_lanes(sum) + query.constant - taken;
+    bounds[i] = bound < 0 ? 0U : static_cast<uint32_t>(bound);
+  }
 }
 
 size_t collect_at_most(const uint32_t* values, size_t count, uint32_t limit, uint32_t* indices) {

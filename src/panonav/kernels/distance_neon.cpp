@@ -68,13 +68,17 @@ uint32_t sketch_bounds(const uint8_t* sketches, const int32_t* slacks, size_t oc
   return smallest;
 }
 
-uint32_t sketch_bound(const uint8_t* sketch, int32_t slack, const SketchQuery& query) {
-  uint64_t sum = 0;
-  for (size_t group = 0; group < query.groups; ++group) {
-    sum += query.steps[group] * group_l1(sketch + group * 8, vld1_u8(query.values + group * 8),
-                                         vld1_u8(query.mask + group * 8));
+void sketch_bounds_at(const uint8_t* sketches, const int32_t* slacks, const uint32_t* indices,
+                      size_t count, const SketchQuery& query, uint32_t* bounds) {
+  for (size_t i = 0; i < count; ++i) {
+    const uint8_t* const sketch = sketches + indices[i] * query.stored_groups * 8;
+    uint64_t sum = 0;
+    for (size_t group = 0; group < query.groups; ++group) {
+      sum += query.steps[group] * group_l1(sketch + group * 8, vld1_u8(query.values + group * 8),
+                                           vld1_u8(query.mask + group * 8));
+    }
+    bounds[i] = finish(sum, slacks[indices[i]], query);
   }
-  return finish(sum, slack, query);
 }
 
 size_t collect_at_most(const uint32_t* values, size_t count, uint32_t limit, uint32_t* indices) {

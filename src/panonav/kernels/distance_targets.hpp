@@ -8,13 +8,14 @@
 
 namespace panonav::kernels {
 
-/// A query as `sketch_bounds` and `sketch_bound` compare it. Sketches consist of groups of 8 bytes.
+/// A query as `sketch_bounds` and `sketch_bounds_at` compare it. Sketches consist of groups of 8
+/// bytes.
 struct SketchQuery {
   const uint8_t* values;  ///< 8 bytes per group, 0 where the mask is 0
   const uint8_t* mask;    ///< 8 bytes per group: 255 where a byte counts, else 0
   const uint64_t* steps;  ///< one weight per group, below 2^22
-  size_t groups;          ///< compared; a multiple of 8 for `sketch_bound`
-  size_t stored_groups;   ///< of each view in interleaved sketches, >= groups
+  size_t groups;          ///< compared; a multiple of 8 for `sketch_bounds_at`
+  size_t stored_groups;   ///< of each view, >= groups
   int32_t constant;       ///< added to every bound
   int32_t largest_slack;  ///< slacks above are taken as this
 };
@@ -25,7 +26,8 @@ struct SketchQuery {
   uint32_t masked_l1(const uint8_t* a, const uint8_t* b, const uint8_t* mask, size_t count);       \
   uint32_t sketch_bounds(const uint8_t* sketches, const int32_t* slacks, size_t octets,            \
                          const SketchQuery& query, uint32_t* bounds);                              \
-  uint32_t sketch_bound(const uint8_t* sketch, int32_t slack, const SketchQuery& query);           \
+  void sketch_bounds_at(const uint8_t* sketches, const int32_t* slacks, const uint32_t* indices,   \
+                        size_t count, const SketchQuery& query, uint32_t* bounds);                 \
   size_t collect_at_most(const uint32_t* values, size_t count, uint32_t limit, uint32_t* indices); \
   }
 

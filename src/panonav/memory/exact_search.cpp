@@ -107,9 +107,10 @@ class Search {
     return comparison_.full(row);
   }
 
-  std::uint32_t fine(Row row) {
-    result_.bytes_read += fine_.bytes();
-    return fine_(row);
+  /// Fine bounds of rows first + places[i], which lie in one segment.
+  void fine(Row first, std::span<const std::uint32_t> places, std::uint32_t* bounds) {
+    result_.bytes_read += places.size() * fine_.bytes();
+    fine_(first, places, bounds);
   }
 
   /// A distance within which `top` views lie, from the views that look best by their bounds. A good
@@ -133,9 +134,11 @@ class Search {
       }
     }
     if (has_fine_) {
-      keep_smallest(best, 128 + 16 * top_);
+      keep_smallest(best, 64 + 8 * top_);
+      // In the order of the rows, so that the query is encoded once for each segment.
       std::ranges::sort(best, {}, &Bounded::second);
-      for (Bounded& candidate : best) candidate.first = fine(candidate.second);
+      constexpr std::uint32_t here = 0;
+      for (Bounded& candidate : best) fine(candidate.second, {&here, 1}, &candidate.first);
     }
     keep_smallest(best, 2 * top_);
     for (Bounded& candidate : best) candidate.first = full(candidate.second);
@@ -151,11 +154,12 @@ class Search {
 
   void scan(Nearest& nearest) {
     constexpr std::size_t chunk = 1024;
+    static_assert(SketchIndex::rows_per_segment % chunk == 0);
     // Now and then the fine bounds get a new chance: the limit sinks while the scan runs.
     constexpr std::size_t retry = 16;
     constexpr std::size_t most_waiting = 2048;
-    constexpr std::size_t ahead = 8;
     std::array<std::uint32_t, chunk + 16> found{};
+    std::array<std::uint32_t, chunk> fine_bounds{};
     std::vector<Bounded> waiting;
     FineBenefit benefit(fine_.bytes(), comparison_.bytes());
     for (std::size_t begin = 0; begin < bounds_.size(); begin += chunk) {
@@ -165,11 +169,11 @@ class Search {
       const bool test_fine = has_fine_ && (benefit.pays() || begin / chunk % retry == 0);
       if (test_fine) {
         const std::size_t before = waiting.size();
+        fine(static_cast<Row>(begin), {found.data(), passed}, fine_bounds.data());
         for (std::size_t i = 0; i < passed; ++i) {
-          if (i + ahead < passed) fine_.prefetch(static_cast<Row>(begin + found[i + ahead]));
-          const auto row = static_cast<Row>(begin + found[i]);
-          const std::uint32_t bound = fine(row);
-          if (bound <= nearest.limit()) waiting.emplace_back(bound, row);
+          if (fine_bounds[i] <= nearest.limit()) {
+            waiting.emplace_back(fine_bounds[i], static_cast<Row>(begin + found[i]));
+          }
         }
         benefit.count(passed, waiting.size() - before);
         if (waiting.size() >= most_waiting || !benefit.pays()) compare(waiting, nearest);

@@ -310,27 +310,19 @@ SketchIndex::FineBounds::FineBounds(const SketchIndex& index,
   encoded_.stored_groups = index.layout_.fine_groups;
 }
 
-std::uint32_t SketchIndex::FineBounds::operator()(Row row) {
-  const std::size_t number = row / rows_per_segment;
-  const std::size_t place = row % rows_per_segment;
+void SketchIndex::FineBounds::operator()(Row first, std::span<const std::uint32_t> places,
+                                         std::uint32_t* bounds) {
+  const std::size_t number = first / rows_per_segment;
+  const std::size_t place = first % rows_per_segment;
   const Level& level = index_.segments_[number].fine;
   if (number != segment_) {
     encode_query(level.scale, level.covers, query_.sums.fine, query_.fine_mask, query_.fine_groups,
                  values_.data(), encoded_);
     segment_ = number;
   }
-  return kernels_.sketch_bound(
-      level.codes.data() + place * index_.layout_.fine_groups * group_bytes, level.slacks[place],
-      encoded_);
-}
-
-void SketchIndex::FineBounds::prefetch(Row row) const noexcept {
-  const Level& level = index_.segments_[row / rows_per_segment].fine;
-  const std::uint8_t* const code =
-      level.codes.data() + (row % rows_per_segment) * index_.layout_.fine_groups * group_bytes;
-  for (std::size_t i = 0; i < query_.fine_groups * group_bytes; i += 64) {
-    __builtin_prefetch(code + i);
-  }
+  kernels_.sketch_bounds_at(level.codes.data() + place * index_.layout_.fine_groups * group_bytes,
+                            level.slacks.data() + place, places.data(), places.size(), encoded_,
+                            bounds);
 }
 
 std::size_t SketchIndex::FineBounds::bytes() const noexcept {

@@ -103,13 +103,13 @@ class SketchIndex {
   void coarse_bounds(const kernels::DistanceKernels& kernels, const Query& query,
                      std::span<std::uint32_t> bounds, std::span<std::uint32_t> smallest) const;
 
-  /// Lower bounds of single rows from the fine level.
+  /// Lower bounds of some rows from the fine level.
   class FineBounds {
    public:
     FineBounds(const SketchIndex& index, const kernels::DistanceKernels& kernels,
                const Query& query);
-    [[nodiscard]] std::uint32_t operator()(Row row);
-    void prefetch(Row row) const noexcept;
+    /// bounds[i] is that of row `first` + places[i]. All of them lie in one segment.
+    void operator()(Row first, std::span<const std::uint32_t> places, std::uint32_t* bounds);
     /// Bytes that one bound reads.
     [[nodiscard]] std::size_t bytes() const noexcept;
 
