@@ -27,7 +27,8 @@ PlaceRecording record_place(const PlaceRecordingOptions& options, Executor& exec
   PlaceRecording recording;
   recording.scene = make_scene(options.scene, {.seed = options.seed});
   recording.spacing_m = options.spacing_m;
-  recording.free_space = std::make_shared<const FreeSpace>(recording.scene);
+  recording.free_space =
+      std::make_shared<const FreeSpace>(recording.scene, free_space_options(recording.scene));
   const auto renderer = std::make_shared<const Renderer>(recording.scene);
   const double height_m = recording.scene.camera_height_m;
   recording.take = [renderer, height_m, rows = options.rows, columns = options.columns](

@@ -44,6 +44,13 @@ std::string text(Point2 p) {
 
 }  // namespace
 
+FreeSpaceOptions free_space_options(const Scene& scene) {
+  return {.robot_radius_m = scene.robot_radius_m,
+          .robot_height_m = scene.camera_height_m,
+          .step_height_m = scene.camera_height_m / 12.0,
+          .cell_m = scene.robot_radius_m / 8.0};
+}
+
 void visit_options(FreeSpaceOptions& options, OptionVisitor& visitor) {
   visitor.visit({.name = "robot_radius_m", .help = "radius of the robot", .low = 0.0, .high = 10.0},
                 options.robot_radius_m);

@@ -24,6 +24,10 @@ struct FreeSpaceOptions {
 };
 void visit_options(FreeSpaceOptions& options, OptionVisitor& visitor);
 
+/// The options of the robot that a scene is made for: its radius, as high as its camera, driving
+/// over a twelfth of that.
+[[nodiscard]] FreeSpaceOptions free_space_options(const Scene& scene);
+
 /// Where a robot can stand and drive in a scene: inside `floor_low .. floor_high` and the
 /// `drivable` areas if there are any; on something to stand on (a surface within the step height of
 /// the floor), unless the scene has no floor at all; and with no surface within the robot's radius

@@ -7,17 +7,6 @@
 
 namespace panonav {
 
-namespace {
-
-Colour tint(Random& random, double low, double high, double spread) {
-  const double level = random.uniform(low, high);
-  return {static_cast<float>(level * random.uniform(1.0 - spread, 1.0 + spread)),
-          static_cast<float>(level * random.uniform(1.0 - spread, 1.0 + spread)),
-          static_cast<float>(level * random.uniform(1.0 - spread, 1.0 + spread))};
-}
-
-}  // namespace
-
 void furnish_room_shell(SceneBuilder& builder, const FloorArea& room, double height_m) {
   Random& random = builder.random();
   const std::array<Point2, 4> corners{room.low, Point2{room.high.x_m, room.low.y_m}, room.high,
@@ -25,6 +14,9 @@ void furnish_room_shell(SceneBuilder& builder, const FloorArea& room, double hei
   builder.floor(builder.textured(noise_texture(random, 256, tint(random, 0.25, 0.5, 0.15), 0.12)),
                 room.low, room.high, 1.5);
   builder.ceiling(builder.plain(tint(random, 0.75, 0.9, 0.03)), room.low, room.high, height_m, 1.0);
+  // Windows are in one wall: the room is bright on one side.
+  const std::size_t outer_wall = random.index(4);
+  const double middle_z = 0.6 * height_m;
   for (std::size_t i = 0; i < 4; ++i) {
     const Point2 from = corners[i];
     const Point2 to = corners[(i + 1) % 4];
@@ -41,11 +33,18 @@ void furnish_room_shell(SceneBuilder& builder, const FloorArea& room, double hei
       double width = 0.0;
       const std::string name =
           wall + " picture at " + std::to_string(static_cast<int>(along * 100));
-      if (kind < 0.25) {
+      if (i == outer_wall && kind < 0.7) {
         width = std::min(random.uniform(1.0, 1.6), length - along - 0.1);
-        builder.on_wall(name, builder.textured(window_texture(random, 128), 0.7F), from, to, along,
+        // Daylight comes in as from a lamp as large as the window.
+        const double middle = (along + 0.5 * width) / length;
+        const double in_x = -(to.y_m - from.y_m) / length;
+        const double in_y = (to.x_m - from.x_m) / length;
+        builder.lamp({from.x_m + middle * (to.x_m - from.x_m) + 0.8 * in_x,
+                      from.y_m + middle * (to.y_m - from.y_m) + 0.8 * in_y, middle_z},
+                     1.8F, 1.2F);
+        builder.on_wall(name, builder.textured(window_texture(random, 128), 1.0F), from, to, along,
                         width, random.uniform(0.8, 1.0), std::min(height_m - 0.3, 2.1));
-      } else if (kind < 0.40) {
+      } else if (i != outer_wall && kind < 0.25) {
         width = std::min(0.9, length - along - 0.1);
         builder.on_wall(name,
                         builder.textured(door_texture(random, 128, tint(random, 0.2, 0.7, 0.3))),
@@ -66,8 +65,9 @@ void furnish_room_shell(SceneBuilder& builder, const FloorArea& room, double hei
 
 void add_desk(SceneBuilder& builder, const std::string& name, const Footing& footing) {
   Random& random = builder.random();
-  const int wood = builder.textured(wood_texture(random, 128, tint(random, 0.35, 0.75, 0.2)));
-  const int metal = builder.plain(tint(random, 0.1, 0.4, 0.05));
+  const int wood =
+      builder.textured(wood_texture(random, 128, alike(random, builder.palette().wood)));
+  const int metal = builder.plain(builder.palette().metal);
   builder.box(name, wood, wood, footing, {0.0, 0.0, 0.70}, {1.4, 0.7, 0.04}, 0.7);
   for (const double x : {-0.65, 0.65}) {
     for (const double y : {-0.30, 0.30}) {
@@ -75,7 +75,7 @@ void add_desk(SceneBuilder& builder, const std::string& name, const Footing& foo
     }
   }
   const int drawers = builder.textured(
-      brick_texture(random, 128, 1, 3, tint(random, 0.3, 0.8, 0.1), {0.1F, 0.1F, 0.1F}));
+      brick_texture(random, 128, 1, 3, alike(random, builder.palette().paint), {0.1F, 0.1F, 0.1F}));
   const double side = random.uniform() < 0.5 ? -0.42 : 0.42;
   builder.box(name, drawers, wood, footing, {side, 0.0, 0.02}, {0.42, 0.6, 0.64});
   if (random.uniform() < 0.6) {
@@ -95,8 +95,9 @@ void add_desk(SceneBuilder& builder, const std::string& name, const Footing& foo
 
 void add_chair(SceneBuilder& builder, const std::string& name, const Footing& footing) {
   Random& random = builder.random();
-  const int cloth = builder.textured(noise_texture(random, 64, tint(random, 0.1, 0.6, 0.4), 0.15));
-  const int metal = builder.plain(tint(random, 0.08, 0.3, 0.05));
+  const int cloth = builder.textured(
+      noise_texture(random, 64, alike(random, builder.palette().cloth, 0.2), 0.15));
+  const int metal = builder.plain(builder.palette().metal);
   builder.box(name, cloth, cloth, footing, {0.0, 0.0, 0.43}, {0.45, 0.45, 0.07});
   builder.box(name, cloth, cloth, footing, {0.0, 0.21, 0.55}, {0.42, 0.05, 0.42});
   builder.cylinder(name, metal, footing.centre, 0.08, 0.43, 0.035, 8);
@@ -110,7 +111,8 @@ void add_shelf(SceneBuilder& builder, const std::string& name, const Footing& fo
                double width_m, double height_m) {
   Random& random = builder.random();
   const int boards = std::max(2, static_cast<int>(height_m / 0.36));
-  const int wood = builder.textured(wood_texture(random, 128, tint(random, 0.3, 0.7, 0.2)));
+  const int wood =
+      builder.textured(wood_texture(random, 128, alike(random, builder.palette().wood)));
   builder.box(name, wood, wood, footing, {0.0, 0.0, 0.0}, {width_m, 0.32, height_m}, 0.8);
   // Books stand on both sides, a little before the wood.
   for (const double side : {-1.0, 1.0}) {
@@ -129,11 +131,27 @@ void add_shelf(SceneBuilder& builder, const std::string& name, const Footing& fo
   }
 }
 
+void add_wardrobe(SceneBuilder& builder, const std::string& name, const Footing& footing,
+                  double width_m, double height_m) {
+  Random& random = builder.random();
+  const Colour colour = tint(random, 0.08, 0.85, 0.2);
+  const int front = builder.textured(noise_texture(random, 128, colour, 0.12, 2.5));
+  const int gap = builder.plain({0.4F * colour[0], 0.4F * colour[1], 0.4F * colour[2]});
+  builder.box(name, front, front, footing, {0.0, 0.0, 0.0}, {width_m, 0.45, height_m}, 1.6);
+  // Gaps between the doors stand out a little on both long sides.
+  const int doors = std::max(2, static_cast<int>(width_m / 0.55));
+  for (int i = 1; i < doors; ++i) {
+    const double x = width_m * (static_cast<double>(i) / doors - 0.5);
+    builder.box(name, gap, gap, footing, {x, 0.0, 0.06}, {0.012, 0.456, height_m - 0.12});
+  }
+}
+
 void add_cabinet(SceneBuilder& builder, const std::string& name, const Footing& footing) {
   Random& random = builder.random();
-  const Colour colour = tint(random, 0.25, 0.85, 0.15);
-  const int front = builder.textured(brick_texture(
-      random, 128, 1, 3 + static_cast<int>(random.index(2)), colour, {0.1F, 0.1F, 0.1F}));
+  const Colour colour = alike(random, builder.palette().paint, 0.15);
+  const int front =
+      builder.textured(brick_texture(random, 128, 1, 3 + static_cast<int>(random.index(2)), colour,
+                                     {0.5F * colour[0], 0.5F * colour[1], 0.5F * colour[2]}));
   const int top = builder.plain(colour);
   const double height = random.uniform(0.7, 1.5);
   builder.box(name, front, top, footing, {0.0, 0.0, 0.0}, {random.uniform(0.45, 0.9), 0.5, height});

@@ -15,6 +15,9 @@ void add_desk(SceneBuilder& builder, const std::string& name, const Footing& foo
 void add_chair(SceneBuilder& builder, const std::string& name, const Footing& footing);
 void add_shelf(SceneBuilder& builder, const std::string& name, const Footing& footing,
                double width_m, double height_m);
+/// Wide, closed and of one tone: what makes the large dark and bright parts of a view.
+void add_wardrobe(SceneBuilder& builder, const std::string& name, const Footing& footing,
+                  double width_m, double height_m);
 void add_cabinet(SceneBuilder& builder, const std::string& name, const Footing& footing);
 void add_plant(SceneBuilder& builder, const std::string& name, Point2 centre);
 void add_crate(SceneBuilder& builder, const std::string& name, const Footing& footing,

@@ -45,14 +45,15 @@ void add_sky(SceneBuilder& builder, Point2 centre, double radius_m) {
   builder.scene().meshes.push_back(std::move(mesh));
 }
 
-void add_house(SceneBuilder& builder, const std::string& name, const Footing& footing,
-               Vector3 size) {
+void add_house(SceneBuilder& builder, const std::string& name, const Footing& footing, Vector3 size,
+               Colour wall_colour, Colour roof_colour) {
   Random& random = builder.random();
-  const auto channel = [&random] { return static_cast<float>(random.uniform(0.25, 0.85)); };
   const int walls = builder.textured(
-      brick_texture(random, 128, 6, 12, {channel(), channel(), channel()}, {0.7F, 0.7F, 0.68F}));
+      brick_texture(random, 128, 6, 12, wall_colour,
+                    {1.1F * wall_colour[0], 1.1F * wall_colour[1], 1.1F * wall_colour[2]}));
   const int roof = builder.textured(
-      brick_texture(random, 128, 8, 8, {channel(), 0.25F, 0.2F}, {0.2F, 0.15F, 0.12F}));
+      brick_texture(random, 128, 8, 8, roof_colour,
+                    {0.7F * roof_colour[0], 0.7F * roof_colour[1], 0.7F * roof_colour[2]}));
   builder.box(name, walls, walls, footing, {0.0, 0.0, 0.0}, size, 0.6 * size.z_m);
   const double c = std::cos(footing.turn_rad);
   const double s = std::sin(footing.turn_rad);
@@ -155,9 +156,9 @@ Scene make_garden(const SceneVariation& variation) {
               {random.uniform(0.4, 1.2), random.uniform(0.3, 0.6), random.uniform(0.3, 0.8)});
   }
   add_house(builder, "house", {{random.uniform(2.0, 10.0), 18.0}, random.uniform(-0.2, 0.2)},
-            {9.0, 6.0, 3.2});
+            {9.0, 6.0, 3.2}, tint(random, 0.4, 0.8, 0.2), {0.5F, 0.25F, 0.2F});
   add_house(builder, "shed", {{-5.0, random.uniform(2.0, 8.0)}, random.uniform(1.2, 1.9)},
-            {3.0, 2.2, 2.0});
+            {3.0, 2.2, 2.0}, builder.palette().wood, tint(random, 0.15, 0.4, 0.2));
   // Far trees make the horizon.
   for (int i = 0; i < 60; ++i) {
     const double angle = 2.0 * std::numbers::pi * (i + random.uniform(-0.5, 0.5)) / 60.0;
@@ -177,37 +178,52 @@ Scene make_arena(const SceneVariation& variation) {
   scene.floor_low = {0.0, 0.0};
   scene.floor_high = {1.4, 1.2};
   scene.camera_height_m = 0.08;
+  scene.robot_radius_m = 0.0275;
   scene.ambient = 0.5F;
   const int table = builder.textured(noise_texture(random, 128, {0.55F, 0.55F, 0.5F}, 0.06));
   // A little above the floor of the lab, so that the two do not compete.
-  builder.floor(table, {-0.3, -0.3}, {1.7, 1.5}, 0.4, 0.002);
+  builder.floor(table, {-0.04, -0.04}, {1.44, 1.24}, 0.4, 0.002);
   // The lab around the table, seen above the houses.
   const FloorArea lab{{-2.0, -2.0}, {3.4, 3.2}};
   furnish_room_shell(builder, lab, 2.2);
-  builder.lamp({0.7, 0.6, 1.9}, 1.2F);
-  builder.lamp({-0.8, -0.8, 1.8}, 0.6F);
+  // One lamp stands to the side, so that houses have a bright and a dark face.
+  builder.lamp({random.uniform(-1.5, -0.5), random.uniform(-1.5, 2.7), 1.9}, 2.5F);
+  builder.lamp({0.7, 0.6, 2.0}, 0.5F);
 
-  // Toy houses along the border and some inside, with streets of 20 cm and more between them.
-  const FloorArea plot{{-0.2, -0.2}, {1.6, 1.4}};
+  // A low wall around the town: painted, dark in places and bright in others.
+  const std::array<Point2, 4> wall{Point2{-0.04, -0.04}, Point2{1.44, -0.04}, Point2{1.44, 1.24},
+                                   Point2{-0.04, 1.24}};
+  for (std::size_t i = 0; i < 4; ++i) {
+    builder.wall(
+        "border " + std::to_string(i),
+        builder.textured(noise_texture(random, 128, tint(random, 0.2, 0.75, 0.15), 0.35, 3.0)),
+        wall[i], wall[(i + 1) % 4], 0.16, 1.0);
+  }
+  // Two rows of three blocks with streets of 20 cm and more around each, one or two houses a block.
+  const FloorArea plot{{0.0, 0.0}, {1.4, 1.2}};
   int number = 0;
-  const auto house = [&](Point2 at, double turn_rad) {
-    const Footing footing = builder.movable({at, turn_rad}, 0.1, plot);
-    add_house(builder, "house " + std::to_string(number++), footing,
-              {random.uniform(0.09, 0.16), random.uniform(0.08, 0.12), random.uniform(0.07, 0.14)});
-  };
-  for (double x = -0.05; x < 1.5; x += random.uniform(0.16, 0.26)) {
-    house({x, -0.13}, random.normal(0.0, 0.1));
-    house({x + random.uniform(-0.04, 0.04), 1.33}, random.normal(0.0, 0.1));
+  for (const double y : {0.38, 0.82}) {
+    for (const double x : {0.3, 0.7, 1.1}) {
+      const Colour paint = tint(random, 0.15, 0.85, 0.3);
+      const Colour tiles = tint(random, 0.15, 0.5, 0.4);
+      const Footing block{
+          {x + random.normal(0.0, 0.015), y + random.normal(0.0, 0.015)},
+          random.uniform() < 0.5 ? random.normal(0.0, 0.12) : 1.57 + random.normal(0.0, 0.12)};
+      const Footing footing = builder.movable(block, 0.1, plot);
+      const bool pair = random.uniform() < 0.4;
+      const double length = pair ? 0.085 : random.uniform(0.12, 0.18);
+      for (const double side : pair ? std::array{-0.05, 0.05} : std::array{0.0, 0.0}) {
+        const Footing place{{footing.centre.x_m + side * std::cos(footing.turn_rad),
+                             footing.centre.y_m + side * std::sin(footing.turn_rad)},
+                            footing.turn_rad};
+        add_house(builder, "house " + std::to_string(number++), place,
+                  {length, random.uniform(0.09, 0.14), random.uniform(0.1, 0.17)},
+                  alike(random, paint), tiles);
+        if (!pair) break;
+      }
+    }
   }
-  for (double y = 0.1; y < 1.15; y += random.uniform(0.18, 0.28)) {
-    house({-0.13, y}, 1.57 + random.normal(0.0, 0.1));
-    house({1.53, y}, 1.57 + random.normal(0.0, 0.1));
-  }
-  for (const Point2 at : {Point2{0.45, 0.4}, Point2{0.95, 0.45}, Point2{0.7, 0.85}}) {
-    house({at.x_m + random.normal(0.0, 0.04), at.y_m + random.normal(0.0, 0.04)},
-          random.uniform(-1.5, 1.5));
-  }
-  scene.tour = {{0.15, 0.15}, {1.25, 0.15}, {1.25, 1.05}, {0.15, 1.05}};
+  scene.tour = {{0.1, 0.12}, {1.3, 0.12}, {1.3, 1.08}, {0.1, 1.08}};
   return builder.finish();
 }
 

@@ -24,23 +24,34 @@ void furnish_row(SceneBuilder& builder, const FloorArea& room, const std::string
   const double uy = (to.y_m - from.y_m) / length;
   double along = random.uniform(0.2, 0.5);
   int number = 0;
+  double kind = random.uniform();
   while (along < length - 0.3) {
-    const double kind = random.uniform();
-    const double width = kind < 0.35 ? 1.5 : kind < 0.55 ? 1.0 : 0.7;
+    // Things of a kind stand together.
+    if (random.uniform() < 0.35) kind = random.uniform();
+    const bool is_desk = kind < 0.3;
+    const bool is_wardrobe = !is_desk && kind < 0.5;
+    const bool is_shelf = kind >= 0.5 && kind < 0.67;
+    const double width = is_desk       ? 1.5
+                         : is_wardrobe ? random.uniform(1.1, 2.2)
+                         : is_shelf    ? 1.0
+                                       : 0.7;
     const Point2 at{from.x_m + ux * (along + 0.5 * width), from.y_m + uy * (along + 0.5 * width)};
     const std::string piece = name + " " + std::to_string(number++);
     const Footing wanted{at, turn_rad + random.normal(0.0, 0.05)};
-    const Footing footing = builder.movable(wanted, 0.5 * width, room);
-    if (kind < 0.35) {
+    // Nobody moves a wardrobe.
+    const Footing footing = is_wardrobe ? wanted : builder.movable(wanted, 0.5 * width, room);
+    if (is_desk) {
       add_desk(builder, piece, footing);
       const Point2 before{footing.centre.x_m + 0.45 * std::sin(footing.turn_rad),
                           footing.centre.y_m - 0.45 * std::cos(footing.turn_rad)};
       add_chair(builder, piece + " chair", {before, random.uniform(-3.0, 3.0)});
-    } else if (kind < 0.55) {
+    } else if (is_wardrobe) {
+      add_wardrobe(builder, piece, footing, width, random.uniform(1.3, 2.1));
+    } else if (is_shelf) {
       add_shelf(builder, piece, footing, width - 0.1, random.uniform(1.2, 2.1));
-    } else if (kind < 0.75) {
+    } else if (kind < 0.82) {
       add_cabinet(builder, piece, footing);
-    } else if (kind < 0.87) {
+    } else if (kind < 0.9) {
       add_plant(builder, piece, footing.centre);
     } else {
       add_crate(builder, piece, footing,
@@ -73,7 +84,7 @@ void add_lamps(SceneBuilder& builder, const FloorArea& room, double height_m, do
       const Point2 at{room.low.x_m + (i + 0.5) * width / columns,
                       room.low.y_m + (j + 0.5) * depth / rows};
       builder.lamp({at.x_m, at.y_m, height_m - 0.2},
-                   static_cast<float>(builder.random().uniform(0.8, 1.2)));
+                   static_cast<float>(builder.random().uniform(0.1, 1.0)));
       builder.box("lamp", shine, shine, {at, 0.0}, {0.0, 0.0, height_m - 0.1}, {1.2, 0.25, 0.06});
     }
   }
@@ -87,7 +98,7 @@ Scene make_office(const SceneVariation& variation) {
   scene.floor_low = {0.0, 0.0};
   scene.floor_high = {5.0, 2.0};
   scene.drivable = {{{-0.25, -0.25}, {5.25, 2.25}}};
-  scene.ambient = 0.65F;
+  scene.ambient = 0.4F;
   const FloorArea room{{-1.6, -1.5}, {6.6, 3.5}};
   constexpr double kHeight = 2.6;
   furnish_room_shell(builder, room, kHeight);
@@ -103,7 +114,7 @@ Scene make_lab(const SceneVariation& variation) {
   scene.floor_low = {0.0, 0.0};
   scene.floor_high = {7.0, 5.0};
   scene.drivable = {{{0.9, 1.2}, {6.1, 3.8}}};
-  scene.ambient = 0.65F;
+  scene.ambient = 0.4F;
   const FloorArea room{{0.0, 0.0}, {7.0, 5.0}};
   constexpr double kHeight = 2.8;
   furnish_room_shell(builder, room, kHeight);
@@ -120,7 +131,7 @@ Scene make_hall(const SceneVariation& variation, bool periodic) {
   scene.floor_low = {0.0, 0.0};
   scene.floor_high = {7.0, 7.0};
   scene.drivable = {{{-0.3, -0.3}, {7.3, 7.3}}};
-  scene.ambient = 0.65F;
+  scene.ambient = 0.4F;
   const FloorArea room{{-2.0, -2.0}, {9.0, 9.0}};
   constexpr double kHeight = 3.5;
   if (!periodic) {

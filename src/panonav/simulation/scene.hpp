@@ -73,6 +73,7 @@ struct Scene {
   Point2 floor_high;
   std::vector<FloorArea> drivable;    ///< empty: the whole floor
   std::vector<Point2> tour;           ///< a closed round trip through free space; may be empty
+  double robot_radius_m = 0.2;        ///< of the robot that the scene is made for
   double camera_height_m = 0.6;       ///< viewpoint of the robot that the scene is made for
   std::vector<std::string> warnings;  ///< missing textures and the like; shown once by the command
 };

@@ -27,6 +27,8 @@ bool inside(const FloorArea& area, Point2 centre, double margin_m) {
 SceneBuilder::SceneBuilder(std::string name, const SceneVariation& variation)
     : variation_(variation), random_(variation.seed, 11), moved_(variation.moved_seed, 12) {
   scene_.name = std::move(name);
+  palette_ = {tint(random_, 0.25, 0.7, 0.2), tint(random_, 0.3, 0.8, 0.12),
+              tint(random_, 0.08, 0.45, 0.35), tint(random_, 0.08, 0.35, 0.05)};
 }
 
 int SceneBuilder::plain(Colour colour, float emission) {
@@ -206,8 +208,8 @@ Footing SceneBuilder::movable(const Footing& wanted, double radius_m, const Floo
   return found;
 }
 
-void SceneBuilder::lamp(Vector3 position, float intensity) {
-  scene_.lights.push_back({position, intensity});
+void SceneBuilder::lamp(Vector3 position, float intensity, float radius_m) {
+  scene_.lights.push_back({position, intensity, radius_m});
 }
 
 Scene SceneBuilder::finish() {

@@ -18,6 +18,15 @@ struct Footing {
   double turn_rad = 0.0;
 };
 
+/// What the furniture of a scene is made of. Rooms are furnished from few suppliers: pieces of a
+/// kind look alike, so that a view has large dark and bright parts and not only small ones.
+struct Palette {
+  Colour wood;
+  Colour paint;
+  Colour cloth;
+  Colour metal;
+};
+
 /// Puts a built-in scene together. Random numbers come in two streams: one for what the scene is,
 /// one for which objects have moved, so that moving objects changes nothing else.
 class SceneBuilder {
@@ -26,6 +35,7 @@ class SceneBuilder {
 
   [[nodiscard]] Random& random() noexcept { return random_; }
   [[nodiscard]] Scene& scene() noexcept { return scene_; }
+  [[nodiscard]] const Palette& palette() const noexcept { return palette_; }
 
   int plain(Colour colour, float emission = 0.0F);
   int textured(Image image, float emission = 0.0F);
@@ -65,7 +75,7 @@ class SceneBuilder {
   /// floor's surroundings `room`.
   Footing movable(const Footing& wanted, double radius_m, const FloorArea& room);
 
-  void lamp(Vector3 position, float intensity);
+  void lamp(Vector3 position, float intensity, float radius_m = 0.4F);
   /// Applies the light of the variation and checks the scene.
   [[nodiscard]] Scene finish();
 
@@ -75,6 +85,7 @@ class SceneBuilder {
   SceneVariation variation_;
   Random random_;
   Random moved_;
+  Palette palette_;
   Scene scene_;
 };
 

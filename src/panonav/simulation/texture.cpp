@@ -75,12 +75,6 @@ void fill(Image& image, int u0, int v0, int u1, int v1, Colour colour) {
   }
 }
 
-Colour random_colour(Random& random, double low, double high) {
-  return {static_cast<float>(random.uniform(low, high)),
-          static_cast<float>(random.uniform(low, high)),
-          static_cast<float>(random.uniform(low, high))};
-}
-
 // Light and dirt over a finished picture, so that no surface is of one even colour.
 void weather(Random& random, Image& image, double contrast) {
   const auto field = noise_field(random, image.width(), image.height(), 2.0);
@@ -96,6 +90,21 @@ void weather(Random& random, Image& image, double contrast) {
 }
 
 }  // namespace
+
+Colour tint(Random& random, double low, double high, double spread) {
+  const double level = random.uniform(low, high);
+  Colour colour{};
+  for (float& channel : colour) {
+    channel = static_cast<float>(level * random.uniform(1.0 - spread, 1.0 + spread));
+  }
+  return colour;
+}
+
+Colour alike(Random& random, Colour colour, double spread) {
+  const auto factor = static_cast<float>(random.uniform(1.0 - spread, 1.0 + spread));
+  for (float& channel : colour) channel *= factor;
+  return colour;
+}
 
 Image noise_texture(Random& random, int size, Colour base, double contrast, double exponent) {
   Image image(size, size, 3);
@@ -158,6 +167,8 @@ Image brick_texture(Random& random, int size, int columns, int rows, Colour bric
 
 Image bookshelf_texture(Random& random, int size, int boards) {
   Image image(size, size, 3);
+  // Most books of a shelf are of a series or an age: around one brightness.
+  const double level = random.uniform(0.15, 0.65);
   const Colour board{0.45F, 0.35F, 0.25F};
   fill(image, 0, 0, size, size, {0.12F, 0.10F, 0.09F});
   const int height = size / boards;
@@ -168,7 +179,7 @@ Image bookshelf_texture(Random& random, int size, int boards) {
       const int width = std::max(2, static_cast<int>(random.uniform(0.012, 0.07) * size));
       if (random.uniform() > 0.15) {
         const int top = bottom - static_cast<int>(height * random.uniform(0.55, 0.88));
-        fill(image, u, top, u + width - 1, bottom, random_colour(random, 0.08, 0.9));
+        fill(image, u, top, u + width - 1, bottom, tint(random, 0.6 * level, 1.4 * level, 0.3));
         if (random.uniform() < 0.4) {
           const int label = top + height / 6;
           fill(image, u + width / 4, label, u + 3 * width / 4, label + height / 8,
@@ -185,10 +196,11 @@ Image bookshelf_texture(Random& random, int size, int boards) {
 
 Image poster_texture(Random& random, int size) {
   Image image(size, size, 3);
-  fill(image, 0, 0, size, size, random_colour(random, 0.1, 0.95));
+  const double level = random.uniform(0.2, 0.75);
+  fill(image, 0, 0, size, size, tint(random, level, level, 0.3));
   const int shapes = 3 + static_cast<int>(random.index(5));
   for (int i = 0; i < shapes; ++i) {
-    const Colour colour = random_colour(random, 0.02, 1.0);
+    const Colour colour = tint(random, 0.4 * level, 1.6 * level, 0.5);
     const double cu = random.uniform(0.0, 1.0) * size;
     const double cv = random.uniform(0.0, 1.0) * size;
     const double ru = random.uniform(0.08, 0.35) * size;
@@ -205,7 +217,7 @@ Image poster_texture(Random& random, int size) {
   }
   weather(random, image, 0.06);
   const int frame = size / 24;
-  const Colour edge = random_colour(random, 0.05, 0.3);
+  const Colour edge = tint(random, 0.05, 0.3, 0.2);
   fill(image, 0, 0, size, frame, edge);
   fill(image, 0, size - frame, size, size, edge);
   fill(image, 0, 0, frame, size, edge);

@@ -12,6 +12,13 @@ namespace panonav {
 /// surface. Sizes are powers of two. Colours are 0 .. 1.
 using Colour = std::array<float, 3>;
 
+/// A colour of brightness `low` .. `high` whose channels differ from grey by a factor of up to
+/// 1 -+ `spread`.
+[[nodiscard]] Colour tint(Random& random, double low, double high, double spread);
+
+/// The colour times a random factor of 1 -+ `spread`: two things of the same make.
+[[nodiscard]] Colour alike(Random& random, Colour colour, double spread = 0.1);
+
 /// Mixture of noise over many scales whose power falls as 1 / f^exponent, as in natural pictures.
 /// Brightness varies around `base` with the standard deviation `contrast`.
 [[nodiscard]] Image noise_texture(Random& random, int size, Colour base, double contrast,
