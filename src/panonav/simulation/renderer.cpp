@@ -64,8 +64,11 @@ void validate(const Viewpoint& viewpoint) {
   require(std::isfinite(viewpoint.pitch_rad), "pitch_rad", viewpoint.pitch_rad, "finite");
 }
 
+constexpr int kMostRays = 8;
+
 void require_rays(int rays_per_axis) {
-  require(rays_per_axis >= 1 && rays_per_axis <= 8, "rays_per_axis", rays_per_axis, "1 .. 8");
+  require(rays_per_axis >= 1 && rays_per_axis <= kMostRays, "rays_per_axis", rays_per_axis,
+          "1 .. 8");
 }
 
 double light_spacing_m(const Scene& scene) {
@@ -75,6 +78,15 @@ double light_spacing_m(const Scene& scene) {
 LitTriangles checked_triangles(const Scene& scene) {
   panonav::validate(scene);
   return subdivide(scene, light_spacing_m(scene));
+}
+
+// Where ray (i, j) of n x n stands in its pixel: a regular grid, sheared both ways so that all n^2
+// rays differ in u and in v.
+struct SubPixel {
+  double u, v;
+};
+SubPixel sub_pixel(int i, int j, int n) {
+  return {(i + (j + 0.5) / n) / n, (j + (i + 0.5) / n) / n};
 }
 
 float grey_of(const float* value, int channels) {
@@ -221,10 +233,16 @@ Panorama Renderer::render_panorama(const Viewpoint& viewpoint, const PanoramaRen
       (rendering.elevations.top_rad - rendering.elevations.bottom_rad) / rendering.rows;
   const auto spread_rad = static_cast<float>(std::sqrt(column_rad * row_rad) / n);
   const float weight = 1.0F / static_cast<float>(n * n);
-  std::vector<std::array<double, 2>> azimuths(rays_per_row);
-  for (std::size_t i = 0; i < rays_per_row; ++i) {
-    const double azimuth = ((static_cast<double>(i) + 0.5) / n - 0.5) * column_rad;
-    azimuths[i] = {std::cos(azimuth), std::sin(azimuth)};
+  // Directions in the plane for every ray of every line of a row: they are the same in all rows.
+  std::vector<std::array<double, 2>> azimuths(rays_per_row * static_cast<std::size_t>(n));
+  for (int j = 0; j < n; ++j) {
+    for (std::size_t ray = 0; ray < rays_per_row; ++ray) {
+      const int i = static_cast<int>(ray) % n;
+      const double column = static_cast<double>(ray / static_cast<std::size_t>(n));
+      const double azimuth = (column + sub_pixel(i, j, n).u - 0.5) * column_rad;
+      azimuths[static_cast<std::size_t>(j) * rays_per_row + ray] = {std::cos(azimuth),
+                                                                    std::sin(azimuth)};
+    }
   }
   const RayMaker make_ray(viewpoint);
   const auto out = panorama.values();
@@ -235,12 +253,16 @@ Panorama Renderer::render_panorama(const Viewpoint& viewpoint, const PanoramaRen
     for (std::size_t y = begin; y < end; ++y) {
       std::fill(row.begin(), row.end(), 0.0F);
       for (int j = 0; j < n; ++j) {
-        const double elevation =
-            rendering.elevations.top_rad - (static_cast<double>(y) + (j + 0.5) / n) * row_rad;
-        const double flat = std::cos(elevation);
-        const double up = std::sin(elevation);
-        for (std::size_t i = 0; i < rays_per_row; ++i) {
-          rays[i] = make_ray({flat * azimuths[i][0], flat * azimuths[i][1], up});
+        std::array<std::array<double, 2>, kMostRays> elevations{};
+        for (int i = 0; i < n; ++i) {
+          const double elevation = rendering.elevations.top_rad -
+                                   (static_cast<double>(y) + sub_pixel(i, j, n).v) * row_rad;
+          elevations[static_cast<std::size_t>(i)] = {std::cos(elevation), std::sin(elevation)};
+        }
+        const auto* const line = azimuths.data() + static_cast<std::size_t>(j) * rays_per_row;
+        for (std::size_t ray = 0; ray < rays_per_row; ++ray) {
+          const auto& [flat, up] = elevations[ray % static_cast<std::size_t>(n)];
+          rays[ray] = make_ray({flat * line[ray][0], flat * line[ray][1], up});
         }
         implementation_->tracer.trace(rays, hits);
         implementation_->shade(rays, hits, spread_rad, weight, static_cast<std::size_t>(n),
@@ -291,8 +313,9 @@ Radiance Renderer::render_image(const Viewpoint& viewpoint, const Camera& camera
       rays.clear();
       pixel_of.clear();
       for (std::size_t i = 0; i < width * n; ++i) {
-        const PixelPoint point{(static_cast<double>(i) + 0.5) / n,
-                               (static_cast<double>(line) + 0.5) / n};
+        const SubPixel at = sub_pixel(static_cast<int>(i % n), static_cast<int>(line % n), n);
+        const PixelPoint point{static_cast<double>(i / n) + at.u,
+                               static_cast<double>(line / n) + at.v};
         const std::size_t pixel = line / n * width + i / n;
         if (!mirror) {
           if (const auto direction = unproject(camera, point)) {

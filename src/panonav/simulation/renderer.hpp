@@ -36,7 +36,8 @@ struct PanoramaRendering {
   int rows = 80;
   int columns = 512;
   ElevationBand elevations{-0.5235987755982988, 0.6981317007977318};  ///< -30 .. 40 degrees
-  /// Rays per pixel and axis: 1, 2 or more on a regular grid within the pixel.
+  /// Rays per pixel and axis, n x n within the pixel. No two share a line along either axis, so
+  /// that an edge is placed to 1 / n^2 of a pixel.
   int rays_per_axis = 2;
 };
 
