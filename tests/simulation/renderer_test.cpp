@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numbers>
 
+#include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 
 namespace panonav {
@@ -55,6 +57,123 @@ TEST(Renderer, AnEdgeAppearsAtItsAzimuth) {
     }
   }
   EXPECT_GT(bright, 200);
+}
+
+TEST(Renderer, AnEdgeIsPlacedToAFractionOfAColumn) {
+  const Renderer renderer(board_ahead());
+  Executor executor;
+  const int n = 4;
+  const double edge = std::atan2(0.5, 2.0);
+  for (int columns = 100; columns < 110; ++columns) {
+    const Panorama view = renderer.render_panorama(
+        {.pose = {0.0, 0.0, 0.0}},
+        {.rows = 1, .columns = columns, .elevations = {-0.01, 0.01}, .rays_per_axis = n}, executor);
+    // The column that the edge falls into is bright up to the edge.
+    const double at = edge * columns / (2.0 * std::numbers::pi) + 0.5;
+    const int column = static_cast<int>(at);
+    EXPECT_NEAR(view.at(0, column), at - column, 1.0 / (n * n)) << columns << " columns";
+  }
+}
+
+TEST(Renderer, LightFollowsLambertAndTheDistance) {
+  Scene scene = board_ahead();
+  scene.materials[0].emission = 0.0F;
+  scene.materials[0].colour = {0.5F, 0.5F, 0.5F};
+  scene.ambient = 0.1F;
+  scene.lights.push_back({{0.0, 0.0, 0.5}, 1.5F, 0.0F});
+  const Renderer renderer(scene);
+  // Straight ahead the board is 2 m from the lamp; 4.5 m above, the light falls at a slant. The
+  // board's light is interpolated between points, hence the tolerance.
+  const auto expected = [](double height) {
+    const double squared = 4.0 + height * height;
+    return 0.5 * (0.1 + 1.5 / squared * 2.0 / std::sqrt(squared));
+  };
+  EXPECT_NEAR(renderer.radiance_along({0.0, 0.0, 0.5}, {1.0, 0.0, 0.0}, 0.0), expected(0.0), 5e-3);
+  EXPECT_NEAR(renderer.radiance_along({0.0, 0.0, 4.5}, {1.0, 0.0, 0.0}, 0.0), expected(4.0), 5e-3);
+  // The far side sees the ambient light alone.
+  EXPECT_NEAR(renderer.radiance_along({4.0, 0.0, 0.5}, {-1.0, 0.0, 0.0}, 0.0), 0.05, 1e-3);
+}
+
+TEST(Renderer, AScreenCastsAShadowUnlessShadowsAreOff) {
+  Scene scene = board_ahead();
+  scene.materials[0].emission = 0.0F;
+  scene.ambient = 0.0F;
+  scene.lights.push_back({{0.0, 0.0, 0.5}, 2.0F, 0.0F});
+  scene.meshes.push_back(
+      quadrilateral(0, {1.0, -2.0, 0.0}, {1.0, 2.0, 0.0}, {1.0, 2.0, 1.0}, {1.0, -2.0, 1.0}));
+  const Direction3 ahead{1.0, 0.0, 0.0};
+  const Vector3 behind_screen{1.5, 0.0, 0.5};
+  const Vector3 above_shadow{1.5, 0.0, 3.0};
+  const Renderer with(scene);
+  const Renderer without(scene, {.shadows = false});
+  EXPECT_EQ(with.radiance_along(behind_screen, ahead, 0.0), 0.0F);
+  EXPECT_GT(without.radiance_along(behind_screen, ahead, 0.0), 0.3F);
+  EXPECT_NEAR(with.radiance_along(above_shadow, ahead, 0.0),
+              without.radiance_along(above_shadow, ahead, 0.0), 1e-6);
+}
+
+TEST(Renderer, FarTexturesAreAveragedNotSampled) {
+  // A checkerboard of one-texel fields, seen from so far that a pixel covers many of them.
+  Image fields(64, 64, 1);
+  for (int v = 0; v < 64; ++v) {
+    for (int u = 0; u < 64; ++u) fields.at(u, v) = (u + v) % 2 == 0 ? 255 : 0;
+  }
+  Scene scene = board_ahead();
+  scene.materials[0].texture = std::make_shared<const Image>(std::move(fields));
+  scene.meshes[0].texture_coordinates = {{0.0F, 0.0F}, {1.0F, 0.0F}, {1.0F, 10.0F}, {0.0F, 10.0F}};
+  const Renderer renderer(scene);
+  Random random(8);
+  for (int i = 0; i < 50; ++i) {
+    const Vector3 from{-3.0, random.uniform(-0.3, 0.3), random.uniform(-1.0, 1.0)};
+    EXPECT_NEAR(renderer.radiance_along(from, {1.0, 0.0, 0.0}, 0.02), 0.5, 0.01);
+  }
+}
+
+TEST(Renderer, EquirectangularPictureShowsThePanoramaMirrored) {
+  Scene scene = board_ahead();
+  scene.meshes.push_back(
+      quadrilateral(0, {-1.0, 1.0, -0.3}, {1.0, 1.0, -0.3}, {1.0, 1.0, 0.4}, {-1.0, 1.0, 0.4}));
+  const Renderer renderer(scene);
+  Executor executor;
+  const Viewpoint viewpoint{.pose = {0.1, -0.2, 0.4}};
+  Camera camera;
+  camera.model = EquirectangularModel{-0.5, 0.5};
+  camera.image_size = {128, 32};
+  camera.direction = ColumnDirection::clockwise;
+  camera.forward_column = 0.5 / 128.0;  // the middle of the first column looks ahead
+  const Image picture = to_image(renderer.render_image(viewpoint, camera, 2, executor));
+  const Panorama panorama = renderer.render_panorama(
+      viewpoint, {.rows = 32, .columns = 128, .elevations = {-0.5, 0.5}, .rays_per_axis = 2},
+      executor);
+  int bright = 0;
+  for (int v = 0; v < 32; ++v) {
+    for (int u = 0; u < 128; ++u) {
+      const float expected = panorama.at(v, (128 - u) % 128);
+      bright += expected > 0.9F ? 1 : 0;
+      // An edge through the pixel may be counted by other rays: a mirrored pattern of them.
+      EXPECT_NEAR(picture.at(u, v) / 255.0, expected, 0.26) << u << " " << v;
+    }
+  }
+  EXPECT_GT(bright, 100);
+}
+
+TEST(Renderer, RefusesWhatItCannotDraw) {
+  const Renderer renderer(board_ahead());
+  Executor executor;
+  EXPECT_THROW((void)renderer.render_panorama({}, {.rays_per_axis = 0}, executor), ContractError);
+  EXPECT_THROW((void)renderer.render_panorama({.pose = {std::nan(""), 0.0, 0.0}}, {}, executor),
+               ContractError);
+  EXPECT_THROW((void)renderer.radiance_along({}, {0.0, 0.0, 0.0}, 0.0), ContractError);
+  EXPECT_THROW(Renderer(board_ahead(), {.channels = 2}), ContractError);
+  Scene broken = board_ahead();
+  broken.meshes[0].triangles.push_back({0, 1, 9});
+  EXPECT_THROW(Renderer{broken}, ContractError);
+}
+
+TEST(Renderer, AnEmptySceneIsBackground) {
+  Scene scene;
+  scene.background = {0.25F, 0.25F, 0.25F};
+  EXPECT_NEAR(Renderer(scene).radiance_along({}, {1.0, 0.0, 0.0}, 0.0), 0.25, 1e-6);
 }
 
 TEST(Renderer, DistanceIsThatOfTheSurface) {
