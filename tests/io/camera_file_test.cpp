@@ -7,6 +7,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/io/trajectory_file.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace panonav {
 namespace {
@@ -34,7 +35,8 @@ std::string error_of(const fs::path& path) {
 }
 
 TEST(CameraFile, EveryModelReadsBackTheSame) {
-  const fs::path path = fs::temp_directory_path() / "panonav_camera_test.toml";
+  const test::TemporaryFolder folder;
+  const fs::path path = folder / "camera.toml";
   int models = 0;
   for (const CameraModel& model :
        {CameraModel{HyperboloidalModel{}}, CameraModel{PolynomialModel{{-180.0, 0.0, 0.002}}},
@@ -49,11 +51,11 @@ TEST(CameraFile, EveryModelReadsBackTheSame) {
     ++models;
   }
   EXPECT_EQ(models, 4);
-  fs::remove(path);
 }
 
 TEST(CameraFile, FaultsNameFieldValueAndRange) {
-  const fs::path path = fs::temp_directory_path() / "panonav_camera_fault.toml";
+  const test::TemporaryFolder folder;
+  const fs::path path = folder / "camera.toml";
   write_camera(path, {mirror_camera(HyperboloidalModel{}), std::nullopt});
   std::ifstream in(path);
   const std::string good((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
@@ -71,8 +73,7 @@ TEST(CameraFile, FaultsNameFieldValueAndRange) {
   EXPECT_NE(with("centre_u_px", "").find("centre_u_px is missing"), std::string::npos);
   EXPECT_NE(with("columns", "colums = \"clockwise\"").find("colums is not a known field"),
             std::string::npos);
-  EXPECT_NE(error_of(path.parent_path() / "panonav_no_such_camera.toml"), "");
-  fs::remove(path);
+  EXPECT_NE(error_of(folder / "no_such_camera.toml"), "");
 }
 
 TEST(TrajectoryFile, TumAndCsvReadBackTheSame) {
@@ -80,8 +81,9 @@ TEST(TrajectoryFile, TumAndCsvReadBackTheSame) {
   for (int i = 0; i < 20; ++i) {
     trajectory.push_back({0.1 * i, {0.3 * i, -0.01 * i * i, wrap_angle(0.5 * i)}});
   }
-  for (const char* name : {"panonav_trajectory.tum", "panonav_trajectory.csv"}) {
-    const fs::path path = fs::temp_directory_path() / name;
+  const test::TemporaryFolder folder;
+  for (const char* name : {"trajectory.tum", "trajectory.csv"}) {
+    const fs::path path = folder / name;
     write_trajectory(path, trajectory);
     const auto back = read_trajectory(path);
     ASSERT_EQ(back.size(), trajectory.size());
@@ -91,12 +93,12 @@ TEST(TrajectoryFile, TumAndCsvReadBackTheSame) {
       EXPECT_NEAR(angle_difference(back[i].pose.heading_rad, trajectory[i].pose.heading_rad), 0.0,
                   1e-12);
     }
-    fs::remove(path);
   }
 }
 
 TEST(TrajectoryFile, FaultsNameTheLine) {
-  const fs::path path = fs::temp_directory_path() / "panonav_trajectory_fault.tum";
+  const test::TemporaryFolder folder;
+  const fs::path path = folder / "trajectory.tum";
   const auto message = [&](const std::string& text) -> std::string {
     std::ofstream(path) << text;
     try {
@@ -111,7 +113,6 @@ TEST(TrajectoryFile, FaultsNameTheLine) {
   EXPECT_NE(message("0 1 2 0 0 0 0 0.5\n").find("quaternion"), std::string::npos);
   EXPECT_NE(message("1 1 2 0 0 0 0 1\n1 1 2 0 0 0 0 1\n").find("stamp"), std::string::npos);
   EXPECT_NE(message("# nothing\n").find("no pose"), std::string::npos);
-  fs::remove(path);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/simulation/free_space.hpp"
 #include "panonav/simulation/mesh_library.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace panonav {
 namespace {
@@ -55,11 +56,6 @@ const Material& material_of(const Scene& scene, const std::string& object, std::
 class GazeboWorld : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::temp_directory_path() /
-              ("panonav_world_" +
-               std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
     try {
       (void)load_gazebo(data / "worlds/tiny.world");
     } catch (const FileError& error) {
@@ -67,12 +63,7 @@ class GazeboWorld : public testing::Test {
       GTEST_SKIP() << "built without sdformat or assimp";
     }
   }
-  void TearDown() override { fs::remove_all(folder_); }
-  fs::path write(const std::string& name, const std::string& text) const {
-    std::ofstream(folder_ / name, std::ios::binary) << text;
-    return folder_ / name;
-  }
-  fs::path folder_;
+  const test::TemporaryFolder folder_;
 };
 
 TEST_F(GazeboWorld, PosesScalesAndUnitsAreComposed) {
@@ -121,7 +112,7 @@ TEST_F(GazeboWorld, LightsKeepTheirPlaceAndTheirFading) {
 }
 
 TEST_F(GazeboWorld, LightBeyondWhiteIsScaledDownAsAWhole) {
-  const auto world = write("bright.world", R"(<sdf version="1.6"><world name="bright">
+  const auto world = folder_.write("bright.world", R"(<sdf version="1.6"><world name="bright">
     <scene><ambient>1 1 1 1</ambient></scene>
     <light name="sun" type="directional"><diffuse>1 1 1 1</diffuse><direction>0 0 -1</direction></light>
     <model name="m"><static>true</static><link name="l"><visual name="v"><geometry><box><size>1 1 1</size></box>
@@ -134,7 +125,7 @@ TEST_F(GazeboWorld, LightBeyondWhiteIsScaledDownAsAWhole) {
 TEST_F(GazeboWorld, ModelFoldersMayLieElsewhere) {
   const std::string text = R"(<sdf version="1.6"><world name="far">
     <include><uri>model://crate</uri></include></world></sdf>)";
-  const auto world = write("far.world", text);
+  const auto world = folder_.write("far.world", text);
   try {
     (void)load_gazebo(world, options());
     FAIL() << "no error";
@@ -168,21 +159,22 @@ TEST_F(GazeboWorld, BrokenFilesGiveOneClearLineAndNothingOnTheConsole) {
   const std::string visual_end = "</geometry></visual></link></model></world></sdf>";
   std::vector<fs::path> files{
       folder_ / "nothing.world",
-      folder_,
-      write("empty.world", ""),
-      write("text.world", "not xml"),
-      write("cut.world", head),
-      write("no_world.world", R"(<sdf version="1.6"></sdf>)"),
-      write("no_visual.world", head + "</world></sdf>"),
-      write("newer.world", R"(<sdf version="99.0"><world name="w"></world></sdf>)"),
-      write("no_mesh.world",
-            head + visual + "<mesh><uri>model://a/b.dae</uri></mesh>" + visual_end),
-      write("no_model.world", head + "<include><uri>model://absent</uri></include></world></sdf>"),
-      write(
+      folder_.path(),
+      folder_.write("empty.world", ""),
+      folder_.write("text.world", "not xml"),
+      folder_.write("cut.world", head),
+      folder_.write("no_world.world", R"(<sdf version="1.6"></sdf>)"),
+      folder_.write("no_visual.world", head + "</world></sdf>"),
+      folder_.write("newer.world", R"(<sdf version="99.0"><world name="w"></world></sdf>)"),
+      folder_.write("no_mesh.world",
+                    head + visual + "<mesh><uri>model://a/b.dae</uri></mesh>" + visual_end),
+      folder_.write("no_model.world",
+                    head + "<include><uri>model://absent</uri></include></world></sdf>"),
+      folder_.write(
           "twins.world",
           head +
               R"(<model name="m"><link name="l"/></model><model name="m"><link name="l"/></model></world></sdf>)"),
-      write(
+      folder_.write(
           "pose.world",
           head +
               R"(<model name="m"><pose>nan 0 0 0 0 0</pose><link name="l"><visual name="v"><geometry>)" +
@@ -192,7 +184,8 @@ TEST_F(GazeboWorld, BrokenFilesGiveOneClearLineAndNothingOnTheConsole) {
     std::ifstream stream(data / "worlds/tiny.world");
     const std::string good(std::istreambuf_iterator<char>(stream), {});
     for (std::size_t length = 100; length + 10 < good.size(); length += 331) {
-      files.push_back(write("cut" + std::to_string(length) + ".world", good.substr(0, length)));
+      files.push_back(
+          folder_.write("cut" + std::to_string(length) + ".world", good.substr(0, length)));
     }
   }
   testing::internal::CaptureStdout();
@@ -214,7 +207,7 @@ TEST_F(GazeboWorld, BrokenFilesGiveOneClearLineAndNothingOnTheConsole) {
 }
 
 TEST_F(GazeboWorld, AModelThatIncludesItselfIsRefused) {
-  const auto world = write("loop.world", R"(<sdf version="1.6"><world name="w">
+  const auto world = folder_.write("loop.world", R"(<sdf version="1.6"><world name="w">
     <include><uri>model://loop</uri></include></world></sdf>)");
   GazeboOptions with_folder = options();
   with_folder.model_folders.push_back(data / "models");

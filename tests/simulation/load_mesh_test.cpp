@@ -7,6 +7,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/simulation/mesh_library.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace panonav {
 namespace {
@@ -35,11 +36,6 @@ void expect_extent(const Scene& scene, const Vector3& low, const Vector3& high) 
 class MeshFile : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::temp_directory_path() /
-              ("panonav_mesh_" +
-               std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
     try {
       (void)load_mesh(meshes / "crate_z_up_cm.dae");
     } catch (const FileError& error) {
@@ -47,12 +43,7 @@ class MeshFile : public testing::Test {
       GTEST_SKIP() << "built without assimp";
     }
   }
-  void TearDown() override { fs::remove_all(folder_); }
-  fs::path write(const std::string& name, const std::string& text) const {
-    std::ofstream(folder_ / name, std::ios::binary) << text;
-    return folder_ / name;
-  }
-  fs::path folder_;
+  const test::TemporaryFolder folder_;
 };
 
 TEST_F(MeshFile, ColladaUnitIsAppliedAndZStaysUp) {
@@ -112,7 +103,7 @@ TEST_F(MeshFile, LargeTexturesAreHalved) {
 
 TEST_F(MeshFile, ObjAndStlAreZUpUnlessSaidOtherwise) {
   const auto obj =
-      write("part.obj", "o part\nv 0 0 0\nv 2 0 0\nv 0 3 0\nv 0 0 4\nf 1 2 3\nf 1 2 4\n");
+      folder_.write("part.obj", "o part\nv 0 0 0\nv 2 0 0\nv 0 3 0\nv 0 0 4\nf 1 2 3\nf 1 2 4\n");
   expect_extent(load_mesh(obj), {0.0, 0.0, 0.0}, {2.0, 3.0, 4.0});
   expect_extent(load_mesh(obj, {.up = UpAxis::y}), {0.0, -4.0, 0.0}, {2.0, 0.0, 3.0});
   expect_extent(load_mesh(obj, {.scale = 0.5}), {0.0, 0.0, 0.0}, {1.0, 1.5, 2.0});
@@ -124,16 +115,16 @@ TEST_F(MeshFile, BrokenFilesGiveOneClearLine) {
     std::ifstream stream(meshes / "crate_z_up_cm.dae");
     return std::string(std::istreambuf_iterator<char>(stream), {});
   }();
-  std::vector<fs::path> files{write("empty.dae", ""),
-                              write("text.obj", "no mesh at all\n"),
-                              write("noise.stl", "\x01\x02\x03"),
-                              write("unknown.xyz", "1 2 3"),
-                              write("nan.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
-                              write("index.obj", "v 0 0 0\nv 1 0 0\nf 1 2 99\n"),
-                              folder_,
+  std::vector<fs::path> files{folder_.write("empty.dae", ""),
+                              folder_.write("text.obj", "no mesh at all\n"),
+                              folder_.write("noise.stl", "\x01\x02\x03"),
+                              folder_.write("unknown.xyz", "1 2 3"),
+                              folder_.write("nan.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+                              folder_.write("index.obj", "v 0 0 0\nv 1 0 0\nf 1 2 99\n"),
+                              folder_.path(),
                               folder_ / "nothing.dae"};
   for (std::size_t length = 0; length < good.size(); length += 397) {
-    files.push_back(write("cut" + std::to_string(length) + ".dae", good.substr(0, length)));
+    files.push_back(folder_.write("cut" + std::to_string(length) + ".dae", good.substr(0, length)));
   }
   ASSERT_GT(files.size(), 10U);
   for (const fs::path& file : files) {
