@@ -120,8 +120,7 @@ TEST(Align, RefusesSetsThatDoNotMatch) {
   EXPECT_THROW((void)align(Points{{0, 0}}, Points{}), ContractError);
 }
 
-// Singular values of the 2 x 2 product of the centred unit-norm sets, in closed form, as the design
-// writes mu.
+// Singular values of the 2 x 2 product of the centred unit-norm sets, in closed form.
 ShapeDifference oracle_shape_difference(const Points& a, const Points& b) {
   const Point2 ca = centroid(a);
   const Point2 cb = centroid(b);

@@ -30,7 +30,8 @@ struct AlignmentOptions {
 
 /// How much two shapes differ when translation, rotation and size do not count: mu = 1 - (s_1 + d
 /// s_2)^2 with s the singular values of the product of the two centred, unit-norm sets, d = +-1 so
-/// that the best proper rotation is meant [F11 section 3.3 with the design's correction].
+/// that the best proper rotation is meant. The measure that [F11 section 4] names but does not
+/// print.
 struct ShapeDifference {
   double value = 0.0;            ///< 0 (same shape) .. 1
   double with_reflection = 0.0;  ///< the same when a mirror image is allowed
