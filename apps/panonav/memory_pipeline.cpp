@@ -21,9 +21,12 @@ PictureSource cut_to(const MemoryHeader& header, PictureSource source) {
   return source;
 }
 
+bool both_ready_made(const MemoryHeader& header, const PictureSource& source) {
+  return source.kind == PictureKind::panorama && header.source.kind == PictureKind::panorama;
+}
+
 PanoramaShape shape_for(const MemoryHeader& header, const PictureSource& source) {
-  if (source.kind == PictureKind::panorama && header.source.kind == PictureKind::panorama)
-    return {};
+  if (both_ready_made(header, source) && !header.picture_shape) return {};
   return {header.shape.rows, header.panorama_columns};
 }
 
@@ -42,15 +45,26 @@ bool same_band(const std::optional<ElevationBand>& a, const std::optional<Elevat
 }  // namespace
 
 MemoryPipeline::MemoryPipeline(const MemoryHeader& header, const PictureSource& source)
-    : header_(header), reader_(cut_to(header, source), shape_for(header, source)) {}
+    : header_(header), reader_(cut_to(header, source), shape_for(header, source)) {
+  if (both_ready_made(header, source)) picture_shape_ = header.picture_shape;
+}
 
 Panorama MemoryPipeline::read(const DatasetEntry& entry) const {
-  Panorama panorama = reader_.read(entry.path);
   const auto refuse = [&](const std::string& field, const std::string& value,
                           const std::string& wanted) {
     throw FileError(entry.path.string(), field + " is " + value + "; allowed: " + wanted +
                                              ", as in the views of the memory");
   };
+  if (picture_shape_) {
+    const auto [width, height] = read_image_size(entry.path);
+    if (height != picture_shape_->rows) {
+      refuse("rows", std::to_string(height), std::to_string(picture_shape_->rows));
+    }
+    if (width != picture_shape_->columns) {
+      refuse("columns", std::to_string(width), std::to_string(picture_shape_->columns));
+    }
+  }
+  Panorama panorama = reader_.read(entry.path);
   if (panorama.rows() != header_.shape.rows) {
     refuse("rows", std::to_string(panorama.rows()), std::to_string(header_.shape.rows));
   }

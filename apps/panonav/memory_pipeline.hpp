@@ -27,9 +27,10 @@ class MemoryPipeline {
  private:
   MemoryHeader header_;
   PanoramaReader reader_;
+  std::optional<PanoramaShape> picture_shape_;  ///< of panoramas that are resampled
 };
 
-/// The size of the cylinders of a new memory, with the defaults filled in.
+/// The size of the cylinders of a new memory, with the defaults filled in; 0: a panorama's own.
 [[nodiscard]] PanoramaShape wanted_shape(const Dataset& recording, const SignatureOptions& options);
 
 /// The largest magnitude of k >= 1. k = 0 is the mean brightness: much larger than the rest, and it

@@ -100,13 +100,14 @@ Dataset open_recording(const std::string& input, const PictureArguments& picture
 }
 
 void visit_options(SignatureOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "rows",
-                 .help = "Rows of the panoramic cylinder; 0: 80, or a panorama's own",
-                 .low = 0,
-                 .high = 4096},
-                options.rows);
+  visitor.visit(
+      {.name = "rows",
+       .help = "Rows of the panoramic cylinder; pictures are resampled; 0: 80, or a panorama's own",
+       .low = 0,
+       .high = 4096},
+      options.rows);
   visitor.visit({.name = "columns",
-                 .help = "Columns of the panoramic cylinder; 0: 512, or a panorama's own",
+                 .help = "Columns of the panoramic cylinder, likewise; 0: 512, or a panorama's own",
                  .low = 0,
                  .high = 16384},
                 options.columns);

@@ -3,6 +3,7 @@
 #include <set>
 
 #include "arguments.hpp"
+#include "known_views.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "session.hpp"
@@ -27,6 +28,7 @@ ExitCode forget(const ForgetArguments& wanted, Session& session) {
     }
     views.insert(*view);
   }
+  forget_recordings(memory);
   memory.remove(std::vector<ViewId>(views.begin(), views.end()));
   const auto left = memory.info().views;
   if (session.json()) {

@@ -6,8 +6,10 @@
 #include <nlohmann/json.hpp>
 #include <unordered_set>
 
+#include "known_views.hpp"
 #include "memory_pipeline.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/io/image_file.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "recording.hpp"
 #include "session.hpp"
@@ -49,6 +51,11 @@ MemoryHeader header_from_first_views(const Dataset& recording, const MemoriseArg
   header.shape = {first.rows(), wanted.signature.components};
   header.panorama_columns = first.columns();
   header.elevations = first.elevations();
+  if (recording.source.kind == PictureKind::panorama) {
+    const auto [width, height] = read_image_size(recording.entries.front().path);
+    const PanoramaShape own{height, width};
+    if (own != PanoramaShape{first.rows(), first.columns()}) header.picture_shape = own;
+  }
   if (2 * header.shape.components > header.panorama_columns) {
     throw ContractError("components", header.shape.components,
                         "1 to " + std::to_string(header.panorama_columns / 2) +
@@ -96,34 +103,6 @@ void check_same_options(const Arguments& arguments, const MemoriseArguments& wan
     throw FileError(memory.path().string(),
                     "was made with other preprocessing; leave these options out or start a new "
                     "memory");
-  }
-}
-
-/// Names that the memory knows must mean the same views: other poses, or other pictures under an
-/// old name, are two recordings with the same file names.
-void check_known_views(const Dataset& recording, const VisualMemory& memory,
-                       const MemoryPipeline& pipeline, const std::string& path) {
-  std::vector<const DatasetEntry*> known;
-  for (const auto& entry : recording.entries) {
-    const auto view = memory.find(entry.file);
-    if (!view) continue;
-    known.push_back(&entry);
-    const auto& info = memory.info(*view);
-    if (info.pose != entry.pose || info.stamp_s != entry.stamp_s) {
-      throw FileError(path,
-                      "holds a view " + entry.file +
-                          " with another pose or stamp; names must be unique within a memory");
-    }
-  }
-  // Comparing pictures costs as much as memorising them, so a few stand for all.
-  constexpr std::size_t compared = 4;
-  const std::size_t count = std::min(compared, known.size());
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto& entry = *known[i * (known.size() - 1) / std::max<std::size_t>(1, count - 1)];
-    if (pipeline.packed(pipeline.read(entry)) != memory.packed(*memory.find(entry.file))) {
-      throw FileError(path, "holds another picture under the name " + entry.file +
-                                "; names must be unique within a memory");
-    }
   }
 }
 
@@ -187,7 +166,8 @@ ExitCode memorise(const Arguments& arguments, const MemoriseArguments& wanted, S
                                 header_from_first_views(recording, wanted, session.executor()));
   }
   const MemoryPipeline pipeline(memory->header(), recording.source);
-  if (resumes) check_known_views(recording, memory->load(), pipeline, wanted.memory);
+  if (resumes) check_known_views(recording, *memory, pipeline, session);
+  remember_recording(recording, *memory);
   const auto counts = append_all(recording, pipeline, !wanted.no_thumbnails, *memory, session);
   const auto info = memory->info();
   if (session.json()) {
@@ -231,7 +211,8 @@ Verb memorise_verb() {
   return {
       "memorise", "Remember what the places of a recording look like",
       "Every view is on the disk before the next one is taken up; after an interruption the same\n"
-      "command goes on where it stopped.",
+      "command goes on where it stopped. Views that the memory knows by name must be the same\n"
+      "views: another pose, stamp or picture under a known name is refused.",
       "  panonav memorise office_run office.panonav\n"
       "  panonav memorise photos walk.panonav --kind equirectangular --elevation-deg -30 40",
       declare};

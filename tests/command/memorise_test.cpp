@@ -63,6 +63,77 @@ TEST_F(Memorise, SecondTimeThereIsNothingToDo) {
   EXPECT_EQ(views_in(memory()), 16);
 }
 
+TEST_F(Memorise, PanoramasAreResampledToTheSizeAskedFor) {
+  ASSERT_EQ(run_panonav({"memorise", data(), memory(), "--rows", "6", "--columns", "48"}).exit_code,
+            0);
+  const auto info = info_of(memory());
+  EXPECT_EQ(info["rows"], 6);
+  EXPECT_EQ(info["panorama_columns"], 48);
+  EXPECT_EQ(info["views"], 16);
+  // Asking resamples in the same way, so that every view finds itself.
+  const auto asked = run_panonav({"localise", memory(), data(), "--json"});
+  ASSERT_EQ(asked.exit_code, 0) << asked.err;
+  const auto answers = lines(asked.out);
+  ASSERT_EQ(answers.size(), 16U);
+  for (const auto& line : answers) {
+    const auto answer = json::parse(line);
+    EXPECT_EQ(answer["matches"][0]["file"], answer["file"]);
+    EXPECT_EQ(answer["matches"][0]["dissimilarity"], 0);
+  }
+  // Pictures of another size than the recording's are still refused, on both ways in.
+  world_.write_picture(data() / view_name(5), {0.0, 0.0, 0.0}, 48, 6);
+  auto line = refusal({"localise", memory(), data()});
+  EXPECT_NE(line.find(view_name(5) + ": rows is 6; allowed: 12"), std::string::npos) << line;
+  line = refusal({"memorise", data(), folder_ / "o.panonav", "--rows", "6", "--columns", "48"});
+  EXPECT_NE(line.find(view_name(5)), std::string::npos) << line;
+  EXPECT_FALSE(fs::exists(folder_ / "o.panonav"));
+}
+
+TEST_F(Memorise, AResumedMemoryTakesNoOtherPictureUnderAKnownName) {
+  ASSERT_EQ(run_panonav({"memorise", data(), memory()}).exit_code, 0);
+  // Same name, same pose, one other picture out of sixteen.
+  world_.write_picture(data() / view_name(6), {1.7, 0.1, 0.0});
+  auto line = refusal({"memorise", data(), memory()});
+  EXPECT_NE(line.find("m.panonav"), std::string::npos) << line;
+  EXPECT_NE(line.find("another picture under the name " + view_name(6)), std::string::npos) << line;
+  // The robot turned on the spot: the same place, but another view.
+  world_.write_picture(data() / view_name(6), {0.5, 1.0, 0.4});
+  line = refusal({"memorise", data(), memory()});
+  EXPECT_NE(line.find(view_name(6)), std::string::npos) << line;
+  // The true picture written anew is the same view.
+  world_.write_picture(data() / view_name(6), grid_poses(4)[6]);
+  EXPECT_EQ(run_panonav({"memorise", data(), memory()}).exit_code, 0);
+  fs::remove(data() / view_name(6));
+  line = refusal({"memorise", data(), memory()});
+  EXPECT_NE(line.find(view_name(6)), std::string::npos) << line;
+  EXPECT_EQ(views_in(memory()), 16);
+}
+
+TEST_F(Memorise, AResumedMemoryTakesNoOtherPoseUnderAKnownName) {
+  ASSERT_EQ(run_panonav({"memorise", data(), memory()}).exit_code, 0);
+  auto moved = grid_poses(4);
+  moved[9].x_m += 0.01;
+  write_dataset(data(), world_, moved);
+  const auto line = refusal({"memorise", data(), memory()});
+  EXPECT_NE(line.find(view_name(9)), std::string::npos) << line;
+  EXPECT_EQ(views_in(memory()), 16);
+}
+
+TEST_F(Memorise, WhatWasForgottenAndReplacedIsComparedAgain) {
+  ASSERT_EQ(run_panonav({"memorise", data(), memory()}).exit_code, 0);
+  ASSERT_EQ(run_panonav({"forget", memory(), view_name(6)}).exit_code, 0);
+  const auto other = folder_.path() / "other";
+  auto poses = grid_poses(4);
+  write_dataset(other, LandmarkWorld(99), poses);
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    if (i != 6) fs::remove(other / view_name(i));
+  }
+  write_text(other / "poses.csv", "file,x_m,y_m,heading_deg\nview_006.png,0.5,1,0\n");
+  ASSERT_EQ(run_panonav({"memorise", other, memory()}).exit_code, 0);
+  const auto line = refusal({"memorise", data(), memory()});
+  EXPECT_NE(line.find(view_name(6)), std::string::npos) << line;
+}
+
 TEST_F(Memorise, TakesAFolderOfImagesWithoutPoses) {
   fs::remove(data() / "dataset.toml");
   const auto result = run_panonav({"memorise", data(), memory(), "--kind", "panorama", "--json"});

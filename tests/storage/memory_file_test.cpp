@@ -33,7 +33,9 @@ TEST(MemoryFile, HeadersComeBack) {
   picture.source.layout.elevations = ElevationBand{-1.5, 1.5};
   picture.source.layout.kept_elevations = ElevationBand{-0.5, 0.7};
   picture.elevations = ElevationBand{-0.5, 0.7};
-  std::vector<MemoryHeader> headers{plain, picture, mirror_header()};
+  MemoryHeader resampled = small_header();
+  resampled.picture_shape = PanoramaShape{37, 720};
+  std::vector<MemoryHeader> headers{plain, picture, resampled, mirror_header()};
   for (const CameraModel& model :
        {CameraModel(HyperboloidalModel{}), CameraModel(UnifiedModel{0.9, 200.0}),
         CameraModel(EquiangularModel{-0.9, 0.4})}) {
@@ -208,6 +210,12 @@ TEST(MemoryFile, ImpossibleHeadersAreRefused) {
   refused(header);
   header = small_header();
   header.panorama_columns = 9;
+  refused(header);
+  header = small_header();
+  header.picture_shape = PanoramaShape{0, 720};
+  refused(header);
+  header = mirror_header();
+  header.picture_shape = PanoramaShape{80, 720};
   refused(header);
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "panonav/memory/visual_memory.hpp"
+#include "panonav/panorama/picture.hpp"
 #include "panonav/panorama/picture_source.hpp"
 #include "panonav/panorama/preprocessing.hpp"
 
@@ -23,7 +24,10 @@ struct MemoryHeader {
   std::optional<ElevationBand> elevations;  ///< of the signatures' rows; empty: unknown
   int panorama_columns = 512;               ///< of the cylinders that the signatures are taken from
   PreprocessingOptions preprocessing;
-  PictureSource source;             ///< how queries without a data set of their own are read
+  PictureSource source;  ///< how queries without a data set of their own are read
+  /// Rows and columns of ready-made panoramas that are resampled to the memory's; empty: they have
+  /// the memory's own, or the pictures are of another kind.
+  std::optional<PanoramaShape> picture_shape;
   std::optional<double> created_s;  ///< seconds since 1970-01-01 UTC
   friend bool operator==(const MemoryHeader&, const MemoryHeader&) = default;
 };

@@ -247,6 +247,14 @@ void validate(const MemoryHeader& header) {
     throw ContractError("camera", source.camera ? "there" : "missing",
                         "there for mirror pictures and only for them");
   }
+  if (header.picture_shape) {
+    if (source.kind != PictureKind::panorama) {
+      throw ContractError("picture_shape", "there", "there for panoramas only");
+    }
+    require(header.picture_shape->rows >= 1, "picture rows", header.picture_shape->rows, ">= 1");
+    require(header.picture_shape->columns >= 4, "picture columns", header.picture_shape->columns,
+            ">= 4");
+  }
   if (source.camera) validate(*source.camera);
   if (source.mask && (!source.camera || source.mask->channels() != 1 ||
                       source.mask->size() != source.camera->image_size)) {
@@ -279,6 +287,10 @@ Settings settings_of(const MemoryHeader& header) {
   settings.emplace("source.forward_column", source.layout.forward_column);
   put_band(settings, "source.elevation_", source.layout.elevations);
   put_band(settings, "source.kept_elevation_", source.layout.kept_elevations);
+  if (header.picture_shape) {
+    settings.emplace("source.picture_rows", std::int64_t{header.picture_shape->rows});
+    settings.emplace("source.picture_columns", std::int64_t{header.picture_shape->columns});
+  }
   if (source.camera) put_camera(settings, *source.camera);
   if (source.mask) settings.emplace("source.mask", bits_of(*source.mask));
   return settings;
@@ -302,6 +314,11 @@ MemoryHeader header_from(const Settings& settings) {
   source.layout.forward_column = reader.get<double>("source.forward_column");
   source.layout.elevations = reader.band("source.elevation_");
   source.layout.kept_elevations = reader.band("source.kept_elevation_");
+  if (reader.find<std::int64_t>("source.picture_rows") != nullptr ||
+      reader.find<std::int64_t>("source.picture_columns") != nullptr) {
+    header.picture_shape = PanoramaShape{reader.integer("source.picture_rows"),
+                                         reader.integer("source.picture_columns")};
+  }
   if (source.kind == PictureKind::mirror) {
     source.camera = camera_from(reader);
     validate(*source.camera);
