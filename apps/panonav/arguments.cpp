@@ -118,11 +118,18 @@ std::string unknown_verb(std::span<const Verb> verbs, const std::string& typed) 
   return message;
 }
 
-std::string one_line(const CLI::ParseError& error) {
+/// With what was typed that is no option: the parser looks for missing arguments first, and a
+/// misspelt flag is often why one is missing.
+std::string one_line(const CLI::ParseError& error, const CLI::App& app) {
   std::string text = error.what();
   std::replace(text.begin(), text.end(), '\n', ' ');
   while (!text.empty() && (text.back() == ' ' || text.back() == '.')) text.pop_back();
-  return text;
+  if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) return text;
+  std::string unknown;
+  for (const auto& typed : app.remaining(true)) {
+    if (typed.starts_with("-")) unknown += (unknown.empty() ? "" : ", ") + typed;
+  }
+  return unknown.empty() ? text : "no such option: " + unknown + "; and " + text;
 }
 
 }  // namespace
@@ -330,7 +337,7 @@ std::optional<ParsedCommand> parse(std::span<const Verb> verbs, int argc, const 
     app.exit(success, std::cout, std::cout);
     return std::nullopt;
   } catch (const CLI::ParseError& error) {
-    throw UsageError(one_line(error));
+    throw UsageError(one_line(error, app));
   }
   // One file may serve several verbs, so the sections of all of them are allowed in it.
   std::vector<std::string_view> sections;

@@ -7,6 +7,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
+#include "session.hpp"
 
 namespace panonav::command {
 
@@ -32,7 +33,8 @@ PanoramaShape shape_for(const MemoryHeader& header, const PictureSource& source)
 
 std::string band_text(const std::optional<ElevationBand>& band) {
   if (!band) return "unknown";
-  return to_text(degrees(band->bottom_rad)) + " to " + to_text(degrees(band->top_rad)) + " degrees";
+  return short_number(degrees(band->bottom_rad)) + " to " + short_number(degrees(band->top_rad)) +
+         " degrees";
 }
 
 bool same_band(const std::optional<ElevationBand>& a, const std::optional<ElevationBand>& b) {

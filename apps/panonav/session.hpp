@@ -40,6 +40,9 @@ class Session {
 /// A number with this many digits after the point, for people.
 [[nodiscard]] std::string fixed(double value, int digits);
 
+/// A number with up to six digits that count, for people: 30, not 29.999999999999996.
+[[nodiscard]] std::string short_number(double value);
+
 /// A bar on standard error, only where that is a terminal and only once the work has taken longer
 /// than a second. The bar is gone when the object is. Not thread-safe: advance it from one thread.
 class Progress {

@@ -73,9 +73,10 @@ ExitCode show(const std::string& path, Session& session) {
                 std::to_string(2 * header.shape.size()) + " bytes a view");
   session.print("  pictures    " + std::string(kind_name(header.source.kind)) + ", " +
                 std::to_string(header.panorama_columns) + " columns, elevations " +
-                (header.elevations ? to_text(degrees(header.elevations->bottom_rad)) + " to " +
-                                         to_text(degrees(header.elevations->top_rad)) + " degrees"
-                                   : std::string("unknown")));
+                (header.elevations
+                     ? short_number(degrees(header.elevations->bottom_rad)) + " to " +
+                           short_number(degrees(header.elevations->top_rad)) + " degrees"
+                     : std::string("unknown")));
   session.print("  file        " + std::to_string(info.file_bytes) + " bytes, format " +
                 std::to_string(info.format_version) + ", " + std::to_string(info.thumbnails) +
                 " thumbnails");
