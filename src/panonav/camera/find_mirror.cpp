@@ -159,8 +159,12 @@ std::optional<double> disc_within(const Evidence& seen, std::span<const SmoothPl
   const double reach_px = std::max(2.0, disc_off_centre * rim.radius_px);
   const PixelPoint centre{rim.centre.u_px / seen.middle_reduction,
                           rim.centre.v_px / seen.middle_reduction};
+  struct Disc {
+    double quality;
+    double radius_px;
+  };
+  std::vector<Disc> discs;
   double best_quality = 0;
-  std::optional<double> radius_px;
   for (const FieldCircle& candidate : concentric_candidates(
            seen.middle, centre.u_px, centre.v_px, reach_px / seen.middle_reduction, range, 1.0)) {
     const auto found = refined(seen, planes, climb(seen.middle, candidate, range));
@@ -171,9 +175,15 @@ std::optional<double> disc_within(const Evidence& seen, std::span<const SmoothPl
     const double outside =
         structure(planes, rim.centre, 1.1 * found->radius_px, 0.95 * rim.radius_px);
     const double needed = inside < plain_ring * outside ? least_plain_disc : least_disc;
-    if (found->quality >= needed && found->quality > best_quality) {
-      best_quality = found->quality;
-      radius_px = found->radius_px + off_px;
+    if (found->quality < needed) continue;
+    discs.push_back({found->quality, found->radius_px + off_px});
+    best_quality = std::max(best_quality, found->quality);
+  }
+  // A camera shows several circles, its lens and its body: the widest clear one covers them all.
+  std::optional<double> radius_px;
+  for (const Disc& disc : discs) {
+    if (disc.quality >= as_clear * best_quality && disc.radius_px > radius_px.value_or(0.0)) {
+      radius_px = disc.radius_px;
     }
   }
   return radius_px;
