@@ -22,7 +22,7 @@ p { max-width: 48rem; }
 .figures b { display: block; font-size: 1.5rem; color: var(--accent); }
 .pictures { display: flex; flex-wrap: wrap; gap: 1.2rem; }
 figure { margin: .8rem 0; flex: 1 1 22rem; max-width: 100%; }
-figure img { max-width: 100%; border: 1px solid var(--line); border-radius: .3rem; background: #fff; }
+figure img { width: 100%; max-width: 60rem; border: 1px solid var(--line); border-radius: .3rem; background: #fff; }
 figcaption { font-size: .92rem; opacity: .85; }
 table { border-collapse: collapse; margin: 1rem 0; display: block; overflow-x: auto; }
 th, td { text-align: left; padding: .3rem .8rem; border-bottom: 1px solid var(--line); }

@@ -1,21 +1,20 @@
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
+#include <string_view>
 #include <vector>
 
 #include "arguments.hpp"
+#include "demo_pictures.hpp"
+#include "demo_recordings.hpp"
+#include "memorising.hpp"
 #include "panonav/core/error.hpp"
-#include "panonav/evaluation/m04_figures.hpp"
-#include "panonav/evaluation/place_recording.hpp"
-#include "panonav/evaluation/plot.hpp"
 #include "panonav/evaluation/statistics.hpp"
+#include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
-#include "panonav/localisation/localiser.hpp"
-#include "panonav/panorama/unwarper.hpp"
-#include "panonav/simulation/mirror.hpp"
-#include "panonav/simulation/renderer.hpp"
-#include "panonav/simulation/sensor.hpp"
-#include "panonav/storage/memory_file.hpp"
 #include "report_page.hpp"
 #include "session.hpp"
 #include "verbs.hpp"
@@ -26,225 +25,273 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct DemoArguments {
-  std::string out = "demo";
-  std::optional<std::uint64_t> seed;
-};
-
-constexpr int kComponents = 15;
-// 80 x 15 magnitudes of preprocessed offices stay below; larger ones saturate, which does no harm
-// to speak of.
-constexpr float kFullScale = 0.5F;
-
-FourierSignature signature_of(const Panorama& view) {
-  return compute_signature(preprocess(view, PreprocessingOptions{}), kComponents);
-}
-
 std::string percent(double share) {
   return fixed(100.0 * share, 0) + " %";
 }
 
-// What the robot's camera sees at the first query, and the cylinder made of it.
-void show_camera(const PlaceRecording& place, const fs::path& out, Session& session,
+// Raw picture, what calibration found in it, and the cylinder made of it.
+void show_camera(const DemoRecordings& recordings, const fs::path& out, Session& session,
                  ReportPage& page) {
-  const Camera camera = simulated_mirror_camera();
-  const Renderer renderer(place.scene, {.channels = 3}, session.executor());
-  const Viewpoint viewpoint{.pose = place.queries.front().pose,
-                            .height_m = place.scene.camera_height_m};
-  const Image raw = apply_sensor(renderer.render_image(viewpoint, camera, 2, session.executor()),
-                                 camera, SensorOptions{}, 1);
-  write_png(out / "mirror.png", raw.view());
-  const Unwarper unwarper(camera);
-  const Panorama cylinder = unwarper.unwrap(raw.view());
+  const Dataset& asked = recordings.query_run;
+  const Image colour = recordings.colour_picture(asked.entries.front(), session.executor());
+  write_png(out / "mirror.png", colour.view());
+  const Image overlay = draw_mirror(colour.view(), recordings.mirror);
+  write_png(out / "calibration.png", overlay.view());
+  const PanoramaReader reader(asked.source, {});
+  const Panorama cylinder = reader.read(asked.entries.front().path);
   const Image picture = to_picture(cylinder);
   write_png(out / "cylinder.png", picture.view());
-  page.section("What the robot sees");
+
+  const Camera truth = recordings.true_camera;
+  const MirrorCircle& found = recordings.mirror;
+  page.section("1. What the robot sees");
   page.text(
-      "A camera looks up into a hyperboloidal mirror and sees all around. The middle shows the "
-      "camera itself. "
-      "The picture is unwarped to a panoramic cylinder, here with forward in the middle, and of "
-      "each of its 80 rows "
-      "only the first 15 Fourier components are kept: 2.4 kB. Their magnitudes tell the place "
-      "whichever way the robot "
-      "faces, their phases tell the heading.");
-  page.pictures({{"mirror.png", "Raw picture of the mirror camera, 640 x 480"},
-                 {"cylinder.png", "The panoramic cylinder, 512 x 80, forward in the middle"}});
+      "A camera looks up into a curved mirror and sees all around at once. The dark disc in the "
+      "middle is the camera "
+      "itself. Before anything else, calibration finds the mirror in some of the raw pictures: "
+      "centre, rim and inner radius. "
+      "Everything below uses what it found, not the simulator's own numbers.");
+  page.pictures(
+      {{"mirror.png",
+        "Raw picture of the mirror camera, 640 x 480 (in colour for you; the robot "
+        "works on grey)"},
+       {"calibration.png",
+        "What calibration found in " + std::to_string(recordings.calibrated_on) +
+            " raw pictures: rim green, inner radius orange, centre red. The centre is off by " +
+            fixed(std::hypot(found.centre.u_px - truth.centre.u_px,
+                             found.centre.v_px - truth.centre.v_px),
+                  2) +
+            " pixels, the rim by " + fixed(std::abs(found.rim_radius_px - truth.rim_radius_px), 2) +
+            "."}});
+  page.text(
+      "The picture is then unwrapped to a panoramic cylinder. Of each of its 80 rows only the "
+      "first "
+      "15 Fourier components "
+      "are kept, 2.4 kB a view. Their magnitudes do not change when the robot turns, so they tell "
+      "the place whichever way "
+      "it faces; their phases tell the heading.");
+  page.pictures({{"cylinder.png",
+                  "The same view as a cylinder of 512 x 80 pixels, forward in the middle, left on "
+                  "the left"}});
 }
 
-MemoryFile memorise_place(const PlaceRecording& place, const fs::path& path) {
-  std::error_code ignored;
-  for (const char* suffix : {"", "-wal", "-shm"}) fs::remove(path.string() + suffix, ignored);
-  MemoryHeader header;
-  header.shape = {place.references.front().panorama.rows(), kComponents};
-  header.full_scale = kFullScale;
-  header.elevations = place.references.front().panorama.elevations();
-  MemoryFile file = MemoryFile::create(path, header);
-  std::vector<NewView> views;
-  for (std::size_t i = 0; i < place.references.size(); ++i) {
-    const Pose2& pose = place.references[i].pose;
-    views.push_back({{.name = "view " + std::to_string(i),
-                      .pose = ReferencePose{pose.x_m, pose.y_m, pose.heading_rad},
-                      .stamp_s = std::nullopt},
-                     pack(signature_of(place.references[i].panorama), kFullScale),
-                     {}});
-  }
-  (void)file.append(views);
-  return file;
+std::vector<AskedView> ask(const Localiser& localiser, const MemoryPipeline& pipeline,
+                           const Dataset& queries, Executor& executor) {
+  std::vector<std::optional<AskedView>> asked(queries.entries.size());
+  for_each_entry(executor, queries.entries.size(), [&](std::size_t i) {
+    const auto& entry = queries.entries[i];
+    PackedSignature signature = pipeline.packed(pipeline.read(entry));
+    Localisation found = localiser.localise(signature);
+    const ReferencePose& pose = *entry.pose;
+    asked[i] =
+        AskedView{{pose.x_m, pose.y_m, *pose.heading_rad}, std::move(signature), std::move(found)};
+  });
+  std::vector<AskedView> all;
+  for (auto& view : asked) all.push_back(std::move(*view));
+  return all;
 }
 
-struct Answers {
+/// What the answers are worth.
+struct Outcome {
   std::vector<double> errors_m;
   std::vector<double> nearest_errors_m;
-  std::vector<double> heading_errors_deg;
-  std::size_t known = 0;
-  double bytes_share = 0.0;
+  std::vector<double> heading_errors_rad;
+  double known = 0.0;        ///< share of all questions
+  double bytes_share = 0.0;  ///< of a full scan
 };
 
-Answers ask(const Localiser& localiser, const VisualMemory& memory,
-            const std::vector<PlacedView>& queries) {
-  Answers answers;
-  for (const auto& query : queries) {
-    const auto found = localiser.localise(pack(signature_of(query.panorama), kFullScale));
-    answers.known += found.known ? 1 : 0;
-    answers.bytes_share += static_cast<double>(found.bytes_read) /
-                           static_cast<double>(found.bytes_in_full) /
-                           static_cast<double>(queries.size());
-    const Point2 truth = query.pose.position();
+Outcome outcome_of(const std::vector<AskedView>& asked, const VisualMemory& memory) {
+  Outcome outcome;
+  std::uint64_t read = 0;
+  std::uint64_t in_full = 0;
+  std::size_t known = 0;
+  for (const auto& [truth, signature, found] : asked) {
+    known += found.known ? 1 : 0;
+    read += found.bytes_read;
+    in_full += found.bytes_in_full;
     if (!found.matches.empty()) {
-      answers.nearest_errors_m.push_back(
-          distance(memory.info(found.matches.front().view).pose->position(), truth));
+      const Point2 nearest = memory.info(found.matches.front().view).pose->position();
+      outcome.nearest_errors_m.push_back(distance(nearest, truth.position()));
     }
-    if (found.position) answers.errors_m.push_back(distance(found.position->position, truth));
+    if (found.position) {
+      outcome.errors_m.push_back(distance(found.position->position, truth.position()));
+    }
     if (found.heading_rad) {
-      answers.heading_errors_deg.push_back(
-          degrees(std::abs(angle_difference(*found.heading_rad, query.pose.heading_rad))));
+      outcome.heading_errors_rad.push_back(
+          std::abs(angle_difference(*found.heading_rad, truth.heading_rad)));
     }
   }
-  return answers;
+  outcome.known = static_cast<double>(known) / static_cast<double>(asked.size());
+  outcome.bytes_share = static_cast<double>(read) / static_cast<double>(in_full);
+  return outcome;
 }
 
-void show_map(const PlaceRecording& place, const Localiser& localiser, const fs::path& out) {
-  MapPlot map{.title = "Where the robot was, and where its memory says it was", .layers = {}};
-  MapLayer references;
-  references.label = "reference views";
-  for (const auto& view : place.references) references.circles.push_back(view.pose.position());
-  MapLayer truth;
-  truth.label = "true position";
-  truth.colour = "#009e73";
-  MapLayer error;
-  error.label = "error";
-  error.colour = "#d55e00";
-  for (const auto& query : place.queries) {
-    const auto found = localiser.localise(pack(signature_of(query.panorama), kFullScale));
-    truth.crosses.push_back(query.pose.position());
-    if (found.position) error.lines.push_back({query.pose.position(), found.position->position});
-  }
-  map.layers = {references, truth, error};
-  write_plot(out / "map.png", map);
+std::string median_text(const std::vector<double>& values, double unit, int digits,
+                        std::string_view name) {
+  if (values.empty()) return "none";
+  return fixed(unit * median(values), digits) + " " + std::string(name);
 }
 
-ExitCode demonstrate(const DemoArguments& wanted, Session& session) {
+void show_answers(const VisualMemory& memory, const FloorPlan& plan,
+                  const std::vector<AskedView>& asked, const Outcome& own, const Outcome& foreign,
+                  double spacing_m, const fs::path& out, ReportPage& page) {
+  draw_answers(memory, plan, asked, out / "map.png");
+  const std::string spacing = fixed(100.0 * spacing_m, 0) + " cm";
+  page.section("2. Remember and localise");
+  page.text("The robot took a view every " + spacing +
+            " and remembered it. Then it was put down at " + std::to_string(asked.size()) +
+            " random places between them, facing anywhere, and asked from one new picture each: "
+            "where are you, and which way do "
+            "you face? It was also put into another room, where the right answer is that it does "
+            "not know the place.");
+  page.figures({{std::to_string(memory.size()), "views remembered, " + spacing + " apart"},
+                {median_text(own.errors_m, 100.0, 1, "cm"), "median error of the position"},
+                {median_text(own.heading_errors_rad, degrees(1.0), 2, "degrees"),
+                 "median error of the heading"},
+                {percent(own.known), "of its own places recognised"},
+                {percent(foreign.known), "of the views of another room taken for this one"}});
+  page.text(
+      "On the map, circles are the remembered views and green crosses the places where the robot "
+      "was put down. From each a "
+      "line runs to where its memory says it is; the shorter, the better. The nearest remembered "
+      "view alone would be " +
+      median_text(own.nearest_errors_m, 100.0, 1, "cm") +
+      " off (median): the position is interpolated between views.");
+  page.pictures({{"map.png", "True places, and the error of each answer"}});
+}
+
+/// The first place that was recognised stands for all.
+const AskedView& shown_view(const std::vector<AskedView>& asked) {
+  const auto known =
+      std::find_if(asked.begin(), asked.end(), [](const auto& view) { return view.found.known; });
+  return known == asked.end() ? asked.front() : *known;
+}
+
+void show_levels(const VisualMemory& memory, const FloorPlan& plan, const AskedView& view,
+                 double spacing_m, const fs::path& out, ReportPage& page) {
+  const auto areas_m2 = draw_areas(memory, plan, view, out / "areas.png");
+  draw_similarity(memory, spacing_m, view, out / "similarity.png");
+  page.section("3. As accurate as needed");
+  page.text(
+      "With one Fourier component compared, the robot may be anywhere in a large area (" +
+      fixed(areas_m2.front(), 1) +
+      " square metres here); with each further component the area shrinks, down to " +
+      fixed(areas_m2.back(), 2) +
+      ". In the open a coarse answer is enough and costs less; at a door a fine one is needed.");
+  page.pictures({{"areas.png",
+                  "Orange: where the robot may be, after 1, 3, 6 and 15 components. Red cross: "
+                  "where it is."}});
+  page.pictures({{"similarity.png",
+                  "How similar each remembered view is to the one asked for. It falls with "
+                  "distance on all sides."}});
+}
+
+void show_what_next(const DemoRecordings& recordings, const fs::path& out, ReportPage& page) {
+  const auto in_out = [&](const char* name) { return (out / name).string(); };
+  page.section("Try it yourself");
+  page.text(
+      "The recordings and the memory of this run lie beside this page. Each command shows more "
+      "with --help.");
+  const std::string memory = in_out("office.panonav");
+  page.commands(
+      {"alias panonav=build/release/bin/panonav", "panonav info " + memory,
+       "panonav localise " + memory + " " + in_out("query_run"),
+       "panonav localise " + memory + " " + in_out("elsewhere_run") + "    # another room: unknown",
+       "panonav localise " + memory + " " + recordings.query_run.entries.front().path.string() +
+           " --areas",
+       "panonav unwrap " + recordings.query_run.entries.front().path.string() + " --camera " +
+           (recordings.query_run.folder / "camera.toml").string() + " -o panorama.png"});
+}
+
+ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
   const auto start = std::chrono::steady_clock::now();
-  const fs::path out(wanted.out);
-  std::error_code error;
-  fs::create_directories(out, error);
-  if (error) throw FileError(out.string(), "cannot be made: " + error.message());
-  Progress progress("demo", 6);
-  const std::uint64_t seed = wanted.seed.value_or(1);
-  const PlaceRecording office =
-      record_place({.scene = "office", .seed = seed, .queries = 40}, session.executor());
-  progress.advance();
-  const PlaceRecording elsewhere = record_place(
-      {.scene = "lab", .seed = seed + 1, .spacing_m = 0.5, .queries = 40}, session.executor());
-  progress.advance();
-
+  const fs::path& out = wanted.out;
+  prepare_demo_folder(out);
+  const auto recordings = record_demo(wanted, session);
+  if (!recordings) {
+    session.note("panonav demo: no mirror was found in the simulated pictures");
+    return ExitCode::no_answer;
+  }
   ReportPage page("panonav: a robot that remembers what places look like",
-                  "A simulated robot with one mirror camera drives through an office, remembers a "
-                  "view every 25 cm, "
-                  "is put down elsewhere, and says where it is and which way it faces. No laser, "
-                  "no GPU, no training.");
-  show_camera(office, out, session, page);
-  progress.advance();
+                  "A simulated robot with one mirror camera drives through an office and remembers "
+                  "what it looks like. Put down "
+                  "somewhere else, it says where it is and which way it faces, from one picture. "
+                  "No laser, no GPU, no training.");
+  show_camera(*recordings, out, session, page);
 
   const fs::path memory_path = out / "office.panonav";
-  const MemoryFile file = memorise_place(office, memory_path);
+  MemoryFile file = MemoryFile::create(
+      memory_path, header_from_first_views(recordings->memory_run, SignatureOptions{},
+                                           PreprocessingOptions{}, session.executor()));
+  const MemoryPipeline pipeline(file.header(), recordings->memory_run.source);
+  (void)append_views(recordings->memory_run, pipeline, true, file, session);
   const VisualMemory memory = file.load();
   const Localiser localiser(memory);
-  const Answers own = ask(localiser, memory, office.queries);
-  const Answers foreign = ask(localiser, memory, elsewhere.queries);
-  show_map(office, localiser, out);
-  progress.advance();
-  const double queries = static_cast<double>(office.queries.size());
-  const std::string median_error =
-      own.errors_m.empty() ? "none" : fixed(100.0 * median(own.errors_m), 1) + " cm";
-  const std::string median_heading = own.heading_errors_deg.empty()
-                                         ? "none"
-                                         : fixed(median(own.heading_errors_deg), 2) + " degrees";
-
-  page.section("Remember and localise");
-  page.figures(
-      {{std::to_string(memory.size()), "views remembered, 25 cm apart"},
-       {median_error, "median error of the position"},
-       {median_heading, "median error of the heading"},
-       {percent(static_cast<double>(own.known) / queries), "of its own places recognised"},
-       {percent(static_cast<double>(foreign.known) / static_cast<double>(elsewhere.queries.size())),
-        "of views of another room taken for this one"},
-       {percent(own.bytes_share), "of the bytes of a full scan read per question"}});
-  page.text(
-      "Circles are the remembered views. The robot was put down at the crosses with a random "
-      "heading; each line runs "
-      "to where its memory says it is. Median distance to the nearest remembered view alone: " +
-      fixed(100.0 * median(own.nearest_errors_m), 1) + " cm.");
-  page.pictures({{"map.png", "True positions, and the error of the answer for each"}});
-
-  page.section("As accurate as needed");
-  page.text(
-      "With one Fourier component compared the robot may be in a large area; with each further "
-      "component the area "
-      "shrinks. In the open the coarse answer is enough and costs less; at a door the fine one is "
-      "needed.");
-  Reproduction figures;
-  reproduce_hierarchical_areas({office}, out, figures);
-  progress.advance();
-  reproduce_similarity_surface(office, out, figures);
-  std::vector<ReportPicture> pictures;
-  for (const auto& picture : figures.pictures)
-    pictures.push_back({picture.file.string(), picture.caption});
-  page.pictures(pictures);
-  progress.advance();
-
-  page.section("Go on");
-  page.text("The memory of this run lies beside this page.");
-  page.commands({"panonav info " + memory_path.string(), "panonav verify " + memory_path.string(),
-                 "panonav --help"});
+  const auto asked = ask(localiser, pipeline, recordings->query_run, session.executor());
+  const auto elsewhere = ask(localiser, pipeline, recordings->elsewhere_run, session.executor());
+  const Outcome own = outcome_of(asked, memory);
+  const Outcome foreign = outcome_of(elsewhere, memory);
+  constexpr double margin_m = 1.2;  // furniture stands around the free floor
+  const FloorPlan plan = floor_plan(
+      *recordings->office, {recordings->low.x_m - margin_m, recordings->low.y_m - margin_m},
+      {recordings->high.x_m + margin_m, recordings->high.y_m + margin_m});
+  show_answers(memory, plan, asked, own, foreign, wanted.spacing_m(), out, page);
+  show_levels(memory, plan, shown_view(asked), wanted.spacing_m(), out, page);
+  show_what_next(*recordings, out, page);
   page.write(out);
-  progress.clear();
+
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const auto median_or_null = [](const std::vector<double>& values) {
+    return values.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(median(values));
+  };
+  if (session.json()) {
+    session.print(nlohmann::ordered_json{
+        {"report", (out / "index.html").string()},
+        {"views", memory.size()},
+        {"questions", asked.size()},
+        {"position_error_m", median_or_null(own.errors_m)},
+        {"heading_error_rad", median_or_null(own.heading_errors_rad)},
+        {"known", own.known},
+        {"known_elsewhere", foreign.known},
+        {"bytes_share", own.bytes_share},
+        {"seconds",
+         seconds}}.dump());
+    return ExitCode::done;
+  }
   session.print("panonav demo: " + std::to_string(memory.size()) +
-                " views of an office remembered, " + std::to_string(office.queries.size()) +
+                " views of an office remembered, " + std::to_string(asked.size()) +
                 " questions asked, " + fixed(seconds, 0) + " s");
-  session.print("  position: median error " + median_error + "; heading: " + median_heading);
-  session.print(
-      "  own places recognised: " + percent(static_cast<double>(own.known) / queries) +
-      "; another room taken for this one: " +
-      percent(static_cast<double>(foreign.known) / static_cast<double>(elsewhere.queries.size())));
+  session.print("  position: median error " + median_text(own.errors_m, 100.0, 1, "cm") +
+                "; heading: " + median_text(own.heading_errors_rad, degrees(1.0), 2, "degrees"));
+  session.print("  own places recognised: " + percent(own.known) +
+                "; views of another room taken for this one: " + percent(foreign.known));
   session.print("Open " + session.strong((out / "index.html").string()) + " in a browser.");
   return ExitCode::done;
 }
 
 Run declare(Arguments& arguments) {
-  auto wanted = std::make_shared<DemoArguments>();
-  arguments.option("-o,--out", wanted->out, "Folder for the report (default: demo)");
-  arguments.option("--seed", wanted->seed, "Of the simulated office (default: 1)");
-  return [wanted](Session& session) { return demonstrate(*wanted, session); };
+  auto wanted = std::make_shared<DemoOptions>();
+  auto out = std::make_shared<std::string>("demo");
+  auto seed = std::make_shared<std::optional<std::uint64_t>>();
+  arguments.option("-o,--out", *out,
+                   "Folder for the report: a new one, or that of an earlier demo (default: demo)");
+  arguments.option("--seed", *seed, "Of the simulated office (default: 1)");
+  arguments.flag("--quick", wanted->quick, "A smoke run: fewer views and questions");
+  return [wanted, out, seed](Session& session) {
+    wanted->out = *out;
+    wanted->seed = seed->value_or(1);
+    return demonstrate(*wanted, session);
+  };
 }
 
 }  // namespace
 
 Verb demo_verb() {
   return {"demo", "The whole story on a simulated office, with a report to look at",
-          "Takes under a minute. Needs nothing but this program and gnuplot.",
+          "Takes under a minute. Needs nothing but this program and gnuplot. What an earlier demo "
+          "left in the folder\n"
+          "is written anew; a folder that holds anything else is refused.",
           "  panonav demo\n  panonav demo --seed 5 -o other_office", declare};
 }
 

@@ -1,15 +1,11 @@
-#include <algorithm>
-#include <chrono>
-#include <exception>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <unordered_set>
 
 #include "known_views.hpp"
+#include "memorising.hpp"
 #include "memory_pipeline.hpp"
 #include "panonav/core/error.hpp"
-#include "panonav/io/image_file.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "recording.hpp"
 #include "session.hpp"
@@ -29,54 +25,6 @@ struct MemoriseArguments {
   PreprocessingOptions preprocessing;
   bool no_thumbnails = false;
 };
-
-/// How many views the full scale is taken from.
-constexpr std::size_t scale_views = 32;
-
-double now_s() {
-  const auto since = std::chrono::system_clock::now().time_since_epoch();
-  return std::chrono::duration<double>(since).count();
-}
-
-/// Views at the head of the recording decide the scale of the whole memory.
-MemoryHeader header_from_first_views(const Dataset& recording, const MemoriseArguments& wanted,
-                                     Executor& executor) {
-  MemoryHeader header;
-  header.source = recording.source;
-  header.preprocessing = wanted.preprocessing;
-  header.created_s = now_s();
-  const PanoramaShape shape = wanted_shape(recording, wanted.signature);
-  const PanoramaReader reader(recording.source, shape);
-  const auto first = reader.read(recording.entries.front().path);
-  header.shape = {first.rows(), wanted.signature.components};
-  header.panorama_columns = first.columns();
-  header.elevations = first.elevations();
-  if (recording.source.kind == PictureKind::panorama) {
-    const auto [width, height] = read_image_size(recording.entries.front().path);
-    const PanoramaShape own{height, width};
-    if (own != PanoramaShape{first.rows(), first.columns()}) header.picture_shape = own;
-  }
-  if (2 * header.shape.components > header.panorama_columns) {
-    throw ContractError("components", header.shape.components,
-                        "1 to " + std::to_string(header.panorama_columns / 2) +
-                            ", half the columns of " + recording.entries.front().path.string());
-  }
-
-  const MemoryPipeline pipeline(header, recording.source);
-  const std::size_t count = std::min(scale_views, recording.entries.size());
-  std::vector<float> largest(count, 0.0F);
-  for_each_entry(executor, count, [&](std::size_t i) {
-    const auto signature = pipeline.signature(pipeline.read(recording.entries[i]));
-    largest[i] = largest_structure(signature);
-  });
-  header.full_scale = *std::max_element(largest.begin(), largest.end());
-  if (!(header.full_scale > 0.0F)) {
-    throw FileError(recording.entries.front().path.string(),
-                    "the first " + std::to_string(count) +
-                        " views are of one colour; a memory needs views with structure");
-  }
-  return header;
-}
 
 /// A resumed memory keeps its own options; other ones that the user asks for are refused.
 void check_same_options(const Arguments& arguments, const MemoriseArguments& wanted,
@@ -106,52 +54,6 @@ void check_same_options(const Arguments& arguments, const MemoriseArguments& wan
   }
 }
 
-struct Counts {
-  std::size_t appended = 0;
-  std::size_t known_before = 0;
-};
-
-/// Signatures are computed side by side, appended one by one in the order of the recording; what
-/// was appended stays, whatever happens later.
-Counts append_all(const Dataset& recording, const MemoryPipeline& pipeline, bool thumbnails,
-                  MemoryFile& memory, Session& session) {
-  Counts counts;
-  std::vector<const DatasetEntry*> missing;
-  {
-    const auto names = memory.names();
-    const std::unordered_set<std::string> known(names.begin(), names.end());
-    for (const auto& entry : recording.entries) {
-      if (!known.contains(entry.file)) missing.push_back(&entry);
-    }
-  }
-  counts.known_before = recording.entries.size() - missing.size();
-  Progress progress("memorising", missing.size());
-  constexpr std::size_t batch = 16;
-  for (std::size_t begin = 0; begin < missing.size(); begin += batch) {
-    const std::size_t count = std::min(batch, missing.size() - begin);
-    std::vector<std::optional<NewView>> views(count);
-    std::vector<std::exception_ptr> failures(count);
-    for_each_entry(session.executor(), count, [&](std::size_t i) {
-      const auto& entry = *missing[begin + i];
-      try {
-        const auto panorama = pipeline.read(entry);
-        views[i] = NewView{{entry.file, entry.pose, entry.stamp_s},
-                           pipeline.packed(panorama),
-                           thumbnails ? thumbnail_png(panorama) : std::vector<std::uint8_t>{}};
-      } catch (const Error&) {
-        failures[i] = std::current_exception();
-      }
-    });
-    for (std::size_t i = 0; i < count; ++i) {
-      if (failures[i]) std::rethrow_exception(failures[i]);
-      (void)memory.append(*views[i]);
-      ++counts.appended;
-      progress.advance();
-    }
-  }
-  return counts;
-}
-
 ExitCode memorise(const Arguments& arguments, const MemoriseArguments& wanted, Session& session) {
   const bool resumes = fs::exists(wanted.memory);
   std::optional<MemoryFile> memory;
@@ -162,13 +64,14 @@ ExitCode memorise(const Arguments& arguments, const MemoriseArguments& wanted, S
   if (memory) {
     check_same_options(arguments, wanted, *memory);
   } else {
-    memory = MemoryFile::create(wanted.memory,
-                                header_from_first_views(recording, wanted, session.executor()));
+    memory = MemoryFile::create(
+        wanted.memory, header_from_first_views(recording, wanted.signature, wanted.preprocessing,
+                                               session.executor()));
   }
   const MemoryPipeline pipeline(memory->header(), recording.source);
   if (resumes) check_known_views(recording, *memory, pipeline, session);
   remember_recording(recording, *memory);
-  const auto counts = append_all(recording, pipeline, !wanted.no_thumbnails, *memory, session);
+  const auto counts = append_views(recording, pipeline, !wanted.no_thumbnails, *memory, session);
   const auto info = memory->info();
   if (session.json()) {
     session.print(nlohmann::ordered_json{{"memory", wanted.memory},

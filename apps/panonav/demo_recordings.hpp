@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+
+#include "panonav/camera/mirror_camera.hpp"
+#include "panonav/camera/mirror_overlay.hpp"
+#include "panonav/io/dataset.hpp"
+#include "panonav/simulation/renderer.hpp"
+#include "session.hpp"
+
+namespace panonav::command {
+
+struct DemoOptions {
+  std::filesystem::path out = "demo";
+  std::uint64_t seed = 1;  ///< of the office, the noise and the questions
+  bool quick = false;
+
+  [[nodiscard]] double spacing_m() const noexcept { return quick ? 0.5 : 0.25; }
+  [[nodiscard]] int questions() const noexcept { return quick ? 10 : 40; }
+};
+
+/// What the demonstration works on: pictures of a simulated mirror camera with its sensor's noise,
+/// on the disk as any recording, and the camera as calibration found it in them.
+struct DemoRecordings {
+  Dataset memory_run;     ///< the office on a grid
+  Dataset query_run;      ///< the same office at random places
+  Dataset elsewhere_run;  ///< another room
+  MirrorCircle mirror;    ///< what calibration found
+  int calibrated_on = 0;  ///< pictures
+  Camera true_camera;
+  std::shared_ptr<const Renderer> office;  ///< in colour
+  Point2 low, high;                        ///< corners of the office's floor
+  /// What the camera sees at an entry of the office, in colour, for people.
+  std::function<Image(const DatasetEntry&, Executor&)> colour_picture;
+};
+
+/// Makes the folder, or clears away what an earlier demo made in it and nothing else. Throws
+/// FileError when it holds anything and was not made by a demo, or cannot be written.
+void prepare_demo_folder(const std::filesystem::path& out);
+
+/// Renders all pictures, calibrates, and writes the three data sets. Empty when calibration finds
+/// no mirror.
+[[nodiscard]] std::optional<DemoRecordings> record_demo(const DemoOptions& options,
+                                                        Session& session);
+
+}  // namespace panonav::command
