@@ -66,13 +66,14 @@ ExitCode reproduce(const ReproduceArguments& wanted, Session& session) {
   }
   Progress progress("reproduce " + wanted.paper, 100);
   std::size_t shown_percent = 0;
+  ReproductionOptions options{.out = wanted.out, .seed = wanted.seed.value_or(1)};
+  if (wanted.quick) options = quick_run(options);
   const Reproduction result =
-      reproduce_m04({.out = wanted.out, .quick = wanted.quick, .seed = wanted.seed.value_or(1)},
-                    session.executor(), [&](std::string_view, double fraction) {
-                      const auto percent = static_cast<std::size_t>(100.0 * fraction);
-                      if (percent > shown_percent) progress.advance(percent - shown_percent);
-                      shown_percent = std::max(shown_percent, percent);
-                    });
+      reproduce_m04(options, session.executor(), [&](std::string_view, double fraction) {
+        const auto percent = static_cast<std::size_t>(100.0 * fraction);
+        if (percent > shown_percent) progress.advance(percent - shown_percent);
+        shown_percent = std::max(shown_percent, percent);
+      });
   progress.clear();
   const std::string json = to_json(result.rows);
   const std::filesystem::path out(wanted.out);

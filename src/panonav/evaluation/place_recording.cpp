@@ -1,13 +1,10 @@
 #include "panonav/evaluation/place_recording.hpp"
 
-#include <numbers>
 #include <optional>
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
-#include "panonav/simulation/renderer.hpp"
 #include "panonav/simulation/scenes.hpp"
-#include "panonav/simulation/sensor.hpp"
 
 namespace panonav {
 
@@ -22,45 +19,65 @@ std::size_t PlaceRecording::nearest_reference(Point2 position) const {
   return nearest;
 }
 
-PlaceRecording record_place(const PlaceRecordingOptions& options, Executor& executor) {
-  require(options.queries >= 1, "queries", options.queries, ">= 1");
-  PlaceRecording recording;
-  recording.scene = make_scene(options.scene, {.seed = options.seed});
-  recording.spacing_m = options.spacing_m;
-  recording.free_space =
-      std::make_shared<const FreeSpace>(recording.scene, free_space_options(recording.scene));
-  const auto renderer = std::make_shared<const Renderer>(recording.scene);
-  const double height_m = recording.scene.camera_height_m;
-  recording.take = [renderer, height_m, rows = options.rows, columns = options.columns](
-                       const Pose2& pose, std::uint64_t seed) {
-    Executor here(1);
-    Panorama view =
-        renderer->render_panorama({.pose = pose, .height_m = height_m},
-                                  {.rows = rows, .columns = columns, .rays_per_axis = 1}, here);
-    return apply_sensor(std::move(view), SensorOptions{}, seed);
-  };
+Panorama take_view(const PlaceRecording& place, const PanoramaRendering& rendering,
+                   const Pose2& pose, std::uint64_t seed, const SensorOptions& sensor) {
+  Executor here(1);
+  Panorama view = place.renderer->render_panorama(
+      {.pose = pose, .height_m = place.scene.camera_height_m}, rendering, here);
+  return apply_sensor(std::move(view), sensor, seed);
+}
 
-  std::vector<Pose2> poses;
-  for (const auto& place : recording.free_space->grid(options.spacing_m)) {
-    poses.push_back({place.position.x_m, place.position.y_m, 0.0});
-  }
-  const std::size_t reference_count = poses.size();
-  Random random(options.seed, 77);
-  for (int q = 0; q < options.queries; ++q) {
-    poses.push_back(recording.free_space->random_pose(random));
-  }
-  std::vector<std::optional<PlacedView>> views(poses.size());
+Panorama take_view(const PlaceRecording& place, const Pose2& pose, std::uint64_t seed,
+                   const SensorOptions& sensor) {
+  return take_view(place, place.rendering, pose, seed, sensor);
+}
+
+std::vector<PlacedView> take_views(const PlaceRecording& place, const PanoramaRendering& rendering,
+                                   const std::vector<Pose2>& poses, std::uint64_t first_seed,
+                                   const SensorOptions& sensor, Executor& executor) {
+  std::vector<std::optional<PlacedView>> slots(poses.size());
   executor.for_chunks(poses.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
     for (std::size_t i = begin; i < end; ++i) {
-      views[i] = PlacedView{poses[i], recording.take(poses[i], options.seed * 100003U + i)};
+      slots[i] =
+          PlacedView{poses[i], take_view(place, rendering, poses[i], first_seed + i, sensor)};
     }
   });
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    auto& list = i < reference_count ? recording.references : recording.queries;
-    list.push_back(std::move(*views[i]));
+  std::vector<PlacedView> views;
+  views.reserve(slots.size());
+  for (auto& slot : slots) views.push_back(std::move(*slot));
+  return views;
+}
+
+std::vector<PlacedView> retake_queries(const PlaceRecording& place, const SensorOptions& sensor,
+                                       std::uint64_t first_seed, Executor& executor) {
+  std::vector<Pose2> poses;
+  for (const PlacedView& query : place.queries) poses.push_back(query.pose);
+  return take_views(place, place.rendering, poses, first_seed, sensor, executor);
+}
+
+PlaceRecording record_place(const PlaceRecordingOptions& options, Executor& executor) {
+  require(options.queries >= 1, "queries", options.queries, ">= 1");
+  PlaceRecording place;
+  place.seed = options.seed;
+  place.scene = make_scene(options.scene, {.seed = options.seed});
+  place.spacing_m = options.spacing_m;
+  place.free_space =
+      std::make_shared<const FreeSpace>(place.scene, free_space_options(place.scene));
+  place.renderer = std::make_shared<const Renderer>(place.scene, RendererOptions{}, executor);
+  place.rendering = {.rows = options.rows, .columns = options.columns, .rays_per_axis = 1};
+
+  std::vector<Pose2> grid;
+  for (const auto& point : place.free_space->grid(options.spacing_m)) {
+    grid.push_back({point.position.x_m, point.position.y_m, 0.0});
   }
-  require(!recording.references.empty(), "reference views", 0.0, ">= 1");
-  return recording;
+  require(!grid.empty(), "reference views", 0.0, ">= 1");
+  Random random(options.seed, 77);
+  std::vector<Pose2> asked;
+  for (int q = 0; q < options.queries; ++q) asked.push_back(place.free_space->random_pose(random));
+  const std::uint64_t noise = options.seed * 100003U;
+  place.references = take_views(place, place.rendering, grid, noise, {}, executor);
+  place.queries = take_views(place, place.rendering, asked, noise + grid.size(), {}, executor);
+  return place;
 }
 
 }  // namespace panonav

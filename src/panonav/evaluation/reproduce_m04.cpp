@@ -1,49 +1,61 @@
 #include <string>
+#include <vector>
 
 #include "panonav/core/error.hpp"
-#include "panonav/evaluation/m04_figures.hpp"
+#include "panonav/evaluation/experiment.hpp"
 
 namespace panonav {
 
+ReproductionOptions quick_run(ReproductionOptions options) {
+  options.scenes = 2;
+  options.queries = 15;
+  return options;
+}
+
 Reproduction reproduce_m04(const ReproductionOptions& options, Executor& executor,
                            const ReproductionProgress& progress) {
+  require(options.scenes >= 2, "scenes", options.scenes, ">= 2");
   std::error_code error;
   std::filesystem::create_directories(options.out, error);
   if (error) throw FileError(options.out.string(), "cannot be made: " + error.message());
-  const auto say = [&](std::string_view stage, double fraction) {
-    if (progress) progress(stage, fraction);
+
+  std::vector<std::unique_ptr<Experiment>> experiments;
+  experiments.push_back(rotational_invariance_experiment());
+  experiments.push_back(power_spectrum_experiment());
+  experiments.push_back(discrimination_experiment());
+  experiments.push_back(distance_curve_experiment());
+  experiments.push_back(similarity_surface_experiment());
+  experiments.push_back(hierarchical_areas_experiment());
+  experiments.push_back(area_shape_experiment());
+  experiments.push_back(component_weights_experiment());
+  experiments.push_back(rivals_experiment());
+
+  // Each scene is one step for taking its views and one for every experiment.
+  const double steps = options.scenes * (1.0 + static_cast<double>(experiments.size()));
+  double done = 0.0;
+  const auto step = [&](const std::string& stage) {
+    if (progress) progress(stage, done / steps);
+    done += 1.0;
   };
-
-  const int scenes = options.quick ? 2 : 10;
-  std::vector<PlaceRecording> recordings;
-  for (int s = 0; s < scenes; ++s) {
-    say("taking views in office " + std::to_string(s + 1) + " of " + std::to_string(scenes),
-        0.6 * s / scenes);
-    recordings.push_back(record_place({.scene = "office",
-                                       .seed = options.seed + static_cast<std::uint64_t>(s),
-                                       .spacing_m = 0.25,
-                                       .queries = options.quick ? 15 : 60},
-                                      executor));
+  for (int s = 0; s < options.scenes; ++s) {
+    const std::string name =
+        "office " + std::to_string(s + 1) + " of " + std::to_string(options.scenes);
+    step(name);
+    const PlaceRecording place = record_place({.scene = "office",
+                                               .seed = options.seed + static_cast<std::uint64_t>(s),
+                                               .spacing_m = 0.25,
+                                               .queries = options.queries,
+                                               .rows = options.rows},
+                                              executor);
+    for (const auto& experiment : experiments) {
+      step(name);
+      experiment->add(place, executor);
+    }
   }
-
   Reproduction result;
-  const auto& out = options.out;
   reproduce_memory_table(result);
-  say("figure 4", 0.60);
-  reproduce_rotational_invariance(recordings, options.seed, result);
-  say("figure 5", 0.65);
-  reproduce_power_spectrum(recordings, out, result);
-  say("figure 6", 0.70);
-  reproduce_discrimination(recordings, out, executor, result);
-  say("figure 7", 0.78);
-  reproduce_distance_curve(recordings, out, executor, result);
-  say("figure 8", 0.80);
-  reproduce_similarity_surface(recordings.front(), out, result);
-  say("figures 9 and 10", 0.82);
-  reproduce_hierarchical_areas(recordings, out, result);
-  say("rivals", 0.85);
-  compare_rivals(recordings, out, executor, result);
-  say("done", 1.0);
+  for (const auto& experiment : experiments) experiment->report(options.out, result);
+  if (progress) progress("done", 1.0);
   return result;
 }
 

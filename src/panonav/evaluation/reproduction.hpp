@@ -14,9 +14,14 @@ namespace panonav {
 
 struct ReproductionOptions {
   std::filesystem::path out;  ///< folder for pictures; made when it is not there
-  bool quick = false;         ///< a smoke run: fewer scenes and queries
-  std::uint64_t seed = 1;
+  int scenes = 20;            ///< variants of the scene, >= 2
+  int queries = 50;           ///< in each, >= 1
+  int rows = 80;              ///< of the views; 512 columns always
+  std::uint64_t seed = 1;     ///< of the first scene; the others follow it
 };
+
+/// The same as a smoke run: two scenes, few queries.
+[[nodiscard]] ReproductionOptions quick_run(ReproductionOptions options);
 
 struct ReproductionPicture {
   std::filesystem::path file;  ///< within `out`
@@ -31,8 +36,9 @@ struct Reproduction {
 /// Told what is being done and how far the whole is, 0 .. 1.
 using ReproductionProgress = std::function<void(std::string_view stage, double fraction)>;
 
-/// The localisation experiments of [M04] (figures 4 to 10) and table 1 of [M03], over several scene
-/// variants.
+/// The localisation experiments of [M04] (figures 4 to 10, eq. 6), table 1 of [M03] and the rivals,
+/// over many variants of the office. Same options: same rows, but for times (unit ms), and same
+/// pictures on any number of threads. Throws OptionError, FileError.
 [[nodiscard]] Reproduction reproduce_m04(const ReproductionOptions& options, Executor& executor,
                                          const ReproductionProgress& progress = {});
 

@@ -14,11 +14,13 @@ namespace panonav {
 
 namespace {
 
-void require_references(const std::vector<Panorama>& references) {
+void require_references(const std::vector<RivalView>& references) {
   require(!references.empty(), "number of reference views", 0.0, ">= 1");
   for (const auto& view : references) {
-    require(view.rows() == references[0].rows() && view.columns() == references[0].columns(),
-            "columns of a reference view", view.columns(), "the shape of the first reference view");
+    const Panorama& first = references[0].panorama;
+    const Panorama& here = view.panorama;
+    require(here.rows() == first.rows() && here.columns() == first.columns(),
+            "columns of a reference view", here.columns(), "the shape of the first reference view");
   }
 }
 
@@ -48,15 +50,15 @@ class FourierSignatureRecogniser final : public PlaceRecogniser {
  public:
   explicit FourierSignatureRecogniser(int components) : components_(components) {}
   [[nodiscard]] std::string name() const override { return "Fourier signature"; }
-  void memorise(const std::vector<Panorama>& references) override {
+  void memorise(const std::vector<RivalView>& references) override {
     require_references(references);
     signatures_.clear();
     for (const auto& view : references) {
-      signatures_.push_back(compute_signature(view, components_));
+      signatures_.push_back(compute_signature(view.panorama, components_));
     }
   }
-  [[nodiscard]] std::size_t nearest(const Panorama& query) const override {
-    const auto signature = compute_signature(query, components_);
+  [[nodiscard]] std::size_t nearest(const RivalView& query) const override {
+    const auto signature = compute_signature(query.panorama, components_);
     return argmin(signatures_.size(),
                   [&](std::size_t i) { return dissimilarity_l1(signature, signatures_[i]); });
   }
@@ -76,13 +78,13 @@ class GreyHistogramRecogniser final : public PlaceRecogniser {
     require(bins >= 2 && bins <= 256, "histogram bins", bins, "2 .. 256");
   }
   [[nodiscard]] std::string name() const override { return "grey histogram"; }
-  void memorise(const std::vector<Panorama>& references) override {
+  void memorise(const std::vector<RivalView>& references) override {
     require_references(references);
     histograms_.clear();
-    for (const auto& view : references) histograms_.push_back(histogram(view));
+    for (const auto& view : references) histograms_.push_back(histogram(view.panorama));
   }
-  [[nodiscard]] std::size_t nearest(const Panorama& query) const override {
-    const auto wanted = histogram(query);
+  [[nodiscard]] std::size_t nearest(const RivalView& query) const override {
+    const auto wanted = histogram(query.panorama);
     return argmin(histograms_.size(), [&](std::size_t i) { return l1(wanted, histograms_[i]); });
   }
   [[nodiscard]] double bytes_per_view() const override { return 2.0 * bins_; }
@@ -101,14 +103,50 @@ class GreyHistogramRecogniser final : public PlaceRecogniser {
   std::vector<std::vector<float>> histograms_;
 };
 
+// One histogram of colours over the whole view. Colour needs no phases and no unwarping, and does
+// not change when the robot turns.
+class ColourHistogramRecogniser final : public PlaceRecogniser {
+ public:
+  explicit ColourHistogramRecogniser(int bins_per_channel) : bins_(bins_per_channel) {
+    require(bins_per_channel >= 2 && bins_per_channel <= 32, "histogram bins per channel",
+            bins_per_channel, "2 .. 32");
+  }
+  [[nodiscard]] std::string name() const override { return "colour histogram"; }
+  void memorise(const std::vector<RivalView>& references) override {
+    require_references(references);
+    histograms_.clear();
+    for (const auto& view : references) histograms_.push_back(histogram(view.colour));
+  }
+  [[nodiscard]] std::size_t nearest(const RivalView& query) const override {
+    const auto wanted = histogram(query.colour);
+    return argmin(histograms_.size(), [&](std::size_t i) { return l1(wanted, histograms_[i]); });
+  }
+  [[nodiscard]] double bytes_per_view() const override { return 2.0 * bins_ * bins_ * bins_; }
+
+ private:
+  [[nodiscard]] std::vector<float> histogram(const Image& view) const {
+    require(view.channels() == 3, "channels of a view", view.channels(), "3");
+    std::vector<float> counts(static_cast<std::size_t>(bins_) * bins_ * bins_);
+    const auto pixels = view.pixels();
+    const float share = 3.0F / static_cast<float>(pixels.size());
+    for (std::size_t i = 0; i < pixels.size(); i += 3) {
+      const auto bin = [&](std::size_t c) { return pixels[i + c] * bins_ / 256; };
+      counts[static_cast<std::size_t>((bin(0) * bins_ + bin(1)) * bins_ + bin(2))] += share;
+    }
+    return counts;
+  }
+  int bins_;
+  std::vector<std::vector<float>> histograms_;
+};
+
 // The zero-phase representation [Pajdla and Hlavac 1999]: the view is turned so that the phase of
 // its first harmonic, summed over rows, becomes zero.
 Panorama turned_to_zero_phase(const Panorama& view) {
   std::complex<double> first{0.0, 0.0};
-  for (int y = 0; y < view.rows(); ++y) {
-    for (int c = 0; c < view.columns(); ++c) {
-      first += static_cast<double>(view.at(y, c)) * std::polar(1.0, -view.azimuth_rad(c));
-    }
+  for (int c = 0; c < view.columns(); ++c) {
+    double column = 0.0;
+    for (int y = 0; y < view.rows(); ++y) column += view.at(y, c);
+    first += column * std::polar(1.0, -view.azimuth_rad(c));
   }
   // I(phi) ~ cos(phi + psi) has its crest at phi = -psi, which is brought to column 0.
   const double columns_per_radian = view.columns() / (2.0 * std::numbers::pi);
@@ -118,16 +156,16 @@ Panorama turned_to_zero_phase(const Panorama& view) {
 class ZeroPhaseRecogniser final : public PlaceRecogniser {
  public:
   [[nodiscard]] std::string name() const override { return "zero-phase representation"; }
-  void memorise(const std::vector<Panorama>& references) override {
+  void memorise(const std::vector<RivalView>& references) override {
     require_references(references);
     views_.clear();
     for (const auto& view : references) {
-      const Panorama turned = turned_to_zero_phase(view);
+      const Panorama turned = turned_to_zero_phase(view.panorama);
       views_.emplace_back(turned.values().begin(), turned.values().end());
     }
   }
-  [[nodiscard]] std::size_t nearest(const Panorama& query) const override {
-    const Panorama turned = turned_to_zero_phase(query);
+  [[nodiscard]] std::size_t nearest(const RivalView& query) const override {
+    const Panorama turned = turned_to_zero_phase(query.panorama);
     const std::vector<float> wanted(turned.values().begin(), turned.values().end());
     return argmin(views_.size(), [&](std::size_t i) { return l1(wanted, views_[i]); });
   }
@@ -147,13 +185,13 @@ class EigenimageRecogniser final : public PlaceRecogniser {
     require(dimensions >= 1, "eigenimages", dimensions, ">= 1");
   }
   [[nodiscard]] std::string name() const override { return "eigenimages"; }
-  void memorise(const std::vector<Panorama>& references) override {
+  void memorise(const std::vector<RivalView>& references) override {
     require_references(references);
     const auto count = static_cast<Eigen::Index>(references.size());
-    const auto pixels = static_cast<Eigen::Index>(references[0].values().size());
+    const auto pixels = static_cast<Eigen::Index>(references[0].panorama.values().size());
     Eigen::MatrixXf views(pixels, count);
     for (Eigen::Index i = 0; i < count; ++i) {
-      views.col(i) = column(references[static_cast<std::size_t>(i)]);
+      views.col(i) = column(references[static_cast<std::size_t>(i)].panorama);
     }
     mean_ = views.rowwise().mean();
     views.colwise() -= mean_;
@@ -167,8 +205,8 @@ class EigenimageRecogniser final : public PlaceRecogniser {
     }
     coefficients_ = basis_.transpose() * views;
   }
-  [[nodiscard]] std::size_t nearest(const Panorama& query) const override {
-    const Eigen::VectorXf wanted = basis_.transpose() * (column(query) - mean_);
+  [[nodiscard]] std::size_t nearest(const RivalView& query) const override {
+    const Eigen::VectorXf wanted = basis_.transpose() * (column(query.panorama) - mean_);
     return argmin(static_cast<std::size_t>(coefficients_.cols()), [&](std::size_t i) {
       return (coefficients_.col(static_cast<Eigen::Index>(i)) - wanted).squaredNorm();
     });
@@ -198,14 +236,15 @@ class EigenimageRecogniser final : public PlaceRecogniser {
 class PixelRecogniser final : public PlaceRecogniser {
  public:
   [[nodiscard]] std::string name() const override { return "pixels over all turns"; }
-  void memorise(const std::vector<Panorama>& references) override {
+  void memorise(const std::vector<RivalView>& references) override {
     require_references(references);
-    matrix_ = transform_matrix(references[0].columns(), references[0].columns() / 2 + 1);
+    matrix_ = transform_matrix(references[0].panorama.columns(),
+                               references[0].panorama.columns() / 2 + 1);
     views_.clear();
-    for (const auto& view : references) views_.push_back(spectrum(view));
+    for (const auto& view : references) views_.push_back(spectrum(view.panorama));
   }
-  [[nodiscard]] std::size_t nearest(const Panorama& query) const override {
-    const Spectrum wanted = spectrum(query);
+  [[nodiscard]] std::size_t nearest(const RivalView& query) const override {
+    const Spectrum wanted = spectrum(query.panorama);
     return argmin(views_.size(), [&](std::size_t i) { return distance(wanted, views_[i]); });
   }
   [[nodiscard]] double bytes_per_view() const override {
@@ -271,6 +310,9 @@ std::unique_ptr<PlaceRecogniser> fourier_signature_recogniser(int components) {
 }
 std::unique_ptr<PlaceRecogniser> grey_histogram_recogniser(int bins) {
   return std::make_unique<GreyHistogramRecogniser>(bins);
+}
+std::unique_ptr<PlaceRecogniser> colour_histogram_recogniser(int bins_per_channel) {
+  return std::make_unique<ColourHistogramRecogniser>(bins_per_channel);
 }
 std::unique_ptr<PlaceRecogniser> eigenimage_recogniser(int dimensions) {
   return std::make_unique<EigenimageRecogniser>(dimensions);

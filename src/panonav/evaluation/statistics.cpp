@@ -36,6 +36,22 @@ std::vector<double> ranks(std::span<const double> values) {
   return result;
 }
 
+template <class Statistic>
+std::pair<double, double> bootstrap_interval(std::span<const double> values, std::uint64_t seed,
+                                             int samples, const Statistic& statistic) {
+  require(!values.empty(), "number of values", 0.0, ">= 1");
+  require(samples >= 1, "bootstrap samples", samples, ">= 1");
+  Random random(seed);
+  std::vector<double> results;
+  std::vector<double> drawn(values.size());
+  for (int i = 0; i < samples; ++i) {
+    for (auto& value : drawn) value = values[random.index(values.size())];
+    results.push_back(statistic(drawn));
+  }
+  std::sort(results.begin(), results.end());
+  return {quantile_of_sorted(results, 0.025), quantile_of_sorted(results, 0.975)};
+}
+
 }  // namespace
 
 double quantile(std::span<const double> values, double fraction) {
@@ -68,18 +84,16 @@ Proportion success_rate(std::size_t successes, std::size_t trials) {
 
 std::pair<double, double> median_interval(std::span<const double> values, std::uint64_t seed,
                                           int samples) {
-  require(!values.empty(), "number of values", 0.0, ">= 1");
-  require(samples >= 1, "bootstrap samples", samples, ">= 1");
-  Random random(seed);
-  std::vector<double> medians;
-  std::vector<double> drawn(values.size());
-  for (int i = 0; i < samples; ++i) {
-    for (auto& value : drawn) value = values[random.index(values.size())];
+  return bootstrap_interval(values, seed, samples, [](std::vector<double>& drawn) {
     std::sort(drawn.begin(), drawn.end());
-    medians.push_back(quantile_of_sorted(drawn, 0.5));
-  }
-  std::sort(medians.begin(), medians.end());
-  return {quantile_of_sorted(medians, 0.025), quantile_of_sorted(medians, 0.975)};
+    return quantile_of_sorted(drawn, 0.5);
+  });
+}
+
+std::pair<double, double> mean_interval(std::span<const double> values, std::uint64_t seed,
+                                        int samples) {
+  return bootstrap_interval(values, seed, samples,
+                            [](const std::vector<double>& drawn) { return mean(drawn); });
 }
 
 double rank_correlation(std::span<const double> a, std::span<const double> b) {

@@ -24,6 +24,10 @@ struct Proportion {
 [[nodiscard]] std::pair<double, double> median_interval(std::span<const double> values,
                                                         std::uint64_t seed, int samples = 1000);
 
+/// The same of the mean. For figures per scene: the scenes are what is drawn.
+[[nodiscard]] std::pair<double, double> mean_interval(std::span<const double> values,
+                                                      std::uint64_t seed, int samples = 1000);
+
 /// Spearman's rank correlation, -1 .. 1; ties share their mean rank. Throws ContractError on
 /// different sizes or fewer than 3.
 [[nodiscard]] double rank_correlation(std::span<const double> a, std::span<const double> b);

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "panonav/evaluation/place_recording.hpp"
+#include "panonav/evaluation/plot.hpp"
+
+namespace panonav {
+
+/// Directions in which shapes are compared, counter-clockwise from x; each stands for a sector of
+/// 45 degrees around it.
+inline constexpr std::size_t shape_directions = 8;
+using Directional = std::array<double, shape_directions>;
+
+/// What stands around a position of the floor.
+struct Surroundings {
+  /// Harmonic mean of the free distance, over the sector and over the heights 0.3, 0.6 and 0.9 m.
+  Directional free_m{};
+  /// How far a robot can drive in this direction for the same change of its view, relative to the
+  /// other directions, when only parallax counts: a step in direction theta shifts a thing in
+  /// direction phi at distance d by |sin(phi - theta)| / d. The inverse of the mean shift.
+  Directional parallax_m{};
+};
+[[nodiscard]] Surroundings surroundings_of(const PlaceRecording& place, Point2 position);
+
+/// The sector of a direction, 0 .. shape_directions - 1.
+[[nodiscard]] std::size_t sector_of(double azimuth_rad);
+
+/// Furniture as on a floor plan: one layer of things lower than the camera, one of higher ones.
+[[nodiscard]] std::vector<MapLayer> furniture_layers(const Scene& scene);
+
+}  // namespace panonav
