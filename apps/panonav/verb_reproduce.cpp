@@ -21,12 +21,20 @@ struct ReproduceArguments {
   std::optional<std::uint64_t> seed;
 };
 
+std::string shown(double value) {
+  const double size = std::abs(value);
+  return fixed(value, size >= 100.0 ? 0 : size >= 10.0 ? 1 : 3);
+}
+
 std::string shown(const ResultRow& row) {
-  const double size = std::abs(row.ours);
-  return fixed(row.ours, size >= 100.0  ? 0
-                         : size >= 10.0 ? 1
-                                        : 3) +
-         (row.unit.empty() ? "" : " " + row.unit);
+  return shown(row.ours) + (row.unit.empty() ? "" : " " + row.unit);
+}
+
+/// "-" for none, one number where both ends are the same.
+std::string shown(const std::optional<std::pair<double, double>>& interval) {
+  if (!interval) return "-";
+  const auto& [low, high] = *interval;
+  return low == high ? shown(low) : shown(low) + " .. " + shown(high);
 }
 
 void write_page(const ReproduceArguments& wanted, const Reproduction& result) {
@@ -34,28 +42,24 @@ void write_page(const ReproduceArguments& wanted, const Reproduction& result) {
                   "Menegatti, Maeda, Ishiguro 2004, run on simulated offices with a 25 cm grid of "
                   "reference views. "
                   "Published figures beside ours.");
+  page.section("Published and measured");
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& row : result.rows) {
+    const std::string target =
+        row.target ? std::string(row.target->comparison == Comparison::at_most ? "at most "
+                                                                               : "at least ") +
+                         shown(row.target->value)
+                   : "reported";
+    rows.push_back({row.what, shown(row.published), shown(row), shown(row.interval), target,
+                    row.target ? (row.holds() ? "yes" : "NO") : "-"});
+  }
+  page.table({"what", "published", "ours", "95 % interval", "target", "holds"}, rows);
   page.section("Pictures");
   std::vector<ReportPicture> pictures;
   for (const auto& picture : result.pictures) {
     pictures.push_back({picture.file.string(), picture.caption});
   }
   page.pictures(pictures);
-  page.section("Figures");
-  std::vector<std::vector<std::string>> rows;
-  for (const auto& row : result.rows) {
-    const std::string interval =
-        row.interval ? fixed(row.interval->first, 3) + " .. " + fixed(row.interval->second, 3)
-                     : "-";
-    const std::string published = row.published ? fixed(row.published->first, 2) : "-";
-    const std::string target =
-        row.target ? std::string(row.target->comparison == Comparison::at_most ? "at most "
-                                                                               : "at least ") +
-                         fixed(row.target->value, 3)
-                   : "reported";
-    rows.push_back({row.what, published, shown(row), interval, target,
-                    row.target ? (row.holds() ? "yes" : "NO") : "-"});
-  }
-  page.table({"what", "published", "ours", "95 % interval", "target", "holds"}, rows);
   page.write(wanted.out);
 }
 
