@@ -26,6 +26,7 @@ figure img { width: 100%; max-width: 60rem; border: 1px solid var(--line); borde
 figcaption { font-size: .92rem; opacity: .85; }
 table { border-collapse: collapse; margin: 1rem 0; display: block; overflow-x: auto; }
 th, td { text-align: left; padding: .3rem .8rem; border-bottom: 1px solid var(--line); }
+td:not(:first-child) { white-space: nowrap; }
 pre { background: var(--soft); border-radius: .5rem; padding: .8rem 1rem; overflow-x: auto; }
 )";
 

@@ -58,6 +58,14 @@ std::string picture_name(std::size_t index) {
   return "view_" + std::string(width - std::min(width, digits.size()), '0') + digits + ".png";
 }
 
+/// Takes a data set away that could not be finished.
+void discard(const Dataset& dataset, bool with_folder) {
+  std::error_code ignored;
+  for (const auto& entry : dataset.entries) fs::remove(entry.path, ignored);
+  for (const char* name : {"poses.csv", "camera.toml"}) fs::remove(dataset.folder / name, ignored);
+  if (with_folder) fs::remove(dataset.folder, ignored);
+}
+
 }  // namespace
 
 void visit_options(SimulationOptions& options, OptionVisitor& visitor) {
@@ -145,28 +153,33 @@ Dataset record_dataset(const SimulatedWorld& world, const fs::path& folder,
                        std::span<const RecordedPose> poses, bool with_path, Executor& executor,
                        const std::function<void()>& advance) {
   std::error_code error;
-  fs::create_directories(folder, error);
+  const bool made_folder = fs::create_directories(folder, error);
   if (error) throw FileError(folder.string(), "cannot be made: " + error.message());
 
   Dataset dataset{folder, world.source(), {}};
   const auto& wanted = world.arguments();
-  record(
-      world.renderer(), poses, world.camera(), wanted.frame, wanted.sensor,
-      static_cast<std::uint64_t>(wanted.simulation.seed), executor,
-      [&](std::size_t number, const RecordedPose& recorded, const Image& image) {
-        DatasetEntry entry;
-        entry.file = picture_name(number);
-        entry.path = folder / entry.file;
-        entry.pose = ReferencePose{recorded.pose.x_m, recorded.pose.y_m, recorded.pose.heading_rad};
-        if (with_path) {
-          entry.stamp_s = recorded.stamp_s;
-          entry.odometry = recorded.odometry;
-        }
-        write_png(entry.path, image.view());
-        dataset.entries.push_back(std::move(entry));
-        advance();
-      });
-  write_dataset(dataset);
+  try {
+    record(world.renderer(), poses, world.camera(), wanted.frame, wanted.sensor,
+           static_cast<std::uint64_t>(wanted.simulation.seed), executor,
+           [&](std::size_t number, const RecordedPose& recorded, const Image& image) {
+             DatasetEntry entry;
+             entry.file = picture_name(number);
+             entry.path = folder / entry.file;
+             entry.pose =
+                 ReferencePose{recorded.pose.x_m, recorded.pose.y_m, recorded.pose.heading_rad};
+             if (with_path) {
+               entry.stamp_s = recorded.stamp_s;
+               entry.odometry = recorded.odometry;
+             }
+             write_png(entry.path, image.view());
+             dataset.entries.push_back(std::move(entry));
+             advance();
+           });
+    write_dataset(dataset);
+  } catch (...) {
+    discard(dataset, made_folder);
+    throw;
+  }
   return dataset;
 }
 

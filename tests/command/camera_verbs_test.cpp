@@ -1,0 +1,163 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "command_runner.hpp"
+#include "panonav/io/camera_file.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav/simulation/mirror.hpp"
+
+namespace panonav::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+std::set<std::string> keys_of(const json& object) {
+  std::set<std::string> keys;
+  for (const auto& [key, value] : object.items()) keys.insert(key);
+  return keys;
+}
+
+/// Three pictures of the simulated mirror camera, made once for all tests of this file.
+class CameraVerbs : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new TemporaryFolder;
+    const auto made = run_panonav({"simulate", "office", *folder_ / "run", "--random", "3",
+                                   "--rays-per-axis", "1", "--exposure", "2"});
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+  }
+  static void TearDownTestSuite() { delete folder_; }
+  static std::string picture(int i) {
+    return *folder_ / ("run/view_0000" + std::to_string(i) + ".png");
+  }
+  static std::string true_camera() { return *folder_ / "run/camera.toml"; }
+
+  TemporaryFolder out_;
+  static TemporaryFolder* folder_;
+};
+TemporaryFolder* CameraVerbs::folder_ = nullptr;
+
+TEST_F(CameraVerbs, CalibrateFindsTheSimulatedMirror) {
+  const auto result =
+      run_panonav({"calibrate", picture(0), picture(1), picture(2), "-o", out_ / "camera.toml",
+                   "--overlay", out_ / "overlay.png", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto said = json::parse(result.out);
+  EXPECT_EQ(keys_of(said),
+            (std::set<std::string>{"images", "width_px", "height_px", "centre_u_px", "centre_v_px",
+                                   "rim_radius_px", "inner_radius_px", "inner_radius_found",
+                                   "quality", "residual_px", "deviation_over_images", "camera"}));
+  EXPECT_EQ(said["images"], 3);
+  const Camera truth = simulated_mirror_camera();
+  const Camera found = read_camera(out_ / "camera.toml").camera;
+  EXPECT_NEAR(found.centre.u_px, truth.centre.u_px, 0.3);
+  EXPECT_NEAR(found.centre.v_px, truth.centre.v_px, 0.3);
+  EXPECT_NEAR(found.rim_radius_px, truth.rim_radius_px, 0.5);
+  // The camera's body, not the lens within it.
+  EXPECT_NEAR(found.inner_radius_px, truth.inner_radius_px, 1.5);
+  EXPECT_EQ(found.image_size, truth.image_size);
+  EXPECT_EQ(read_image(out_ / "overlay.png").size(), truth.image_size);
+}
+
+TEST_F(CameraVerbs, CalibrateWithoutAMirrorIsNoAnswer) {
+  Image plain(200, 160);
+  for (auto& pixel : plain.pixels()) pixel = 90;
+  write_png(out_ / "plain.png", plain.view());
+  const auto result = run_panonav({"calibrate", out_ / "plain.png", "-o", out_ / "camera.toml"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(lines(result.err).size(), 1U) << result.err;
+  EXPECT_NE(result.err.find("plain.png"), std::string::npos);
+  EXPECT_FALSE(fs::exists(out_ / "camera.toml"));
+}
+
+TEST_F(CameraVerbs, CalibrateRefusesBadInput) {
+  const auto camera = out_ / "camera.toml";
+  std::ofstream(out_.path() / "text.png") << "no picture";
+  Image other(64, 48);
+  write_png(out_ / "other.png", other.view());
+  const auto refused = [&](const std::vector<std::string>& images, const std::string& word) {
+    std::vector<std::string> arguments{"calibrate"};
+    arguments.insert(arguments.end(), images.begin(), images.end());
+    arguments.insert(arguments.end(), {"-o", camera});
+    const auto line = refusal(arguments);
+    EXPECT_NE(line.find(word), std::string::npos) << line;
+    EXPECT_FALSE(fs::exists(camera));
+  };
+  refused({out_ / "nowhere.png"}, "nowhere.png");
+  refused({out_ / "text.png"}, "text.png");
+  refused({picture(0), out_ / "other.png"}, "64 x 48; allowed: 640 x 480");
+  refused({picture(0), "--rim-elevation-deg", "100"}, "rim_elevation_deg is 100");
+  refused({picture(0), "--least-quality", "0"}, "least_quality is 0");
+  EXPECT_NE(refusal({"calibrate", picture(0)}).find("--out is required"), std::string::npos);
+  EXPECT_NE(refusal({"calibrate", picture(0), "-o", out_ / "text.png/camera.toml"})
+                .find("text.png/camera.toml"),
+            std::string::npos);
+}
+
+TEST_F(CameraVerbs, UnwrapGivesTheCylinder) {
+  const auto result = run_panonav(
+      {"unwrap", picture(0), "--camera", true_camera(), "-o", out_ / "p.png", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto said = json::parse(result.out);
+  EXPECT_EQ(keys_of(said), (std::set<std::string>{"image", "out", "rows", "columns",
+                                                  "elevations_rad", "horizon_row"}));
+  EXPECT_EQ(said["rows"], 80);
+  EXPECT_EQ(said["columns"], 512);
+  const int horizon = said["horizon_row"];
+  EXPECT_GT(horizon, 5);
+  EXPECT_LT(horizon, 75);
+  const Image panorama = read_image(out_ / "p.png");
+  EXPECT_EQ(panorama.size(), (ImageSize{512, 80}));
+  const auto [darkest, brightest] =
+      std::minmax_element(panorama.pixels().begin(), panorama.pixels().end());
+  EXPECT_GT(*brightest - *darkest, 60) << "a plain picture";
+
+  ASSERT_EQ(run_panonav({"unwrap", picture(0), "--camera", true_camera(), "-o", out_ / "s.png",
+                         "--rows", "20", "--columns", "128"})
+                .exit_code,
+            0);
+  EXPECT_EQ(read_image(out_ / "s.png").size(), (ImageSize{128, 20}));
+}
+
+TEST_F(CameraVerbs, UnwrapRefusesBadInput) {
+  std::ofstream(out_.path() / "text.png") << "no picture";
+  Image other(64, 48);
+  write_png(out_ / "other.png", other.view());
+  std::ofstream(out_.path() / "bad.toml") << "model = \"unified\"\nxi = nan\n";
+  const auto panorama = out_ / "p.png";
+  const auto refused = [&](const std::string& image, const std::vector<std::string>& more,
+                           const std::vector<std::string>& words) {
+    std::vector<std::string> arguments{"unwrap", image, "-o", panorama};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const auto line = refusal(arguments);
+    for (const auto& word : words) EXPECT_NE(line.find(word), std::string::npos) << line;
+    EXPECT_FALSE(fs::exists(panorama));
+  };
+  refused(picture(0), {}, {"--camera"});
+  refused(out_ / "nowhere.png", {"--camera", true_camera()}, {"nowhere.png"});
+  refused(out_ / "text.png", {"--camera", true_camera()}, {"text.png"});
+  refused(out_ / "other.png", {"--camera", true_camera()}, {"other.png", "64", "640"});
+  refused(picture(0), {"--camera", out_ / "bad.toml"}, {"bad.toml"});
+  refused(picture(0), {"--camera", out_ / "no.toml"}, {"no.toml"});
+  refused(picture(0), {"--camera", true_camera(), "--rows", "0"}, {"rows is 0"});
+  refused(picture(0), {"--kind", "equirectangular", "--elevation-deg", "40", "-30"},
+          {"--elevation-deg is 40 -30; allowed"});
+  EXPECT_NE(
+      refusal({"unwrap", picture(0), "--camera", true_camera(), "-o", out_ / "text.png/p.png"})
+          .find("text.png/p.png"),
+      std::string::npos);
+  EXPECT_NE(refusal({"unwrap", picture(0), "--camera", true_camera(), "-o", panorama},
+                    {.file_size_limit_bytes = 2000, .kill_after_ms = {}})
+                .find("p.png"),
+            std::string::npos);
+  EXPECT_FALSE(fs::exists(panorama)) << "half a picture";
+}
+
+}  // namespace
+}  // namespace panonav::testing
