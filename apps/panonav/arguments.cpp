@@ -205,14 +205,30 @@ void Arguments::option(const std::string& flag, std::optional<std::pair<double, 
       ->type_name("LOW HIGH");
 }
 
-void Arguments::option(const std::string& flag, int& value, int low, const std::string& help) {
-  const std::string name = long_form(flag);
-  implementation_->app
-      .add_option_function<std::string>(
-          flag,
-          [&value, name, low](const std::string& text) { value = whole_number(name, text, low); },
-          help)
+namespace {
+
+/// For an int and an optional one alike.
+template <class Value>
+void add_whole_number(CLI::App& app, const std::string& flag, Value& value, int low,
+                      const std::string& help) {
+  app.add_option_function<std::string>(
+         flag,
+         [&value, name = long_form(flag), low](const std::string& text) {
+           value = whole_number(name, text, low);
+         },
+         help)
       ->type_name("INT");
+}
+
+}  // namespace
+
+void Arguments::option(const std::string& flag, int& value, int low, const std::string& help) {
+  add_whole_number(implementation_->app, flag, value, low, help);
+}
+
+void Arguments::option(const std::string& flag, std::optional<int>& value, int low,
+                       const std::string& help) {
+  add_whole_number(implementation_->app, flag, value, low, help);
 }
 
 void Arguments::choice(const std::string& flag, std::optional<std::string>& value,

@@ -56,6 +56,7 @@ class Arguments {
               const std::string& help);
   /// Whole number from `low` on.
   void option(const std::string& flag, int& value, int low, const std::string& help);
+  void option(const std::string& flag, std::optional<int>& value, int low, const std::string& help);
   /// One of `choices`.
   void choice(const std::string& flag, std::optional<std::string>& value,
               std::vector<std::string> choices, const std::string& help);

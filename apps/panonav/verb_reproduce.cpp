@@ -19,6 +19,9 @@ struct ReproduceArguments {
   std::string out = "reproduction";
   bool quick = false;
   std::optional<std::uint64_t> seed;
+  std::optional<int> scenes;
+  std::optional<int> queries;
+  std::optional<int> rows;
 };
 
 std::string shown(double value) {
@@ -78,6 +81,9 @@ ExitCode reproduce(const ReproduceArguments& wanted, Session& session) {
   std::size_t shown_percent = 0;
   ReproductionOptions options{.out = wanted.out, .seed = wanted.seed.value_or(1)};
   if (wanted.quick) options = quick_run(options);
+  if (wanted.scenes) options.scenes = *wanted.scenes;
+  if (wanted.queries) options.queries = *wanted.queries;
+  if (wanted.rows) options.rows = *wanted.rows;
   const Reproduction result =
       reproduce_m04(options, session.executor(), [&](std::string_view, double fraction) {
         const auto percent = static_cast<std::size_t>(100.0 * fraction);
@@ -115,6 +121,14 @@ Run declare(Arguments& arguments) {
   arguments.option("-o,--out", wanted->out, "Folder for the report (default: reproduction)");
   arguments.flag("--quick", wanted->quick, "A smoke run: two scenes, few queries");
   arguments.option("--seed", wanted->seed, "First of the scene seeds (default: 1)");
+  const ReproductionOptions full;
+  const auto in_full = [](int value) { return " (default: " + std::to_string(value); };
+  arguments.option("--scenes", wanted->scenes, 2,
+                   "Variants of the scene" + in_full(full.scenes) + "; from 2)");
+  arguments.option("--queries", wanted->queries, 1,
+                   "Questions in each" + in_full(full.queries) + "; from 1)");
+  arguments.option("--rows", wanted->rows, 1,
+                   "Rows of the views" + in_full(full.rows) + "; from 1)");
   return [wanted](Session& session) { return reproduce(*wanted, session); };
 }
 

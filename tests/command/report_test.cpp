@@ -90,7 +90,8 @@ TEST(Demo, TouchesNoFolderThatIsNotItsOwn) {
 TEST(Reproduce, WritesTheTableThreeTimesAndAllPictures) {
   const TemporaryFolder folder;
   const auto out = folder / "m04";
-  const auto result = run_panonav({"reproduce", "m04", "--quick", "-o", out, "--json"});
+  const auto result = run_panonav(
+      {"reproduce", "m04", "--scenes", "2", "--queries", "4", "--rows", "20", "-o", out, "--json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const auto rows = json::parse(result.out);
   ASSERT_GE(rows.size(), 20U);
@@ -119,6 +120,8 @@ TEST(Reproduce, RefusesBadInput) {
   EXPECT_FALSE(fs::exists(folder / "x"));
   std::ofstream(folder.path() / "file") << "mine";
   EXPECT_NE(refusal({"reproduce", "m04", "--quick", "-o", folder / "file/x"}).find("file/x"),
+            std::string::npos);
+  EXPECT_NE(refusal({"reproduce", "m04", "--scenes", "1"}).find("--scenes is '1'"),
             std::string::npos);
   EXPECT_NE(refusal({"reproduce", "m04", "--sead", "3"}).find("--sead"), std::string::npos);
 }
