@@ -4,6 +4,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/panorama/hidden_values.hpp"
 
 namespace panonav {
 
@@ -16,20 +17,14 @@ PanoramaReader::PanoramaReader(PictureSource source, PanoramaShape shape)
   if (shape.columns != 0) options.columns = shape.columns;
   options.elevations = source_.layout.kept_elevations;
   unwarper_.emplace(*source_.camera, options);
+  if (source_.mask) hidden_ = values_hidden_by(source_.mask->view(), *unwarper_);
 }
 
 Panorama PanoramaReader::convert(ImageView picture) const {
   if (!unwarper_) return panorama_from_picture(picture, source_.layout, shape_);
-  if (!source_.mask) return unwarper_->unwrap(picture);
-  Image masked = to_grey(picture);
-  const Image& mask = *source_.mask;
-  if (mask.size() == masked.size()) {
-    const auto pixels = masked.pixels();
-    for (std::size_t i = 0; i < pixels.size(); ++i) {
-      if (mask.pixels()[i] == 0) pixels[i] = 0;
-    }
-  }
-  return unwarper_->unwrap(masked.view());
+  Panorama panorama = unwarper_->unwrap(picture);
+  if (!hidden_.empty()) fill_hidden_values(panorama, hidden_);
+  return panorama;
 }
 
 Panorama PanoramaReader::read(const std::filesystem::path& file) const {

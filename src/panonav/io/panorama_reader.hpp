@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 #include "panonav/core/image.hpp"
 #include "panonav/panorama/picture.hpp"
@@ -28,6 +30,7 @@ class PanoramaReader {
   PictureSource source_;
   PanoramaShape shape_;
   std::optional<Unwarper> unwarper_;
+  std::vector<std::uint8_t> hidden_;  ///< by the mask; empty without one
 };
 
 }  // namespace panonav

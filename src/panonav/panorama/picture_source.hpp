@@ -23,8 +23,8 @@ struct PictureSource {
   /// the band that is unwarped (empty: all that the camera sees at every azimuth).
   PictureLayout layout;
   std::optional<Camera> camera;  ///< mirror, and only there
-  /// Mirror: grey, of the camera's size; pixels of value 0 show the robot itself and are read as
-  /// black.
+  /// Mirror: grey, of the camera's size; pixels of value 0 show the robot itself. What
+  /// looks at them is filled from both sides (see `fill_hidden_values`).
   std::optional<Image> mask;
   friend bool operator==(const PictureSource&, const PictureSource&) = default;
 };

@@ -1,0 +1,79 @@
+#include "panonav/panorama/hidden_values.hpp"
+
+#include <algorithm>
+#include <string>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav {
+
+namespace {
+
+// Between two seen columns, `from` and the next one round the cylinder.
+void fill_gap(std::span<float> row, int from, int length) {
+  const int columns = static_cast<int>(row.size());
+  const float first = row[static_cast<std::size_t>(from)];
+  const float last = row[static_cast<std::size_t>((from + length) % columns)];
+  for (int i = 1; i < length; ++i) {
+    const float share = static_cast<float>(i) / static_cast<float>(length);
+    row[static_cast<std::size_t>((from + i) % columns)] = first + share * (last - first);
+  }
+}
+
+void fill_row(std::span<float> row, std::span<const std::uint8_t> hidden, float mean_of_all) {
+  const int columns = static_cast<int>(row.size());
+  const auto seen = std::ranges::find(hidden, std::uint8_t{0});
+  if (seen == hidden.end()) {
+    std::ranges::fill(row, mean_of_all);
+    return;
+  }
+  const int first_seen = static_cast<int>(seen - hidden.begin());
+  int from = first_seen;
+  for (int i = 1; i <= columns; ++i) {
+    if (hidden[static_cast<std::size_t>((first_seen + i) % columns)] != 0) continue;
+    fill_gap(row, from, first_seen + i - from);
+    from = first_seen + i;
+  }
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> values_hidden_by(ImageView mask, const Unwarper& unwarper) {
+  require(mask.channels == 1, "channels of the mask", mask.channels, "1");
+  Image seen(mask.width, mask.height);
+  for (int v = 0; v < mask.height; ++v) {
+    for (int u = 0; u < mask.width; ++u) {
+      seen.at(u, v) = mask.data[v * mask.stride + u] == 0 ? 0 : 255;
+    }
+  }
+  const Panorama share_seen = unwarper.unwrap(seen.view());
+  std::vector<std::uint8_t> hidden;
+  hidden.reserve(share_seen.values().size());
+  // A thousandth is less than half a grey level of the picture.
+  for (const float share : share_seen.values()) hidden.push_back(share < 0.999F ? 1 : 0);
+  if (std::ranges::count(hidden, std::uint8_t{0}) == 0) {
+    throw ContractError("mask", "hides everything", "something is seen");
+  }
+  return hidden;
+}
+
+void fill_hidden_values(Panorama& panorama, std::span<const std::uint8_t> hidden) {
+  const auto values = panorama.values();
+  require(hidden.size() == values.size(), "number of entries of hidden",
+          static_cast<double>(hidden.size()), std::to_string(values.size()));
+  double sum = 0.0;
+  std::size_t seen = 0;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (hidden[i] != 0) continue;
+    sum += static_cast<double>(values[i]);
+    ++seen;
+  }
+  require(seen > 0, "number of seen values", 0.0, "1 or more");
+  const auto mean = static_cast<float>(sum / static_cast<double>(seen));
+  const auto columns = static_cast<std::size_t>(panorama.columns());
+  for (std::size_t at = 0; at < values.size(); at += columns) {
+    fill_row(values.subspan(at, columns), hidden.subspan(at, columns), mean);
+  }
+}
+
+}  // namespace panonav
