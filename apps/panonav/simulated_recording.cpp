@@ -44,11 +44,7 @@ Scene load_scene(const std::string& name, const SimulationOptions& options) {
     mesh.textures.read = [](const fs::path& path) { return read_image(path); };
     scene = load_mesh(name, mesh);
   }
-  // Built-in scenes do this themselves.
-  const auto light = static_cast<float>(options.light);
-  scene.ambient *= light;
-  for (auto& lamp : scene.lights) lamp.intensity *= light;
-  for (auto& lamp : scene.directional_lights) lamp.intensity *= light;
+  scale_light(scene, options.light);
   return scene;
 }
 
@@ -120,9 +116,14 @@ SimulatedWorld::SimulatedWorld(
                       to_text(simulation.elevation_high_deg));
   }
   if (!given("frame", "camera_height_m")) wanted_.frame.camera_height_m = scene_.camera_height_m;
-  if (!given("free_space", "robot_height_m")) {
-    wanted_.free_space.robot_height_m = wanted_.frame.camera_height_m;
-  }
+  // What is not said of the robot is as with the robot that the scene is made for.
+  const FreeSpaceOptions usual =
+      free_space_options(scene_.robot_radius_m, wanted_.frame.camera_height_m);
+  FreeSpaceOptions& robot = wanted_.free_space;
+  if (!given("free_space", "robot_radius_m")) robot.robot_radius_m = usual.robot_radius_m;
+  if (!given("free_space", "robot_height_m")) robot.robot_height_m = usual.robot_height_m;
+  if (!given("free_space", "step_height_m")) robot.step_height_m = usual.step_height_m;
+  if (!given("free_space", "cell_m")) robot.cell_m = usual.cell_m;
   free_space_ = std::make_unique<FreeSpace>(scene_, wanted_.free_space);
   renderer_ = std::make_unique<Renderer>(scene_, RendererOptions{}, executor);
 }

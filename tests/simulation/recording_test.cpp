@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "panonav/core/error.hpp"
 #include "panonav/simulation/scenes.hpp"
@@ -122,6 +123,84 @@ TEST_F(Recording, TiltChangesTheViewAndNothingElseDoes) {
   }
   EXPECT_LT(largest_again, 1e-4);
   EXPECT_GT(mean_leaning / static_cast<double>(level.values().size()), 0.005);
+}
+
+// A black floor without end below a white sky, and a black wall all round, 2 m away and 1 m high.
+Scene plain_and_round_wall(bool with_wall) {
+  Scene scene;
+  scene.background = {1.0F, 1.0F, 1.0F};
+  scene.materials.push_back({.colour = {0.0F, 0.0F, 0.0F}, .texture = nullptr, .emission = 1.0F});
+  scene.materials.push_back({.colour = {0.5F, 0.5F, 0.5F}, .texture = nullptr, .emission = 1.0F});
+  const double far = 1e4;
+  scene.meshes.push_back({"floor",
+                          0,
+                          {{-far, -far, 0.0}, {far, -far, 0.0}, {far, far, 0.0}, {-far, far, 0.0}},
+                          {},
+                          {{0, 1, 2}, {0, 2, 3}}});
+  constexpr std::uint32_t facets = 256;
+  Mesh wall{"wall", 1, {}, {}, {}};
+  for (std::uint32_t i = 0; with_wall && i < facets; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / facets;
+    wall.vertices.push_back({2.0 * std::cos(angle), 2.0 * std::sin(angle), 0.0});
+    wall.vertices.push_back({2.0 * std::cos(angle), 2.0 * std::sin(angle), 1.0});
+    const std::uint32_t next = (i + 1) % facets;
+    wall.triangles.push_back({2 * i, 2 * next, 2 * i + 1});
+    wall.triangles.push_back({2 * next, 2 * next + 1, 2 * i + 1});
+  }
+  if (with_wall) scene.meshes.push_back(wall);
+  scene.floor_low = {-3.0, -3.0};
+  scene.floor_high = {3.0, 3.0};
+  return scene;
+}
+
+TEST_F(Recording, TiltLeansTheHorizonByItsAngleInAnyDirection) {
+  const Renderer renderer(plain_and_round_wall(false));
+  const PanoramaRendering fine{
+      .rows = 60, .columns = 72, .elevations = {-0.3, 0.3}, .rays_per_axis = 4};
+  const SensorOptions ideal{.read_noise = 0.0, .full_well = 1e12, .eight_bit = false};
+  const double tilt = radians(7.0);
+  double east = 0.0;
+  double north = 0.0;
+  constexpr int pictures = 40;
+  for (int i = 0; i < pictures; ++i) {
+    const Panorama view = take_panorama(renderer, {0.0, 0.0, 0.5}, fine, {.tilt_rad = tilt}, ideal,
+                                        static_cast<std::uint64_t>(i), executor_);
+    // Height of the horizon in each column, and its first harmonic.
+    double cosine = 0.0;
+    double sine = 0.0;
+    for (int c = 0; c < view.columns(); ++c) {
+      double sky = 0.0;
+      for (int y = 0; y < view.rows(); ++y) sky += static_cast<double>(view.at(y, c)) / view.rows();
+      const double horizon_rad = 0.3 - 0.6 * sky;
+      cosine += 2.0 * horizon_rad * std::cos(view.azimuth_rad(c)) / view.columns();
+      sine += 2.0 * horizon_rad * std::sin(view.azimuth_rad(c)) / view.columns();
+    }
+    EXPECT_NEAR(std::hypot(cosine, sine), tilt, 0.02 * tilt) << "picture " << i;
+    east += cosine / tilt / pictures;
+    north += sine / tilt / pictures;
+  }
+  // Directions are drawn evenly: their mean is longer than 0.5 once in e^-10.
+  EXPECT_LT(std::hypot(east, north), 0.5);
+}
+
+TEST_F(Recording, TheCameraStandsAtItsHeight) {
+  const Renderer renderer(plain_and_round_wall(true));
+  const PanoramaRendering fine{
+      .rows = 400, .columns = 8, .elevations = {-0.9, 0.9}, .rays_per_axis = 2};
+  const SensorOptions ideal{.read_noise = 0.0, .full_well = 1e12, .eight_bit = false};
+  for (const double height_m : {0.08, 0.6, 0.9}) {
+    const Panorama view =
+        take_panorama(renderer, {}, fine, {.camera_height_m = height_m}, ideal, 1, executor_);
+    const double row_rad = 1.8 / view.rows();
+    int sky = 0;
+    int floor = 0;
+    for (int y = 0; y < view.rows(); ++y) {
+      sky += view.at(y, 3) > 0.9F ? 1 : 0;
+      floor += view.at(y, 3) < 0.1F ? 1 : 0;
+    }
+    EXPECT_NEAR(0.9 - sky * row_rad, std::atan2(1.0 - height_m, 2.0), 1.5 * row_rad);
+    EXPECT_NEAR(0.9 - floor * row_rad, std::atan2(height_m, 2.0), 1.5 * row_rad);
+  }
 }
 
 TEST_F(Recording, BadInputIsNamed) {

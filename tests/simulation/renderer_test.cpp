@@ -163,10 +163,21 @@ TEST(Renderer, RefusesWhatItCannotDraw) {
   EXPECT_THROW((void)renderer.render_panorama({}, {.rays_per_axis = 0}, executor), ContractError);
   EXPECT_THROW((void)renderer.render_panorama({.pose = {std::nan(""), 0.0, 0.0}}, {}, executor),
                ContractError);
+  EXPECT_THROW((void)renderer.render_panorama({.pose = {1e300, 0.0, 0.0}}, {}, executor),
+               ContractError);
+  EXPECT_THROW((void)renderer.render_panorama({.height_m = -1e30}, {}, executor), ContractError);
+  EXPECT_THROW((void)renderer.render_panorama({}, {.elevations = {std::nan(""), 0.1}}, executor),
+               ContractError);
   EXPECT_THROW((void)renderer.radiance_along({}, {0.0, 0.0, 0.0}, 0.0), ContractError);
+  EXPECT_THROW((void)renderer.distance_along({0.0, std::nan(""), 0.0}, {1.0, 0.0, 0.0}),
+               ContractError);
+  EXPECT_THROW((void)renderer.distance_along({0.0, 1e40, 0.0}, {1.0, 0.0, 0.0}), ContractError);
   EXPECT_THROW(Renderer(board_ahead(), {.channels = 2}), ContractError);
   Scene broken = board_ahead();
   broken.meshes[0].triangles.push_back({0, 1, 9});
+  EXPECT_THROW(Renderer{broken}, ContractError);
+  broken = board_ahead();
+  broken.meshes[0].vertices[1].z_m = 1e39;
   EXPECT_THROW(Renderer{broken}, ContractError);
 }
 

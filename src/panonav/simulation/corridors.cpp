@@ -4,7 +4,9 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "panonav/simulation/built_in_scenes.hpp"
 #include "panonav/simulation/furniture.hpp"
@@ -24,6 +26,38 @@ void add_ceiling_lamp(SceneBuilder& builder, int shine, Point2 at, double height
   builder.box("lamp", shine, shine, {at, 0.0}, {0.0, 0.0, height_m - 0.07}, {0.6, 0.2, 0.05});
 }
 
+struct CorridorLook {
+  int plaster, rail, door;
+  double height_m;
+};
+
+// A closed run of walls parallel to the axes, seen from the left, with a rail all along. A door
+// stands at every even coordinate where there is room for it.
+void add_wall_with_doors(SceneBuilder& builder, const std::string& name, const CorridorLook& look,
+                         std::span<const Point2> corners) {
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const Point2 from = corners[i];
+    const Point2 to = corners[(i + 1) % corners.size()];
+    const double length = distance(from, to);
+    builder.wall(name, look.plaster, from, to, look.height_m, 2.0);
+    builder.on_wall(name + " rail", look.rail, from, to, 0.0, length, 0.85, 0.95, 0.005);
+    const bool along_x = from.y_m == to.y_m;
+    const double a = along_x ? from.x_m : from.y_m;
+    const double b = along_x ? to.x_m : to.y_m;
+    constexpr double kHalfDoor = 0.45;
+    for (double at = 2.0 * std::ceil(0.5 * (std::min(a, b) + kHalfDoor));
+         at <= std::max(a, b) - kHalfDoor; at += 2.0) {
+      builder.on_wall(name + " door", look.door, from, to, std::abs(at - a) - kHalfDoor,
+                      2.0 * kHalfDoor, 0.0, 2.05);
+    }
+  }
+}
+
+// The wall above an opening.
+void add_lintel(SceneBuilder& builder, const CorridorLook& look, Point2 from, Point2 to) {
+  builder.wall("lintel", look.plaster, from, to, look.height_m, 2.0, 2.3);
+}
+
 }  // namespace
 
 Scene make_loop(const SceneVariation& variation) {
@@ -40,7 +74,7 @@ Scene make_loop(const SceneVariation& variation) {
                     {{-0.5, 3.5}, {6.5, 4.5}},
                     {{-0.5, -0.5}, {0.5, 4.5}},
                     {{5.5, -0.5}, {6.5, 4.5}}};
-  scene.ambient = 0.65F;
+  scene.ambient = 0.4F;
   scene.tour = {{0.0, 0.0}, {6.0, 0.0}, {6.0, 4.0}, {0.0, 4.0}};
   furnish_room_shell(builder, outside, kHeight);
   const auto inner = corners_of(block);
@@ -130,57 +164,77 @@ Scene make_corridor(const SceneVariation& variation) {
   SceneBuilder builder("corridor", variation);
   Scene& scene = builder.scene();
   Random& random = builder.random();
-  // A ring of corridors, 2 m wide, round a block; the middle lines are 12 m and 8 m long.
+  // A ring of corridors, 2 m wide, whose middle lines are 12 m and 8 m long. Two narrower ones
+  // cross the block inside and go on outside to a door: eight junctions that look alike.
   constexpr double kHeight = 2.5;
   constexpr double kHalf = 1.0;
   constexpr double kLong = 12.0;
   constexpr double kShort = 8.0;
-  const FloorArea outside{{-kHalf, -kHalf}, {kLong + kHalf, kShort + kHalf}};
-  const FloorArea block{{kHalf, kHalf}, {kLong - kHalf, kShort - kHalf}};
+  constexpr std::array<double, 2> kCrossings{4.0, 8.0};
+  constexpr double kHalfCrossing = 0.65;
+  constexpr double kDeadEnd = 2.0;
   scene.floor_low = {-0.6, -0.6};
   scene.floor_high = {kLong + 0.6, kShort + 0.6};
   scene.drivable = {{{-0.6, -0.6}, {kLong + 0.6, 0.6}},
                     {{-0.6, kShort - 0.6}, {kLong + 0.6, kShort + 0.6}},
                     {{-0.6, -0.6}, {0.6, kShort + 0.6}},
                     {{kLong - 0.6, -0.6}, {kLong + 0.6, kShort + 0.6}}};
+  for (const double x : kCrossings) {
+    scene.drivable.push_back({{x - 0.4, -0.6}, {x + 0.4, kShort + 0.6}});
+  }
   scene.ambient = 0.65F;
   scene.tour = {{0.0, 0.0}, {kLong, 0.0}, {kLong, kShort}, {0.0, kShort}};
 
-  const int carpet = builder.textured(noise_texture(random, 128, {0.3F, 0.3F, 0.34F}, 0.08));
-  builder.floor(carpet, outside.low, outside.high, 1.0);
-  builder.ceiling(builder.plain({0.85F, 0.85F, 0.84F}), outside.low, outside.high, kHeight, 1.0);
-  const int plaster = builder.textured(noise_texture(random, 128, {0.72F, 0.7F, 0.64F}, 0.04));
-  const int rail = builder.plain({0.3F, 0.25F, 0.2F});
-  const int door = builder.textured(door_texture(random, 128, {0.42F, 0.3F, 0.2F}));
-  const int opening = builder.plain({0.05F, 0.05F, 0.06F});
-  // Every wall repeats itself every 2 m: a door; at two places of each long wall a dark side
-  // passage instead.
-  const auto dress = [&](const std::string& name, Point2 from, Point2 to, bool passages) {
-    builder.wall(name, plaster, from, to, kHeight, 2.0);
-    builder.on_wall(name + " rail", rail, from, to, 0.0, distance(from, to), 0.85, 0.95, 0.005);
-    const double length = distance(from, to);
-    const int doors = static_cast<int>(length / 2.0);
-    const double first = 0.5 * (length - 2.0 * doors) + 0.55;
-    for (int i = 0; i < doors; ++i) {
-      const bool passage = passages && (i == doors / 3 || i == 2 * doors / 3);
-      builder.on_wall(name + (passage ? " passage" : " door"), passage ? opening : door, from, to,
-                      first + 2.0 * i - (passage ? 0.2 : 0.0), passage ? 1.3 : 0.9, 0.0,
-                      passage ? 2.3 : 2.05);
+  const Point2 low{-kHalf, -kHalf - kDeadEnd};
+  const Point2 high{kLong + kHalf, kShort + kHalf + kDeadEnd};
+  const int carpet =
+      builder.textured(noise_texture(random, 128, tint(random, 0.15, 0.5, 0.2), 0.08));
+  builder.floor(carpet, low, high, 1.0);
+  builder.ceiling(builder.plain({0.85F, 0.85F, 0.84F}), low, high, kHeight, 1.0);
+  const CorridorLook look{
+      builder.textured(noise_texture(random, 128, tint(random, 0.5, 0.75, 0.1), 0.04)),
+      builder.plain(tint(random, 0.1, 0.4, 0.2)),
+      builder.textured(door_texture(random, 128, tint(random, 0.1, 0.45, 0.3))), kHeight};
+
+  // The outer wall, counter-clockwise as its inside is seen, with the dead ends.
+  std::vector<Point2> outline;
+  for (const double side : {1.0, -1.0}) {
+    const double y = side > 0.0 ? -kHalf : kShort + kHalf;
+    const double end = y - side * kDeadEnd;
+    outline.push_back({side > 0.0 ? -kHalf : kLong + kHalf, y});
+    for (std::size_t i = 0; i < kCrossings.size(); ++i) {
+      const double x = kCrossings[side > 0.0 ? i : kCrossings.size() - 1 - i];
+      const double half = side * kHalfCrossing;
+      outline.insert(outline.end(),
+                     {{x - half, y}, {x - half, end}, {x + half, end}, {x + half, y}});
+      add_lintel(builder, look, {x - half, y}, {x + half, y});
     }
-  };
-  const auto outer = corners_of(outside);
-  const auto inner = corners_of(block);
-  for (std::size_t i = 0; i < 4; ++i) {
-    dress("outer wall " + std::to_string(i), outer[i], outer[(i + 1) % 4], i % 2 == 0);
-    dress("inner wall " + std::to_string(i), inner[(i + 1) % 4], inner[i], i % 2 == 0);
+    outline.push_back({side > 0.0 ? kLong + kHalf : -kHalf, y});
   }
-  // The few distinct places: a window at one corner, a notice board and a plant on two of the
-  // sides.
-  builder.on_wall("window", builder.textured(window_texture(random, 128), 0.8F), outer[0], outer[1],
-                  kLong + 0.2, 1.4, 0.9, 2.1);
-  builder.on_wall("notice board", builder.textured(poster_texture(random, 128)), outer[2], outer[3],
-                  random.uniform(3.0, 9.0), 1.0, 0.8, 1.6);
-  add_plant(builder, "plant", {outside.low.x_m + 0.3, random.uniform(2.0, 6.0)});
+  add_wall_with_doors(builder, "outer wall", look, outline);
+  // The blocks between the corridors, clockwise.
+  const std::array<double, 6> edges{kHalf,
+                                    kCrossings[0] - kHalfCrossing,
+                                    kCrossings[0] + kHalfCrossing,
+                                    kCrossings[1] - kHalfCrossing,
+                                    kCrossings[1] + kHalfCrossing,
+                                    kLong - kHalf};
+  for (std::size_t i = 0; i < edges.size(); i += 2) {
+    auto corners = corners_of({{edges[i], kHalf}, {edges[i + 1], kShort - kHalf}});
+    std::reverse(corners.begin(), corners.end());
+    add_wall_with_doors(builder, "inner wall " + std::to_string(i / 2), look, corners);
+    if (i == 0) continue;
+    for (const double y : {kHalf, kShort - kHalf}) {
+      add_lintel(builder, look, {edges[i - 1], y}, {edges[i], y});
+    }
+  }
+  // The few distinct places: a window, a notice board and a plant, each on a side of its own.
+  builder.on_wall("window", builder.textured(window_texture(random, 128), 0.8F), {-kHalf, -kHalf},
+                  {kLong + kHalf, -kHalf}, 11.55, 0.9, 0.9, 2.1);
+  builder.on_wall("notice board", builder.textured(poster_texture(random, 128)),
+                  {kLong + kHalf, kShort + kHalf}, {-kHalf, kShort + kHalf},
+                  random.uniform() < 0.5 ? 1.5 : 11.5, 1.0, 0.8, 1.6);
+  add_plant(builder, "plant", {-kHalf + 0.3, random.uniform(2.0, 6.0)});
   const int shine = builder.plain({0.98F, 0.98F, 0.95F}, 1.0F);
   for (double x = 0.0; x <= kLong + 0.1; x += 2.0) {
     add_ceiling_lamp(builder, shine, {x, 0.0}, kHeight, 0.7F);
@@ -189,6 +243,7 @@ Scene make_corridor(const SceneVariation& variation) {
   for (double y = 2.0; y < kShort - 0.1; y += 2.0) {
     add_ceiling_lamp(builder, shine, {0.0, y}, kHeight, 0.7F);
     add_ceiling_lamp(builder, shine, {kLong, y}, kHeight, 0.7F);
+    for (const double x : kCrossings) add_ceiling_lamp(builder, shine, {x, y}, kHeight, 0.7F);
   }
   return builder.finish();
 }

@@ -44,11 +44,15 @@ std::string text(Point2 p) {
 
 }  // namespace
 
+FreeSpaceOptions free_space_options(double robot_radius_m, double camera_height_m) {
+  return {.robot_radius_m = robot_radius_m,
+          .robot_height_m = camera_height_m,
+          .step_height_m = camera_height_m / 12.0,
+          .cell_m = robot_radius_m / 8.0};
+}
+
 FreeSpaceOptions free_space_options(const Scene& scene) {
-  return {.robot_radius_m = scene.robot_radius_m,
-          .robot_height_m = scene.camera_height_m,
-          .step_height_m = scene.camera_height_m / 12.0,
-          .cell_m = scene.robot_radius_m / 8.0};
+  return free_space_options(scene.robot_radius_m, scene.camera_height_m);
 }
 
 void visit_options(FreeSpaceOptions& options, OptionVisitor& visitor) {

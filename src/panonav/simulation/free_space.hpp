@@ -24,8 +24,11 @@ struct FreeSpaceOptions {
 };
 void visit_options(FreeSpaceOptions& options, OptionVisitor& visitor);
 
-/// The options of the robot that a scene is made for: its radius, as high as its camera, driving
-/// over a twelfth of that.
+/// The options of a robot of this radius that is as high as its camera and drives over a twelfth of
+/// that.
+[[nodiscard]] FreeSpaceOptions free_space_options(double robot_radius_m, double camera_height_m);
+
+/// The same for the robot that a scene is made for.
 [[nodiscard]] FreeSpaceOptions free_space_options(const Scene& scene);
 
 /// Where a robot can stand and drive in a scene: inside `floor_low .. floor_high` and the

@@ -144,15 +144,24 @@ Scene make_garden(const SceneVariation& variation) {
     add_hedge(builder, "hedge " + std::to_string(2 * i + 1), along(gap + 0.18), b, height);
   }
   const FloorArea plot{{-1.0, -1.0}, {13.0, 11.0}};
+  scene.tour = {{1.0, 1.0}, {11.0, 1.0}, {11.0, 9.0}, {1.0, 9.0}};
+  const auto place = [&](double radius_m) {
+    Point2 at;
+    do {
+      at = {random.uniform(0.0, 12.0), random.uniform(0.0, 10.0)};
+    } while (!builder.leaves_tour_free(at, radius_m));
+    return at;
+  };
+  constexpr double kTrunk = 0.4;
+  constexpr double kBox = 0.7;
   for (int i = 0; i < 7; ++i) {
-    const Footing wanted{{random.uniform(0.0, 12.0), random.uniform(0.0, 10.0)}, 0.0};
-    add_tree(builder, "tree " + std::to_string(i), builder.movable(wanted, 0.4, plot).centre,
+    const Footing wanted{place(kTrunk), 0.0};
+    add_tree(builder, "tree " + std::to_string(i), builder.movable(wanted, kTrunk, plot).centre,
              random.uniform(2.0, 4.5));
   }
   for (int i = 0; i < 5; ++i) {
-    const Footing wanted{{random.uniform(0.5, 11.5), random.uniform(0.5, 9.5)},
-                         random.uniform(-3.0, 3.0)};
-    add_crate(builder, "flower box " + std::to_string(i), builder.movable(wanted, 0.5, plot),
+    const Footing wanted{place(kBox), random.uniform(-3.0, 3.0)};
+    add_crate(builder, "flower box " + std::to_string(i), builder.movable(wanted, kBox, plot),
               {random.uniform(0.4, 1.2), random.uniform(0.3, 0.6), random.uniform(0.3, 0.8)});
   }
   add_house(builder, "house", {{random.uniform(2.0, 10.0), 18.0}, random.uniform(-0.2, 0.2)},
@@ -167,7 +176,6 @@ Scene make_garden(const SceneVariation& variation) {
              {middle.x_m + radius * std::cos(angle), middle.y_m + radius * std::sin(angle)},
              random.uniform(4.0, 12.0));
   }
-  scene.tour = {{1.0, 1.0}, {11.0, 1.0}, {11.0, 9.0}, {1.0, 9.0}};
   return builder.finish();
 }
 

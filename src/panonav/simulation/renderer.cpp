@@ -55,11 +55,12 @@ class RayMaker {
 };
 
 void validate(const Viewpoint& viewpoint) {
-  require(std::isfinite(viewpoint.pose.x_m), "x_m", viewpoint.pose.x_m, "finite");
-  require(std::isfinite(viewpoint.pose.y_m), "y_m", viewpoint.pose.y_m, "finite");
+  require(std::abs(viewpoint.pose.x_m) <= scene_reach_m, "x_m", viewpoint.pose.x_m, "-1e9 .. 1e9");
+  require(std::abs(viewpoint.pose.y_m) <= scene_reach_m, "y_m", viewpoint.pose.y_m, "-1e9 .. 1e9");
   require(std::isfinite(viewpoint.pose.heading_rad), "heading_rad", viewpoint.pose.heading_rad,
           "finite");
-  require(std::isfinite(viewpoint.height_m), "height_m", viewpoint.height_m, "finite");
+  require(std::abs(viewpoint.height_m) <= scene_reach_m, "height_m", viewpoint.height_m,
+          "-1e9 .. 1e9");
   require(std::isfinite(viewpoint.roll_rad), "roll_rad", viewpoint.roll_rad, "finite");
   require(std::isfinite(viewpoint.pitch_rad), "pitch_rad", viewpoint.pitch_rad, "finite");
 }
@@ -184,23 +185,25 @@ Direction3 scene_from_robot(const Viewpoint& viewpoint, const Direction3& in_rob
 
 namespace {
 
-// The ray with a direction of unit length, and the length that it had.
-std::pair<Ray, double> unit_ray(const Vector3& origin, const Direction3& direction) {
+// The ray with a direction of unit length.
+Ray unit_ray(const Vector3& origin, const Direction3& direction) {
+  if (!is_in_reach(origin)) {
+    throw ContractError("origin", "not finite or too far", "coordinates of -1e9 .. 1e9 m");
+  }
   const double length = std::hypot(direction.x, direction.y, direction.z);
   require(length > 0.0 && std::isfinite(length), "length of the direction", length,
           "> 0 and finite");
   const auto component = [length](double value) { return static_cast<float>(value / length); };
-  return {{{static_cast<float>(origin.x_m), static_cast<float>(origin.y_m),
-            static_cast<float>(origin.z_m)},
-           {component(direction.x), component(direction.y), component(direction.z)}},
-          length};
+  return {{static_cast<float>(origin.x_m), static_cast<float>(origin.y_m),
+           static_cast<float>(origin.z_m)},
+          {component(direction.x), component(direction.y), component(direction.z)}};
 }
 
 }  // namespace
 
 float Renderer::radiance_along(const Vector3& origin, const Direction3& direction,
                                double spread_rad) const {
-  const Ray ray = unit_ray(origin, direction).first;
+  const Ray ray = unit_ray(origin, direction);
   std::array<float, 3> colour{};
   implementation_->shade(ray, implementation_->tracer.first_hit(ray),
                          static_cast<float>(spread_rad), colour.data());
@@ -214,7 +217,7 @@ float Renderer::radiance(const Viewpoint& viewpoint, const Direction3& direction
 }
 
 double Renderer::distance_along(const Vector3& origin, const Direction3& direction) const {
-  const RayHit hit = implementation_->tracer.first_hit(unit_ray(origin, direction).first);
+  const RayHit hit = implementation_->tracer.first_hit(unit_ray(origin, direction));
   if (hit.triangle == RayHit::kNothing) return std::numeric_limits<double>::infinity();
   return hit.distance_m;
 }

@@ -9,10 +9,6 @@ namespace panonav {
 
 namespace {
 
-bool finite(const Vector3& v) {
-  return std::isfinite(v.x_m) && std::isfinite(v.y_m) && std::isfinite(v.z_m);
-}
-
 void validate_mesh(const Scene& scene, const Mesh& mesh) {
   const auto name = [&mesh](const char* what) { return "mesh \"" + mesh.object + "\": " + what; };
   if (mesh.material < 0 || static_cast<std::size_t>(mesh.material) >= scene.materials.size()) {
@@ -26,7 +22,9 @@ void validate_mesh(const Scene& scene, const Mesh& mesh) {
             static_cast<double>(mesh.texture_coordinates.size()), "0 or the number of vertices");
   }
   for (const Vector3& vertex : mesh.vertices) {
-    if (!finite(vertex)) throw ContractError(name("vertex"), "not finite", "finite coordinates");
+    if (!is_in_reach(vertex)) {
+      throw ContractError(name("vertex"), "not finite or too far", "coordinates of -1e9 .. 1e9 m");
+    }
   }
   for (const auto& uv : mesh.texture_coordinates) {
     if (!std::isfinite(uv[0]) || !std::isfinite(uv[1])) {
@@ -42,10 +40,17 @@ void validate_mesh(const Scene& scene, const Mesh& mesh) {
 
 }  // namespace
 
+bool is_in_reach(const Vector3& point) noexcept {
+  const auto within = [](double value) { return std::abs(value) <= scene_reach_m; };
+  return within(point.x_m) && within(point.y_m) && within(point.z_m);
+}
+
 void validate(const Scene& scene) {
   for (const Mesh& mesh : scene.meshes) validate_mesh(scene, mesh);
   for (const PointLight& light : scene.lights) {
-    if (!finite(light.position)) throw ContractError("light position", "not finite", "finite");
+    if (!is_in_reach(light.position)) {
+      throw ContractError("light position", "not finite or too far", "-1e9 .. 1e9 m");
+    }
     require(std::isfinite(light.intensity), "light intensity", light.intensity, "finite");
     require(light.radius_m >= 0.0F && std::isfinite(light.radius_m), "light radius_m",
             light.radius_m, ">= 0");
@@ -56,6 +61,21 @@ void validate(const Scene& scene) {
     require(d.x * d.x + d.y * d.y + d.z * d.z > 0.0, "length of towards_light", 0.0, "> 0");
   }
   require(scene.ambient >= 0.0F && std::isfinite(scene.ambient), "ambient", scene.ambient, ">= 0");
+}
+
+void scale_light(Scene& scene, double factor) {
+  const auto f = static_cast<float>(factor);
+  scene.ambient *= f;
+  for (PointLight& light : scene.lights) light.intensity *= f;
+  for (DirectionalLight& light : scene.directional_lights) light.intensity *= f;
+  for (float& channel : scene.background) channel *= f;
+  for (Material& material : scene.materials) {
+    // A surface shows colour * (e + (1 - e) * light). Light is scaled already, so the two shares
+    // change: colour' e' = f colour e and colour' (1 - e') = colour (1 - e).
+    const float scale = f * material.emission + 1.0F - material.emission;
+    for (float& channel : material.colour) channel *= scale;
+    material.emission *= f / scale;
+  }
 }
 
 }  // namespace panonav

@@ -19,6 +19,13 @@ struct Vector3 {
   friend bool operator==(const Vector3&, const Vector3&) = default;
 };
 
+/// How far from the origin anything in a scene may be, the camera too. Far more than that leaves
+/// what the ray tracer can count with.
+inline constexpr double scene_reach_m = 1e9;
+
+/// Whether all coordinates are numbers within `scene_reach_m`.
+[[nodiscard]] bool is_in_reach(const Vector3& point) noexcept;
+
 /// How a surface looks: a colour times, where there is one, a texture that repeats every texture
 /// coordinate of 1. Texture coordinate (0, 0) is the lower left corner of the picture, u runs to
 /// the right and v upwards. Linear 0 .. 1; matt, seen from both sides.
@@ -80,7 +87,11 @@ struct Scene {
 
 /// Throws ContractError that names the mesh and what is wrong with it: an index out of range, a
 /// number of texture coordinates that is not the number of vertices, a coordinate that is not
-/// finite.
+/// finite or out of reach.
 void validate(const Scene& scene);
+
+/// All light times `factor`: lamps, far and ambient light, what shines by itself and the
+/// background. Every pixel's radiance is then `factor` times what it was. `factor` > 0.
+void scale_light(Scene& scene, double factor);
 
 }  // namespace panonav

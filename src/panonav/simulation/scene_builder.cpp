@@ -193,13 +193,14 @@ Footing SceneBuilder::movable(const Footing& wanted, double radius_m, const Floo
   bool placed = false;
   for (int attempt = 0; attempt < 40; ++attempt) {
     const double angle = moved_.uniform(-std::numbers::pi, std::numbers::pi);
-    const double step = moved_.uniform(0.3, 0.8);
+    const double step = moved_.uniform(1.5, 4.0) * scene_.robot_radius_m;
     const double turn = moved_.uniform(-0.6, 0.6);
     if (!moves || placed) continue;
     const Point2 centre{wanted.centre.x_m + step * std::cos(angle),
                         wanted.centre.y_m + step * std::sin(angle)};
     bool is_free = inside(room, centre, 0.5 * radius_m);
     for (const auto& area : scene_.drivable) is_free = is_free && gap_to(area, centre) >= radius_m;
+    is_free = is_free && leaves_tour_free(centre, radius_m);
     if (is_free) {
       found = {centre, wanted.turn_rad + turn};
       placed = true;
@@ -208,22 +209,18 @@ Footing SceneBuilder::movable(const Footing& wanted, double radius_m, const Floo
   return found;
 }
 
+bool SceneBuilder::leaves_tour_free(Point2 centre, double radius_m) const {
+  return std::ranges::all_of(scene_.tour, [&](Point2 corner) {
+    return distance(corner, centre) >= radius_m + 1.5 * scene_.robot_radius_m;
+  });
+}
+
 void SceneBuilder::lamp(Vector3 position, float intensity, float radius_m) {
   scene_.lights.push_back({position, intensity, radius_m});
 }
 
 Scene SceneBuilder::finish() {
-  const auto light = static_cast<float>(variation_.light);
-  scene_.ambient *= light;
-  for (auto& lamp : scene_.lights) lamp.intensity *= light;
-  for (auto& sun : scene_.directional_lights) sun.intensity *= light;
-  // What shines by itself (windows, the sky) follows the light too.
-  for (auto& material : scene_.materials) {
-    if (material.emission > 0.0F) {
-      for (auto& channel : material.colour) channel *= light;
-    }
-  }
-  for (auto& channel : scene_.background) channel *= light;
+  scale_light(scene_, variation_.light);
   validate(scene_);
   return std::move(scene_);
 }

@@ -71,9 +71,12 @@ class SceneBuilder {
   void ceiling(int material, Point2 low, Point2 high, double height_m, double tile_m);
 
   /// The place of a movable object that would stand at `wanted` and covers a disc of `radius_m`:
-  /// moved by up to 0.8 m with the variation's share, but never into a drivable area or out of the
-  /// floor's surroundings `room`.
+  /// moved by up to four radii of the robot with the variation's share, but never into a drivable
+  /// area, onto a corner of the tour or out of the floor's surroundings `room`.
   Footing movable(const Footing& wanted, double radius_m, const FloorArea& room);
+
+  /// Whether a disc at `centre` lets the robot stand at every corner of the tour.
+  [[nodiscard]] bool leaves_tour_free(Point2 centre, double radius_m) const;
 
   void lamp(Vector3 position, float intensity, float radius_m = 0.4F);
   /// Applies the light of the variation and checks the scene.
