@@ -155,8 +155,8 @@ void print_text(const Arguments& arguments, const CalibrateArguments& wanted,
   if (!arguments.given("mirror")) {
     session.print(
         "A picture does not show the mirror's profile: elevations are taken to run evenly from " +
-        to_text(wanted.mirror.inner_elevation_deg) + " degrees at the inner radius to " +
-        to_text(wanted.mirror.rim_elevation_deg) +
+        short_number(wanted.mirror.inner_elevation_deg) + " degrees at the inner radius to " +
+        short_number(wanted.mirror.rim_elevation_deg) +
         " at the rim. Say what you know with --profile, --rim-elevation-deg and their companions.");
   }
   session.print(

@@ -62,7 +62,9 @@ Trajectory read(const std::string& path) {
 }
 
 ExitCode evaluate(const EvaluateArguments& wanted, Session& session) {
-  const auto error = trajectory_error(read(wanted.estimate), read(wanted.truth), wanted.options);
+  const Trajectory estimate = read(wanted.estimate);
+  const Trajectory truth = read(wanted.truth);
+  const auto error = trajectory_error(estimate, truth, wanted.options);
   if (!error) {
     session.note("panonav evaluate: fewer than two poses of " + wanted.estimate +
                  " have a stamp within " + wanted.truth + "; do both count the same seconds?");

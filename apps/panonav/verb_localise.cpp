@@ -101,7 +101,9 @@ std::string as_text(const Answer& answer, const VisualMemory& memory, Session& s
   }
   for (const auto& level : answer.levels) {
     line += "\n    " + std::to_string(level.components) +
-            " components: " + std::to_string(level.candidates.size()) + " views";
+            (level.components == 1 ? " component: " : " components: ") +
+            std::to_string(level.candidates.size()) +
+            (level.candidates.size() == 1 ? " view" : " views");
     if (level.area_m2) line += ", " + fixed(*level.area_m2, 2) + " m2";
     if (level.region) line += ", within " + fixed(level.region->radius_m, 2) + " m";
   }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
@@ -193,6 +195,70 @@ TEST_F(Localise, WrongArgumentsAreRefused) {
   EXPECT_NE(refusal({"localise", memory(), *folder_ / "nowhere"}).find("nowhere"),
             std::string::npos);
   EXPECT_NE(refusal({"localise", memory()}).find("INPUT"), std::string::npos);
+}
+
+TEST_F(Localise, BadQueriesAreNamed) {
+  const auto data = folder_->path() / "bad";
+  const auto table = [&](const std::string& rows) {
+    std::ofstream(data / "poses.csv") << "file,x_m,y_m,heading_deg\n" << rows;
+  };
+  const auto refused = [&](const std::vector<std::string>& words) {
+    const auto line = refusal({"localise", memory(), data});
+    for (const auto& word : words) EXPECT_NE(line.find(word), std::string::npos) << line;
+  };
+  write_dataset(data, *world_, grid_poses(2));
+  ASSERT_EQ(run_panonav({"localise", memory(), data}).exit_code, 0);
+  table("view_000.png,0,nan,0\n");
+  refused({"poses.csv", "y_m", "nan"});
+  table("view_000.png,0,0\n");
+  refused({"poses.csv"});
+  table("view_000.png,0,0,0\nview_000.png,1,0,0\n");
+  refused({"poses.csv", "view_000.png"});
+  table("");
+  refused({"poses.csv"});
+  table("gone.png,0,0,0\n");
+  refused({"gone.png"});
+  table("view_000.png,0,0,0\n");
+  std::ofstream(data / view_name(0)) << "no picture";
+  refused({view_name(0)});
+}
+
+TEST_F(Localise, AreasShrinkAndAreListedComponentByComponent) {
+  for (const auto& answer : answers({memory(), asked(), "--areas"})) {
+    const auto& areas = answer.at("areas");
+    ASSERT_EQ(areas.size(), 15U);
+    for (std::size_t i = 0; i < areas.size(); ++i) {
+      EXPECT_EQ(areas[i].size(), 5U);
+      EXPECT_EQ(areas[i]["components"], i + 1);
+      EXPECT_GE(areas[i]["candidates"].get<int>(), 1);
+      EXPECT_GT(areas[i]["area_m2"].get<double>(), 0.0);
+      if (i == 0) continue;
+      EXPECT_LE(areas[i]["candidates"], areas[i - 1]["candidates"]);
+      EXPECT_LE(areas[i]["area_m2"].get<double>(), areas[i - 1]["area_m2"].get<double>() + 1e-9);
+      EXPECT_LE(areas[i]["radius_m"].get<double>(), areas[i - 1]["radius_m"].get<double>() + 1e-9);
+      EXPECT_GE(areas[i]["bytes_read"], areas[i - 1]["bytes_read"]);
+    }
+  }
+  // Stopping at an accuracy, and a memory without positions.
+  const auto coarse = answers({memory(), asked(), "--areas", "--area-components", "2"});
+  EXPECT_EQ(coarse.front()["areas"].size(), 2U);
+  const auto plain = *folder_ / "plain.panonav";
+  std::filesystem::create_directory(folder_->path() / "plain");
+  for (const int i : {0, 7, 13}) {
+    std::filesystem::copy_file(std::filesystem::path(grid()) / view_name(static_cast<size_t>(i)),
+                               folder_->path() / "plain" / view_name(static_cast<size_t>(i)));
+  }
+  ASSERT_EQ(run_panonav({"memorise", *folder_ / "plain", plain, "--kind", "panorama",
+                         "--elevation-deg", "-20", "20"})
+                .exit_code,
+            0);
+  const auto result = run_panonav({"localise", plain, *folder_ / "plain", "--areas", "--json"});
+  EXPECT_LE(result.exit_code, 1) << result.err;
+  const auto first = json::parse(lines(result.out).at(0));
+  EXPECT_TRUE(first["areas"][0]["area_m2"].is_null());
+  EXPECT_TRUE(first["areas"][0]["radius_m"].is_null());
+  EXPECT_TRUE(first["position"].is_null());
+  EXPECT_TRUE(first["heading_rad"].is_null());
 }
 
 TEST_F(Localise, ViewsOfAnotherSizeAreRefused) {

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <sstream>
+
 #include "command_runner.hpp"
 
 namespace panonav::testing {
@@ -20,6 +22,48 @@ TEST(Usage, WrongUseIsOneLineWithAHint) {
   EXPECT_NE(refusal({}).find("a verb is missing; see panonav --help"), std::string::npos);
   EXPECT_NE(refusal({"frobnicate"}).find("'frobnicate' is no verb"), std::string::npos);
   (void)refusal({"--no-such-flag"});
+}
+
+TEST(Usage, AMisspeltFlagIsNamedEvenWhereSomethingElseIsMissing) {
+  EXPECT_NE(refusal({"memorise", "--componnets", "5"}).find("--componnets"), std::string::npos);
+  EXPECT_NE(refusal({"memorise", "a", "b", "--componnets", "5"}).find("--componnets"),
+            std::string::npos);
+}
+
+TEST(Usage, EveryVerbHasHelpWithAnExampleOfItself) {
+  const auto help = run_panonav({"--help"});
+  for (const std::string verb : {"simulate", "calibrate", "unwrap", "memorise", "info", "verify",
+                                 "forget", "localise", "evaluate", "demo", "reproduce"}) {
+    EXPECT_NE(help.out.find("  " + verb), std::string::npos) << verb;
+    const auto own = run_panonav({verb, "--help"});
+    EXPECT_EQ(own.exit_code, 0) << own.err;
+    EXPECT_NE(own.out.find("--json"), std::string::npos) << verb;
+    EXPECT_NE(own.out.find("--config"), std::string::npos) << verb;
+    const auto examples = own.out.find("Example:\n");
+    ASSERT_NE(examples, std::string::npos) << verb;
+    EXPECT_NE(own.out.find("panonav " + verb, examples), std::string::npos) << verb;
+  }
+}
+
+// Their files are not there, so that is all that may be wrong with them.
+TEST(Usage, ExamplesAreUnderstood) {
+  int tried = 0;
+  for (const std::string verb :
+       {"calibrate", "unwrap", "memorise", "info", "verify", "forget", "localise", "evaluate"}) {
+    const auto help = run_panonav({verb, "--help"});
+    for (const auto& line : lines(help.out.substr(help.out.find("Example:\n")))) {
+      if (line.find("panonav ") == std::string::npos) continue;
+      std::istringstream stream(line);
+      std::vector<std::string> words;
+      for (std::string word; stream >> word;) words.push_back(word);
+      words.erase(words.begin());
+      const auto result = run_panonav(words);
+      EXPECT_EQ(result.exit_code, 2) << line;
+      EXPECT_NE(result.err.find("o such file"), std::string::npos) << line << '\n' << result.err;
+      ++tried;
+    }
+  }
+  EXPECT_GE(tried, 10);
 }
 
 }  // namespace
