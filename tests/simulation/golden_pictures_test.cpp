@@ -75,9 +75,9 @@ Difference difference(const Image& a, const Image& b) {
   return {sum / count, far / count};
 }
 
-// What other rounding may do. Measured between the instruction sets SSE4.2, AVX2 and AVX-512: a mean
-// difference of 0.002 levels at most and no far pixel. The small changes below give 0.15 levels and
-// more.
+// What other rounding may do. Measured between the instruction sets SSE4.2, AVX2 and AVX-512: a
+// mean difference of 0.002 levels at most and no far pixel. The small changes below give 0.15
+// levels and more.
 bool is_the_same(const Difference& found) {
   return found.mean_levels <= 0.1 && found.share_of_far_pixels <= 0.002;
 }

@@ -183,15 +183,21 @@ void add_crate(SceneBuilder& builder, const std::string& name, const Footing& fo
   builder.box(name, side, top, footing, {0.0, 0.0, 0.0}, size);
 }
 
-void add_tree(SceneBuilder& builder, const std::string& name, Point2 centre, double height_m) {
+TreeKind make_tree_kind(SceneBuilder& builder) {
   Random& random = builder.random();
   const int bark = builder.textured(noise_texture(random, 64, {0.25F, 0.2F, 0.15F}, 0.25, 1.5));
   const float green = static_cast<float>(random.uniform(0.22, 0.42));
   const int leaves =
       builder.textured(foliage_texture(random, 256, {0.7F * green, green, 0.45F * green}));
+  return {bark, leaves};
+}
+
+void add_tree(SceneBuilder& builder, const std::string& name, const TreeKind& kind, Point2 centre,
+              double height_m) {
+  Random& random = builder.random();
   const double trunk = 0.3 * height_m;
-  builder.cylinder(name, bark, centre, 0.0, trunk + 0.5, 0.05 * height_m * random.uniform(0.6, 1.0),
-                   10, 1.3);
+  builder.cylinder(name, kind.bark, centre, 0.0, trunk + 0.5,
+                   0.05 * height_m * random.uniform(0.6, 1.0), 10, 1.3);
   // The crown: a few clumps of leaves, pushed to all sides, so that a tree has a shape of its own.
   const double crown = height_m - trunk;
   const int clumps = 4 + static_cast<int>(random.index(3));
@@ -199,7 +205,7 @@ void add_tree(SceneBuilder& builder, const std::string& name, Point2 centre, dou
     const double share = (i + 0.5) / clumps;
     const double radius = crown * random.uniform(0.22, 0.36) * (1.15 - 0.5 * share);
     builder.blob(
-        name, leaves,
+        name, kind.leaves,
         {centre.x_m + random.normal(0.0, 0.12 * crown),
          centre.y_m + random.normal(0.0, 0.12 * crown), trunk + crown * (0.15 + 0.75 * share)},
         {radius, radius, radius * random.uniform(0.7, 1.0)}, 0.13);

@@ -22,6 +22,14 @@ void add_cabinet(SceneBuilder& builder, const std::string& name, const Footing& 
 void add_plant(SceneBuilder& builder, const std::string& name, Point2 centre);
 void add_crate(SceneBuilder& builder, const std::string& name, const Footing& footing,
                Vector3 size);
-void add_tree(SceneBuilder& builder, const std::string& name, Point2 centre, double height_m);
+
+/// Materials of a kind of tree.
+struct TreeKind {
+  int bark = 0;
+  int leaves = 0;
+};
+[[nodiscard]] TreeKind make_tree_kind(SceneBuilder& builder);
+void add_tree(SceneBuilder& builder, const std::string& name, const TreeKind& kind, Point2 centre,
+              double height_m);
 
 }  // namespace panonav

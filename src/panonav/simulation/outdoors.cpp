@@ -156,8 +156,8 @@ Scene make_garden(const SceneVariation& variation) {
   constexpr double kBox = 0.7;
   for (int i = 0; i < 7; ++i) {
     const Footing wanted{place(kTrunk), 0.0};
-    add_tree(builder, "tree " + std::to_string(i), builder.movable(wanted, kTrunk, plot).centre,
-             random.uniform(2.0, 4.5));
+    add_tree(builder, "tree " + std::to_string(i), make_tree_kind(builder),
+             builder.movable(wanted, kTrunk, plot).centre, random.uniform(2.0, 4.5));
   }
   for (int i = 0; i < 5; ++i) {
     const Footing wanted{place(kBox), random.uniform(-3.0, 3.0)};
@@ -168,11 +168,13 @@ Scene make_garden(const SceneVariation& variation) {
             {9.0, 6.0, 3.2}, tint(random, 0.4, 0.8, 0.2), {0.5F, 0.25F, 0.2F});
   add_house(builder, "shed", {{-5.0, random.uniform(2.0, 8.0)}, random.uniform(1.2, 1.9)},
             {3.0, 2.2, 2.0}, builder.palette().wood, tint(random, 0.15, 0.4, 0.2));
-  // Far trees make the horizon.
+  // Far trees, of a few kinds, make the horizon.
+  std::array<TreeKind, 6> kinds;
+  for (TreeKind& kind : kinds) kind = make_tree_kind(builder);
   for (int i = 0; i < 60; ++i) {
     const double angle = 2.0 * std::numbers::pi * (i + random.uniform(-0.5, 0.5)) / 60.0;
     const double radius = random.uniform(25.0, 90.0);
-    add_tree(builder, "far tree " + std::to_string(i),
+    add_tree(builder, "far tree " + std::to_string(i), kinds[random.index(kinds.size())],
              {middle.x_m + radius * std::cos(angle), middle.y_m + radius * std::sin(angle)},
              random.uniform(4.0, 12.0));
   }
