@@ -12,7 +12,7 @@ namespace panonav::command {
 namespace {
 
 MapLayer layer_of(const FloorPlan& plan) {
-  return {.label = "furniture and walls", .colour = "#999999", .filled_polygons = plan.boxes};
+  return {.label = "furniture", .colour = "#999999", .filled_polygons = plan.boxes};
 }
 
 MapLayer references(const VisualMemory& memory) {
