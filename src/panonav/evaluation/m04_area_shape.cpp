@@ -26,8 +26,10 @@ namespace {
 constexpr double kSpacingM = 0.125;
 constexpr int kRows = 40;
 constexpr int kColumns = 256;
-// The shape is looked at where the area is still broad.
-constexpr int kComponents = 3;
+// The shape is looked at where the area is broad, and again where it no longer reaches the border
+// of the grid.
+constexpr std::array kComponents{3, 6};
+constexpr std::size_t kLevels = kComponents.size();
 constexpr double kTolerance = 0.25;
 // The same places in every scene.
 constexpr std::size_t kPlacesX = 6;
@@ -52,9 +54,10 @@ Shape shape_of(const Directional& values) {
 
 // What was found at one place of one scene.
 struct Observation {
-  Shape area;      // equivalent radius of the area in each sector
-  Shape free;      // free distance
-  Shape parallax;  // distance for equal parallax
+  std::array<Shape, kLevels> area;       // equivalent radius of the area in each sector
+  Shape free;                            // free distance
+  Shape parallax;                        // distance for equal parallax
+  std::array<Shape, kLevels> predicted;  // distance for an equal change of the components
 };
 // By place; empty where furniture stands.
 using SceneObservations = std::array<std::optional<Observation>, kPlaces>;
@@ -76,31 +79,56 @@ Directional extents_of(const VisualMemory& memory, const ReferenceAreas& areas, 
 }
 
 // Which surroundings and which property of them an area is compared with.
-using Property = double (*)(const Observation&, std::size_t direction);
+using Property = double (*)(const Observation&, std::size_t level, std::size_t direction);
 
 struct Relation {
   std::string id;
+  std::string label;
   std::string what;
   Property area;
   Property surroundings;
   std::size_t directions;  // 1 for sizes
 };
 
-const std::array<Relation, 3>& relations() {
-  static const std::array<Relation, 3> all{
-      Relation{"size_against_free_distance",
-               "size of the area with the mean free distance to objects",
-               [](const Observation& o, std::size_t) { return o.area.size; },
-               [](const Observation& o, std::size_t) { return o.free.size; }, 1},
-      Relation{"shape_against_free_distance",
+const std::array<Relation, 5>& relations() {
+  static const std::array<Relation, 5> all{
+      Relation{
+          "size_against_free_distance", "size",
+          "size of the area with the mean free distance to objects",
+          [](const Observation& o, std::size_t level, std::size_t) { return o.area[level].size; },
+          [](const Observation& o, std::size_t, std::size_t) { return o.free.size; }, 1},
+      Relation{"shape_against_free_distance", "free distance",
                "relative extent of the area per direction with the relative free distance there",
-               [](const Observation& o, std::size_t i) { return o.area.relative[i]; },
-               [](const Observation& o, std::size_t i) { return o.free.relative[i]; },
+               [](const Observation& o, std::size_t level, std::size_t i) {
+                 return o.area[level].relative[i];
+               },
+               [](const Observation& o, std::size_t, std::size_t i) { return o.free.relative[i]; },
                shape_directions},
-      Relation{"shape_against_parallax",
-               "relative extent of the area per direction with the way that parallax allows there",
-               [](const Observation& o, std::size_t i) { return o.area.relative[i]; },
-               [](const Observation& o, std::size_t i) { return o.parallax.relative[i]; },
+      Relation{
+          "shape_against_parallax", "parallax",
+          "relative extent of the area per direction with the way that parallax allows there",
+          [](const Observation& o, std::size_t level, std::size_t i) {
+            return o.area[level].relative[i];
+          },
+          [](const Observation& o, std::size_t, std::size_t i) { return o.parallax.relative[i]; },
+          shape_directions},
+      Relation{
+          "size_against_prediction", "size",
+          "size of the area with the size predicted from parallax and contrast",
+          [](const Observation& o, std::size_t level, std::size_t) { return o.area[level].size; },
+          [](const Observation& o, std::size_t level, std::size_t) {
+            return o.predicted[level].size;
+          },
+          1},
+      Relation{"shape_against_prediction", "parallax and contrast",
+               "relative extent of the area per direction with that predicted from parallax and "
+               "contrast",
+               [](const Observation& o, std::size_t level, std::size_t i) {
+                 return o.area[level].relative[i];
+               },
+               [](const Observation& o, std::size_t level, std::size_t i) {
+                 return o.predicted[level].relative[i];
+               },
                shape_directions}};
   return all;
 }
@@ -114,7 +142,8 @@ struct Residuals {
 };
 
 std::vector<std::vector<double>> residuals_of(const std::vector<SceneObservations>& scenes,
-                                              Property property, std::size_t directions) {
+                                              Property property, std::size_t level,
+                                              std::size_t directions) {
   std::vector<std::vector<double>> result(scenes.size(),
                                           std::vector<double>(kPlaces * directions, std::nan("")));
   for (std::size_t p = 0; p < kPlaces; ++p) {
@@ -123,12 +152,12 @@ std::vector<std::vector<double>> residuals_of(const std::vector<SceneObservation
       double count = 0.0;
       for (const auto& scene : scenes) {
         if (!scene[p]) continue;
-        sum += property(*scene[p], d);
+        sum += property(*scene[p], level, d);
         count += 1.0;
       }
       for (std::size_t s = 0; s < scenes.size(); ++s) {
         if (scenes[s][p]) {
-          result[s][p * directions + d] = property(*scenes[s][p], d) - sum / count;
+          result[s][p * directions + d] = property(*scenes[s][p], level, d) - sum / count;
         }
       }
     }
@@ -156,8 +185,8 @@ double correlation(const Residuals& residuals, const std::vector<std::size_t>& s
 
 MapPlot plan_of(const PlaceRecording& place, const ReferenceAreas& areas, Point2 robot,
                 const std::vector<Match>& candidates, std::size_t number) {
-  MapPlot map{.title = "place " + std::to_string(number) + ", " + std::to_string(kComponents) +
-                       " components",
+  MapPlot map{.title = "place " + std::to_string(number) + ", " +
+                       std::to_string(kComponents.front()) + " components",
               .layers = furniture_layers(place.scene)};
   MapLayer area{.label = "where it may be", .colour = "#0072b2"};
   for (const Match& match : candidates) area.filled_polygons.push_back(areas.cell(match.view));
@@ -196,14 +225,20 @@ class AreaShape final : public Experiment {
       const Panorama view = take_view(place, rendering, robot, noise + grid.size() + p);
       const auto levels = localise_hierarchically(
           memory, areas, pack(compute_signature(view, m04_components), memory.full_scale()),
-          {.components = kComponents, .tolerance = kTolerance});
-      const auto& candidates = levels.back().candidates;
+          {.tolerance = kTolerance});
       const Surroundings around = surroundings_of(place, robot.position());
-      here[p] = Observation{shape_of(extents_of(memory, areas, robot.position(), candidates)),
-                            shape_of(around.free_m), shape_of(around.parallax_m)};
-      if (scenes_.empty() && kShownPlaces.end() != std::ranges::find(kShownPlaces, p)) {
-        shown_.push_back(plan_of(place, areas, robot.position(), candidates, shown_.size() + 1));
+      Observation seen{{}, shape_of(around.free_m), shape_of(around.parallax_m), {}};
+      for (std::size_t level = 0; level < kLevels; ++level) {
+        const auto& candidates =
+            levels.at(static_cast<std::size_t>(kComponents[level] - 1)).candidates;
+        seen.predicted[level] = shape_of(predicted_extents(place, robot, view, kComponents[level]));
+        seen.area[level] = shape_of(extents_of(memory, areas, robot.position(), candidates));
+        if (scenes_.empty() && level == 0 &&
+            kShownPlaces.end() != std::ranges::find(kShownPlaces, p)) {
+          shown_.push_back(plan_of(place, areas, robot.position(), candidates, shown_.size() + 1));
+        }
       }
+      here[p] = seen;
     }
     scenes_.push_back(here);
   }
@@ -219,17 +254,22 @@ class AreaShape final : public Experiment {
     }
     std::vector<std::size_t> all(scenes_.size());
     std::iota(all.begin(), all.end(), std::size_t{0});
-    LinePlot plot{.title =
-                      "Does the area reach farther where objects are farther away? "
-                      "(relative to other offices at the same place)",
-                  .x_label = "tenth of the values around the place, from smallest to largest",
-                  .y_label = "extent of the area, less its mean [share]",
-                  .series = {}};
-    for (const Relation& relation : relations()) {
-      const Residuals residuals{residuals_of(scenes_, relation.area, relation.directions),
-                                residuals_of(scenes_, relation.surroundings, relation.directions)};
-      add_rows(relation, residuals, all, result);
-      if (relation.directions > 1) plot.series.push_back(tenths(relation, residuals));
+    LinePlot plot{
+        .title = "Does the area reach farther where the surroundings allow it?",
+        .x_label =
+            "surroundings in that direction, against other offices: tenths, smallest to largest",
+        .y_label = "extent of the area, against other offices [share]",
+        .series = {}};
+    for (std::size_t level = 0; level < kLevels; ++level) {
+      for (const Relation& relation : relations()) {
+        const Residuals residuals{
+            residuals_of(scenes_, relation.area, level, relation.directions),
+            residuals_of(scenes_, relation.surroundings, level, relation.directions)};
+        add_rows(relation, level, residuals, all, result);
+        if (relation.directions > 1 && relation.id != "shape_against_parallax") {
+          plot.series.push_back(tenths(relation, level, residuals));
+        }
+      }
     }
     write_plot(folder / "fig10_shape_against_surroundings.png", plot);
     result.pictures.push_back(
@@ -243,8 +283,10 @@ class AreaShape final : public Experiment {
   static constexpr std::array<std::size_t, 4> kShownPlaces{1, 4, 8, 15};
   static constexpr int kDraws = 500;
 
-  static void add_rows(const Relation& relation, const Residuals& residuals,
+  static void add_rows(const Relation& relation, std::size_t level, const Residuals& residuals,
                        const std::vector<std::size_t>& all, Reproduction& result) {
+    const std::string components = std::to_string(kComponents[level]);
+    const std::string id = "m04.fig10." + relation.id + "_" + components;
     Random random(1, 81);
     std::vector<double> drawn;
     std::vector<double> shuffled;
@@ -258,16 +300,17 @@ class AreaShape final : public Experiment {
       }
       shuffled.push_back(correlation(residuals, all, partners));
     }
-    result.rows.push_back({.id = "m04.fig10." + relation.id,
+    result.rows.push_back({.id = id,
                            .what = "figure 10, left open by the authors: rank correlation over " +
-                                   std::to_string(all.size()) + " offices, of the " + relation.what,
+                                   std::to_string(all.size()) + " offices, " + components +
+                                   " components, of the " + relation.what,
                            .published = std::nullopt,
                            .ours = correlation(residuals, all, all),
                            .interval = std::pair{quantile(drawn, 0.025), quantile(drawn, 0.975)},
                            .unit = "",
                            .target = std::nullopt});
     result.rows.push_back(
-        {.id = "m04.fig10." + relation.id + ".by_chance",
+        {.id = id + ".by_chance",
          .what = "figure 10: the same with the surroundings of another office "
                  "at the same place (median of 500 shuffles)",
          .published = std::nullopt,
@@ -278,7 +321,7 @@ class AreaShape final : public Experiment {
   }
 
   // Mean residual of the area in each tenth of the residuals of the surroundings.
-  static Series tenths(const Relation& relation, const Residuals& residuals) {
+  static Series tenths(const Relation& relation, std::size_t level, const Residuals& residuals) {
     std::vector<std::pair<double, double>> pairs;
     for (std::size_t s = 0; s < residuals.area.size(); ++s) {
       for (std::size_t j = 0; j < residuals.area[s].size(); ++j) {
@@ -288,8 +331,8 @@ class AreaShape final : public Experiment {
       }
     }
     std::ranges::stable_sort(pairs, {}, &std::pair<double, double>::first);
-    Series series{.label = relation.id == "shape_against_parallax" ? "way that parallax allows"
-                                                                   : "free distance"};
+    Series series{.label =
+                      relation.label + ", " + std::to_string(kComponents[level]) + " components"};
     constexpr std::size_t kTenths = 10;
     for (std::size_t t = 0; t < kTenths; ++t) {
       std::vector<double> values;

@@ -19,6 +19,8 @@ constexpr std::array kComponents{2, 5, 15, 50, 256};
 constexpr std::size_t kCounts = kComponents.size();
 constexpr std::size_t kFifteen = 2;
 constexpr std::size_t kConditions = 3;
+constexpr std::size_t kHidden = 1;
+constexpr std::size_t kBands = 4;  // components 0 and 1, 2 .. 14, 15 .. 49, 50 .. 255
 
 // Dissimilarities of one query to all references, for every number of components at once.
 std::array<std::vector<double>, kCounts> dissimilarities(
@@ -60,6 +62,7 @@ class Discrimination final : public Experiment {
     require(place.rendering.columns >= 2 * kComponents.back(), "columns", place.rendering.columns,
             ">= 512: figure 6 compares 256 components");
     const auto references = signatures_of(place.references, kComponents.back(), executor);
+    const auto clean = signatures_of(place.queries, kComponents.back(), executor);
     std::vector<double> sharpness(kCounts);
     std::vector<double> contrast(kCounts);
     for (std::size_t condition = 0; condition < kConditions; ++condition) {
@@ -93,6 +96,7 @@ class Discrimination final : public Experiment {
         success_by_scene_[condition][c].push_back(right[c]);
       }
       if (condition == 0 && profile_.empty()) keep_profile(place, values.front());
+      if (condition == kHidden) compare_disturbance(place, clean, queries, references);
     }
     for (std::size_t c = 0; c < kCounts; ++c) {
       sharpness_by_scene_[c].push_back(sharpness[c]);
@@ -144,6 +148,14 @@ class Discrimination final : public Experiment {
                    text(c) + " components (less is better)",
                contrast_by_scene_[c], std::nullopt, result);
     }
+    constexpr std::array kBandNames{"0 and 1", "2 to 14", "15 to 49", "50 to 255"};
+    for (std::size_t band = 0; band < kBands; ++band) {
+      if (disturbance_[band].empty()) continue;
+      add_mean("hidden.disturbance_" + std::to_string(band + 1),
+               std::string("figure 6: what hiding 10 % of the azimuths changes in components ") +
+                   kBandNames[band] + ", over what a step of 25 cm changes there",
+               disturbance_[band], std::nullopt, result);
+    }
     add_mean("sharpness_fifteen_against_2",
              "figure 6: sharpness with 15 components less that with 2",
              difference(sharpness_by_scene_[kFifteen], sharpness_by_scene_[0]),
@@ -186,6 +198,35 @@ class Discrimination final : public Experiment {
          .target = target});
   }
 
+  // What the hidden azimuths change in a view, against what the way to a reference one spacing
+  // from the nearest changes: for the components of the signature and for those beyond.
+  void compare_disturbance(const PlaceRecording& place, const std::vector<FourierSignature>& clean,
+                           const std::vector<FourierSignature>& hidden,
+                           const std::vector<FourierSignature>& references) {
+    if (references.size() < 2) return;
+    std::array<double, kBands> by_people{};
+    std::array<double, kBands> by_step{};
+    for (std::size_t q = 0; q < clean.size(); ++q) {
+      const std::size_t nearest = place.nearest_reference(place.queries[q].pose.position());
+      const auto people = dissimilarity_by_component(clean[q], hidden[q]);
+      // The raster's next reference, or the one before at its end, is a neighbour but for row ends.
+      const std::size_t next = nearest + 1 < references.size() ? nearest + 1 : nearest - 1;
+      if (distance(place.references[nearest].pose.position(),
+                   place.references[next].pose.position()) > 1.01 * place.spacing_m) {
+        continue;
+      }
+      const auto step = dissimilarity_by_component(references[nearest], references[next]);
+      for (std::size_t k = 0; k < people.size(); ++k) {
+        const std::size_t band = k < 2 ? 0 : k < 15 ? 1 : k < 50 ? 2 : 3;
+        by_people[band] += people[k];
+        by_step[band] += step[k];
+      }
+    }
+    for (std::size_t band = 0; band < kBands; ++band) {
+      if (by_step[band] > 0.0) disturbance_[band].push_back(by_people[band] / by_step[band]);
+    }
+  }
+
   void keep_profile(const PlaceRecording& place,
                     const std::array<std::vector<double>, kCounts>& values) {
     const PlacedView& query = place.queries.front();
@@ -223,7 +264,8 @@ class Discrimination final : public Experiment {
                    .x_label = "number of components",
                    .y_label = "share of queries",
                    .series = {},
-                   .log_x = true};
+                   .log_x = true,
+                   .x_range = std::pair{1.5, 400.0}};
     for (std::size_t condition = 0; condition < kConditions; ++condition) {
       Series line{.label = view_conditions()[condition].name};
       for (std::size_t c = 0; c < kCounts; ++c) {
@@ -248,6 +290,7 @@ class Discrimination final : public Experiment {
   std::array<std::array<std::vector<double>, kCounts>, kConditions> success_by_scene_;
   std::array<std::vector<double>, kCounts> sharpness_by_scene_;
   std::array<std::vector<double>, kCounts> contrast_by_scene_;
+  std::array<std::vector<double>, kBands> disturbance_;
   std::vector<Series> profile_;
 };
 

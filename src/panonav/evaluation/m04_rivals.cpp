@@ -104,6 +104,7 @@ class Rivals final : public Experiment {
                   .x_label = "",
                   .y_label = "share of queries",
                   .series = {},
+                  .x_range = std::pair{-0.6, static_cast<double>(kRivals) - 0.4},
                   .y_range = std::pair{0.0, 1.05}};
     plot.x_tick_labels.assign(names_.begin(), names_.end());
     for (std::size_t condition = 0; condition < conditions.size(); ++condition) {

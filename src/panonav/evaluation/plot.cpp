@@ -176,8 +176,7 @@ std::string map_text(const MapPlot& map, const std::string& prefix) {
   }
   std::ostringstream text;
   text << blocks.str() << "set title " << quoted(map.title) << "\n"
-       << "set size ratio -1\nset key outside bottom center horizontal\n"
-       << "set offsets graph 0.03, graph 0.03, graph 0.03, graph 0.03\n";
+       << "set size ratio -1\nset key outside bottom center horizontal samplen 1.5 width -1\n";
   if (items.tellp() > 0) {
     text << "plot " << items.str() << "\n";
   } else {
@@ -186,24 +185,35 @@ std::string map_text(const MapPlot& map, const std::string& prefix) {
   return text.str();
 }
 
-// Keeps a map's picture close to the map's own proportions.
-PictureSize map_size(const MapPlot& map, int width) {
+// The rectangle around everything on a map.
+struct Bounds {
   Point2 low{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
   Point2 high{-low.x_m, -low.y_m};
-  const auto include = [&](const std::vector<Point2>& points) {
+
+  void include(const std::vector<Point2>& points) {
     for (const auto& p : points) {
       low = {std::min(low.x_m, p.x_m), std::min(low.y_m, p.y_m)};
       high = {std::max(high.x_m, p.x_m), std::max(high.y_m, p.y_m)};
     }
-  };
-  for (const auto& layer : map.layers) {
-    include(layer.circles);
-    include(layer.crosses);
-    for (const auto& line : layer.lines) include(line);
-    for (const auto& polygon : layer.filled_polygons) include(polygon);
   }
+  void include(const MapPlot& map) {
+    for (const auto& layer : map.layers) {
+      include(layer.circles);
+      include(layer.crosses);
+      for (const auto& line : layer.lines) include(line);
+      for (const auto& polygon : layer.filled_polygons) include(polygon);
+    }
+  }
+  [[nodiscard]] bool empty() const { return !(high.x_m > low.x_m && high.y_m > low.y_m); }
+};
+
+// Keeps a map's picture close to the map's own proportions.
+PictureSize map_size(const Bounds& bounds, int width) {
   const double ratio =
-      high.x_m > low.x_m ? std::clamp((high.y_m - low.y_m) / (high.x_m - low.x_m), 0.2, 1.2) : 0.75;
+      bounds.empty()
+          ? 0.75
+          : std::clamp((bounds.high.y_m - bounds.low.y_m) / (bounds.high.x_m - bounds.low.x_m), 0.2,
+                       1.2);
   return {width, static_cast<int>(ratio * width) + 130};
 }
 
@@ -322,8 +332,12 @@ void write_plot(const std::filesystem::path& path, const HeatMap& plot) {
 }
 
 void write_plot(const std::filesystem::path& path, const MapPlot& plot) {
-  draw(path, map_size(plot, 800),
-       "set xlabel \"x [m]\"\nset ylabel \"y [m]\"\n" + map_text(plot, "m"));
+  Bounds bounds;
+  bounds.include(plot);
+  draw(path, map_size(bounds, 800),
+       "set xlabel \"x [m]\"\nset ylabel \"y [m]\"\n"
+       "set offsets graph 0.03, graph 0.03, graph 0.03, graph 0.03\n" +
+           map_text(plot, "m"));
 }
 
 void write_plot(const std::filesystem::path& path, const std::vector<MapPlot>& panels,
@@ -332,14 +346,26 @@ void write_plot(const std::filesystem::path& path, const std::vector<MapPlot>& p
   require(panel_columns >= 1, "panel columns", panel_columns, ">= 1");
   const int count = static_cast<int>(panels.size());
   const int panel_rows = (count + panel_columns - 1) / panel_columns;
-  PictureSize size{panel_columns * 460, 0};
+  // All panels show the same part of the world, so that they can be compared.
+  Bounds bounds;
+  for (const MapPlot& panel : panels) bounds.include(panel);
+  constexpr int kPanelWidth = 560;
+  PictureSize size = map_size(bounds, kPanelWidth);
+  size.width *= panel_columns;
+  size.height *= panel_rows;
   std::string body = "set multiplot layout " + std::to_string(panel_rows) + "," +
-                     std::to_string(panel_columns) + "\n";
+                     std::to_string(panel_columns) +
+                     "\nset xlabel \"x [m]\"\nset ylabel \"y [m]\"\n";
+  if (!bounds.empty()) {
+    const double margin =
+        0.03 * std::max(bounds.high.x_m - bounds.low.x_m, bounds.high.y_m - bounds.low.y_m);
+    body += "set xrange [" + number(bounds.low.x_m - margin) + ":" +
+            number(bounds.high.x_m + margin) + "]\nset yrange [" + number(bounds.low.y_m - margin) +
+            ":" + number(bounds.high.y_m + margin) + "]\n";
+  }
   for (int i = 0; i < count; ++i) {
-    size.height = std::max(size.height, map_size(panels[static_cast<std::size_t>(i)], 460).height);
     body += map_text(panels[static_cast<std::size_t>(i)], "p" + std::to_string(i));
   }
-  size.height *= panel_rows;
   draw(path, size, body + "unset multiplot\n");
 }
 

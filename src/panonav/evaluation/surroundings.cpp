@@ -2,9 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <limits>
 #include <map>
 #include <numbers>
+#include <string>
+
+#include "panonav/core/error.hpp"
+#include "panonav/signature/fourier_signature.hpp"
 
 namespace panonav {
 
@@ -50,6 +55,65 @@ Surroundings surroundings_of(const PlaceRecording& place, Point2 position) {
         shift[i] > 0.0 ? static_cast<double>(kRays * kHeightsM.size()) / shift[i] : kFarM;
   }
   return result;
+}
+
+Directional predicted_extents(const PlaceRecording& place, const Pose2& pose, const Panorama& view,
+                              int components) {
+  require(view.elevations().has_value(), "elevations of the view", 0.0, "known");
+  using Complex = std::complex<double>;
+  const FourierSignature signature = compute_signature(view, components);
+  const double column_rad = 2.0 * std::numbers::pi / view.columns();
+  const double row_rad = (view.elevations()->top_rad - view.elevations()->bottom_rad) / view.rows();
+  const auto count = static_cast<std::size_t>(components);
+  Directional change{};
+  for (int y = 0; y < view.rows(); ++y) {
+    const double elevation = view.elevation_rad(y);
+    const int above = std::max(y - 1, 0);
+    const int below = std::min(y + 1, view.rows() - 1);
+    // How the components of this row change per metre along x and y of the robot.
+    std::vector<Complex> along_x(count);
+    std::vector<Complex> along_y(count);
+    for (int c = 0; c < view.columns(); ++c) {
+      const double azimuth = view.azimuth_rad(c);
+      const double range_m = place.renderer->distance_along(
+          {pose.x_m, pose.y_m, place.scene.camera_height_m},
+          Direction3::from_angles(azimuth + pose.heading_rad, elevation));
+      if (!std::isfinite(range_m) || range_m <= 0.0) continue;
+      const int left = (c + 1) % view.columns();
+      const int right = (c + view.columns() - 1) % view.columns();
+      const double around = (view.at(y, left) - view.at(y, right)) / (2.0 * column_rad);
+      const double upwards =
+          above == below ? 0.0
+                         : (view.at(above, c) - view.at(below, c)) / ((below - above) * row_rad);
+      // A step along theta turns what is seen by sin(azimuth - theta) / (range cos(elevation)), and
+      // lifts it by cos(azimuth - theta) sin(elevation) / range.
+      const double turn = around / (range_m * std::max(std::cos(elevation), 1e-3));
+      const double lift = upwards * std::sin(elevation) / range_m;
+      const double x = turn * std::sin(azimuth) + lift * std::cos(azimuth);
+      const double y_part = -turn * std::cos(azimuth) + lift * std::sin(azimuth);
+      for (std::size_t k = 0; k < count; ++k) {
+        const Complex wave = std::polar(1.0, -static_cast<double>(k) * azimuth);
+        along_x[k] += x * wave;
+        along_y[k] += y_part * wave;
+      }
+    }
+    for (std::size_t k = 0; k < count; ++k) {
+      // The part along the component itself changes its magnitude, the rest its phase.
+      const Complex unit =
+          std::polar(1.0, -static_cast<double>(signature.phase_rad(y, static_cast<int>(k))));
+      const double per_x = (along_x[k] * unit).real();
+      const double per_y = (along_y[k] * unit).real();
+      for (std::size_t i = 0; i < shape_directions; ++i) {
+        const double theta = kSectorRad * static_cast<double>(i) - pose.heading_rad;
+        change[i] += std::abs(per_x * std::cos(theta) + per_y * std::sin(theta));
+      }
+    }
+  }
+  Directional extents{};
+  for (std::size_t i = 0; i < shape_directions; ++i) {
+    extents[i] = change[i] > 0.0 ? 1.0 / change[i] : 0.0;
+  }
+  return extents;
 }
 
 std::vector<MapLayer> furniture_layers(const Scene& scene) {

@@ -24,6 +24,15 @@ struct Surroundings {
 };
 [[nodiscard]] Surroundings surroundings_of(const PlaceRecording& place, Point2 position);
 
+/// How far the robot can drive in each direction until the first components of its view have
+/// changed by a fixed amount, to first order, for a view taken at `pose` with the place's heights
+/// and elevations: every pixel's brightness gradient times its shift by parallax, the shift read
+/// from the distance of what the pixel shows, transformed, and projected on each magnitude. Only
+/// ratios have a meaning. Directions are those of the scene. Throws ContractError on a view without
+/// elevations.
+[[nodiscard]] Directional predicted_extents(const PlaceRecording& place, const Pose2& pose,
+                                            const Panorama& view, int components);
+
 /// The sector of a direction, 0 .. shape_directions - 1.
 [[nodiscard]] std::size_t sector_of(double azimuth_rad);
 
