@@ -254,12 +254,10 @@ class AreaShape final : public Experiment {
     }
     std::vector<std::size_t> all(scenes_.size());
     std::iota(all.begin(), all.end(), std::size_t{0});
-    LinePlot plot{
-        .title = "Does the area reach farther where the surroundings allow it?",
-        .x_label =
-            "surroundings in that direction, against other offices: tenths, smallest to largest",
-        .y_label = "extent of the area, against other offices [share]",
-        .series = {}};
+    LinePlot plot{.title = "Does the area reach farther where the surroundings allow it?",
+                  .x_label = "surroundings in that direction [tenths of all]",
+                  .y_label = "extent of the area, against other offices [share]",
+                  .series = {}};
     for (std::size_t level = 0; level < kLevels; ++level) {
       for (const Relation& relation : relations()) {
         const Residuals residuals{
