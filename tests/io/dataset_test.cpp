@@ -12,6 +12,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/panorama_reader.hpp"
+#include "panonav/io/written_degrees.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace panonav {
@@ -82,6 +83,19 @@ TEST_F(DatasetFolder, WhatIsWrittenReadsBackTheSame) {
     EXPECT_EQ(back.entries[i].pose->position(), dataset.entries[i].pose->position());
   }
   EXPECT_NEAR(back.source.layout.elevations->top_rad, radians(40.0), 1e-12);
+}
+
+TEST(WrittenDegrees, AreRoundWhereThatReadsBackTheSame) {
+  EXPECT_EQ(written_degrees(radians(-30.0)), -30.0);
+  EXPECT_EQ(written_degrees(radians(118.1)), 118.1);
+  int unchanged = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const double angle_rad = std::sin(0.7 * i) * 3.0;
+    const double back_rad = radians(written_degrees(angle_rad));
+    EXPECT_NEAR(back_rad, angle_rad, 1e-15);
+    unchanged += back_rad == radians(degrees(angle_rad)) ? 1 : 0;
+  }
+  EXPECT_EQ(unchanged, 1000) << "rounding must not lose what was there";
 }
 
 TEST_F(DatasetFolder, EveryFaultHasItsLine) {

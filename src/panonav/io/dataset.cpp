@@ -12,6 +12,7 @@
 #include "panonav/io/camera_file.hpp"
 #include "panonav/io/csv_table.hpp"
 #include "panonav/io/toml_fields.hpp"
+#include "panonav/io/written_degrees.hpp"
 
 namespace panonav {
 
@@ -277,11 +278,11 @@ void write_dataset(const Dataset& dataset) {
       add(entry.pose->x_m);
       add(entry.pose->y_m);
     }
-    if (headings) add(degrees(*entry.pose->heading_rad));
+    if (headings) add(written_degrees(*entry.pose->heading_rad));
     if (odometry) {
       add(entry.odometry->x_m);
       add(entry.odometry->y_m);
-      add(degrees(entry.odometry->heading_rad));
+      add(written_degrees(entry.odometry->heading_rad));
     }
     table += "\n";
   }
@@ -298,8 +299,8 @@ void write_dataset(const Dataset& dataset) {
             "\"\nforward_column = " + to_text(source.layout.forward_column) + "\n";
   }
   if (band) {
-    text += "elevation_deg = [" + to_text(degrees(band->bottom_rad)) + ", " +
-            to_text(degrees(band->top_rad)) + "]\n";
+    text += "elevation_deg = [" + to_text(written_degrees(band->bottom_rad)) + ", " +
+            to_text(written_degrees(band->top_rad)) + "]\n";
   }
   if (source.kind == PictureKind::mirror) {
     require(source.camera.has_value(), "camera of mirror pictures", 0.0, "one camera");
