@@ -133,7 +133,7 @@ std::vector<MapLayer> furniture_layers(const Scene& scene) {
     }
   }
   MapLayer lower{.label = "lower than the camera", .colour = "#e69f00"};
-  MapLayer higher{.label = "higher", .colour = "#5b3a00"};
+  MapLayer higher{.label = "higher than the camera", .colour = "#5b3a00"};
   for (const auto& [name, box] : boxes) {
     const double width = box.high.x_m - box.low.x_m;
     const double depth = box.high.y_m - box.low.y_m;
