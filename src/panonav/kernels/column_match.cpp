@@ -1,0 +1,36 @@
+#include "panonav/kernels/column_match.hpp"
+
+#include "panonav/core/error.hpp"
+
+namespace panonav::kernels {
+
+void match_columns(std::span<const std::uint8_t> query, std::span<const std::uint8_t> reference,
+                   std::span<std::uint16_t> costs, Instructions instructions) {
+  constexpr auto query_size = static_cast<std::size_t>(matched_query_columns * matched_bands);
+  constexpr auto reference_size =
+      static_cast<std::size_t>(matched_reference_columns * matched_bands);
+  require(query.size() == query_size, "bytes of the query's columns",
+          static_cast<double>(query.size()), "512");
+  require(reference.size() == reference_size, "bytes of the reference's columns",
+          static_cast<double>(reference.size()), "2048");
+  require(costs.size() == static_cast<std::size_t>(matched_reference_columns), "turns",
+          static_cast<double>(costs.size()), "128");
+  switch (instructions) {
+#ifdef PANONAV_HAS_AVX2
+    case Instructions::avx2:
+      return avx2::match_columns(query.data(), reference.data(), costs.data());
+#endif
+#ifdef PANONAV_HAS_AVX512
+    case Instructions::avx512:
+      return avx512::match_columns(query.data(), reference.data(), costs.data());
+#endif
+#ifdef PANONAV_HAS_NEON
+    case Instructions::neon:
+      return neon::match_columns(query.data(), reference.data(), costs.data());
+#endif
+    default:
+      return scalar::match_columns(query.data(), reference.data(), costs.data());
+  }
+}
+
+}  // namespace panonav::kernels

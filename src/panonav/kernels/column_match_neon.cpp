@@ -1,0 +1,10 @@
+#include "panonav/kernels/column_match_vector.hpp"
+
+namespace panonav::kernels::neon {
+
+void match_columns(const unsigned char* query, const unsigned char* reference,
+                   unsigned short* costs) {
+  match_columns_loop(query, reference, costs);
+}
+
+}  // namespace panonav::kernels::neon
