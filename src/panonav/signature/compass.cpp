@@ -278,6 +278,33 @@ std::optional<CompassReading> compass(const PackedSignature& query,
   return read_compass(cross_spectrum(query, reference, options));
 }
 
+std::optional<CompassReading> compass_near(const PackedSignature& query,
+                                           const PackedSignature& reference, double heading_rad,
+                                           double within_rad, const CompassOptions& options) {
+  require(within_rad > 0.0 && within_rad <= pi, "within_rad", within_rad, "above 0 .. pi");
+  const auto spectrum = cross_spectrum(query, reference, options);
+  if (!spectrum) return {};
+  // As fine as `highest_peaks` looks.
+  const int steps = 1 + static_cast<int>(std::ceil(within_rad * 8.0 * spectrum->highest() / pi));
+  const double step = 2.0 * within_rad / steps;
+  Peak best{heading_rad - within_rad, evaluate(*spectrum, heading_rad - within_rad).value};
+  int at = 0;
+  for (int i = 1; i <= steps; ++i) {
+    const double heading = heading_rad - within_rad + i * step;
+    const double value = evaluate(*spectrum, heading).value;
+    if (value > best.value) {
+      best = {heading, value};
+      at = i;
+    }
+  }
+  if (at > 0 && at < steps) {
+    const Peak refined = refine(*spectrum, best.heading_rad - step, best.heading_rad + step);
+    if (refined.value >= best.value) best = refined;
+  }
+  return CompassReading{wrap_angle(best.heading_rad),
+                        std::clamp(best.value / spectrum->norm, -1.0, 1.0), 1.0};
+}
+
 std::optional<CompassReading> sequential_compass(const FourierSignature& query,
                                                  const FourierSignature& reference,
                                                  const CompassOptions& options) {

@@ -40,6 +40,14 @@ struct CompassOptions {
                                                     const PackedSignature& reference,
                                                     const CompassOptions& options = {});
 
+/// The same, but the maximum is looked for only within `within_rad` of `heading_rad`: for a heading
+/// that something else has told coarsely. `distinctness` is 1, as no other heading is considered.
+/// Throws ContractError also unless 0 < within_rad <= pi.
+[[nodiscard]] std::optional<CompassReading> compass_near(const PackedSignature& query,
+                                                         const PackedSignature& reference,
+                                                         double heading_rad, double within_rad,
+                                                         const CompassOptions& options = {});
+
 /// S06's sequential rule [S06 eq. 40-43, sign of eq. 41 corrected], as published, kept for
 /// comparison: each component refines the estimate of those before. When the first is weak (its
 /// weight below a tenth of the mean) a second estimate starts at the opposite heading and the one

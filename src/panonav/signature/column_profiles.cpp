@@ -1,0 +1,183 @@
+#include "panonav/signature/column_profiles.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/kernels/column_match.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr int columns = ColumnProfiles::columns;
+constexpr int bands = ColumnProfiles::bands;
+static_assert(columns == kernels::matched_reference_columns && bands == kernels::matched_bands);
+constexpr std::uint8_t middle = 128;
+// A contrast of 1 in bytes: more than three times the contrast of a column is rare.
+constexpr float unit = 40.0F;
+// A column's own contrast counts together with this share of that of all columns, so that the noise
+// of a blank wall is not blown up to a pattern.
+constexpr float share_of_all = 0.2F;
+// With fewer bands than this a column has no shape of its own.
+constexpr int fewest_for_shape = 4;
+
+// Each band of all columns; a band is the unit of the vector loops.
+using Rebuilt = std::array<std::array<float, columns>, bands>;
+
+// Finer components than this would need more columns.
+constexpr int most_components = columns / 2;
+
+struct Waves {
+  std::array<std::array<float, columns>, most_components> cosines, sines;
+};
+
+const Waves& waves() {
+  static const Waves made = [] {
+    Waves waves{};
+    for (std::size_t k = 0; k < most_components; ++k) {
+      for (std::size_t c = 0; c < columns; ++c) {
+        const double angle =
+            2.0 * std::numbers::pi * static_cast<double>(k * c % columns) / columns;
+        waves.cosines[k][c] = static_cast<float>(std::cos(angle));
+        waves.sines[k][c] = static_cast<float>(std::sin(angle));
+      }
+    }
+    return waves;
+  }();
+  return made;
+}
+
+// Rows that count, spread over the bands as evenly as whole rows allow.
+int rebuild(const PackedSignature& signature, int components,
+            std::span<const std::uint8_t> allowed_rows, Rebuilt& view) {
+  const auto rows = static_cast<std::size_t>(signature.shape.rows);
+  std::vector<std::size_t> counted;
+  for (std::size_t y = 0; y < rows; ++y) {
+    if (allowed_rows.empty() || allowed_rows[y] != 0) counted.push_back(y);
+  }
+  const std::size_t used = std::min<std::size_t>(bands, counted.size());
+  static const std::array<float, 256> cosines = [] {
+    std::array<float, 256> table{};
+    for (std::size_t i = 0; i < table.size(); ++i) {
+      table[i] = static_cast<float>(std::cos(std::numbers::pi * static_cast<double>(i) / 128.0));
+    }
+    return table;
+  }();
+  for (std::size_t band = 0; band < used; ++band) {
+    auto& values = view[band];
+    values.fill(0.0F);
+    const std::size_t first = band * counted.size() / used;
+    const std::size_t end = (band + 1) * counted.size() / used;
+    for (int k = 0; k < components; ++k) {
+      float real = 0.0F;
+      float imaginary = 0.0F;
+      for (std::size_t i = first; i < end; ++i) {
+        const std::size_t at = static_cast<std::size_t>(k) * rows + counted[i];
+        const auto magnitude = static_cast<float>(signature.magnitudes[at]);
+        real += magnitude * cosines[signature.phases[at]];
+        imaginary += magnitude * cosines[static_cast<std::uint8_t>(signature.phases[at] - 64)];
+      }
+      // I(phi) = a_0 / 2 + sum_k a_k cos(k phi) + b_k sin(k phi) [S06 eq. 10].
+      const float scale = (k == 0 ? 0.5F : 1.0F) / static_cast<float>(end - first);
+      real *= scale;
+      imaginary *= scale;
+      const auto& cosine = waves().cosines[k];
+      const auto& sine = waves().sines[k];
+      for (std::size_t c = 0; c < columns; ++c) {
+        values[c] += real * cosine[c] - imaginary * sine[c];
+      }
+    }
+  }
+  return static_cast<int>(used);
+}
+
+void free_columns_of_mean(Rebuilt& view, std::size_t used) {
+  std::array<float, columns> means{};
+  for (std::size_t b = 0; b < used; ++b) {
+    for (std::size_t c = 0; c < columns; ++c) means[c] += view[b][c] / static_cast<float>(used);
+  }
+  for (std::size_t b = 0; b < used; ++b) {
+    for (std::size_t c = 0; c < columns; ++c) view[b][c] -= means[c];
+  }
+}
+
+// Views of so few rows are compared by their brightness.
+void free_view_of_mean(Rebuilt& view, std::size_t used) {
+  float mean = 0.0F;
+  for (std::size_t b = 0; b < used; ++b) {
+    for (const float value : view[b]) mean += value / static_cast<float>(used * columns);
+  }
+  for (std::size_t b = 0; b < used; ++b) {
+    for (float& value : view[b]) value -= mean;
+  }
+}
+
+}  // namespace
+
+ColumnProfiles::ColumnProfiles(const PackedSignature& signature, int components,
+                               std::span<const std::uint8_t> allowed_rows)
+    : values_(static_cast<std::size_t>(columns * bands), middle) {
+  require(components >= 0 && components <= signature.shape.components, "components", components,
+          "0 (all) or 1 .. " + to_text(signature.shape.components));
+  require(
+      allowed_rows.empty() || allowed_rows.size() == static_cast<std::size_t>(signature.shape.rows),
+      "allowed rows", static_cast<double>(allowed_rows.size()), to_text(signature.shape.rows));
+  if (components == 0) components = signature.shape.components;
+  components = std::min(components, most_components);
+
+  Rebuilt view;
+  used_bands_ = rebuild(signature, components, allowed_rows, view);
+  const auto used = static_cast<std::size_t>(used_bands_);
+  const bool shaped = used_bands_ >= fewest_for_shape;
+  if (shaped) {
+    free_columns_of_mean(view, used);
+  } else {
+    free_view_of_mean(view, used);
+  }
+  std::array<float, columns> contrasts{};
+  float all = 0.0F;
+  for (std::size_t b = 0; b < used; ++b) {
+    for (std::size_t c = 0; c < columns; ++c) contrasts[c] += view[b][c] * view[b][c];
+  }
+  for (float& contrast : contrasts) {
+    contrast /= static_cast<float>(used);
+    all += contrast / columns;
+  }
+  all = std::sqrt(all);
+  if (!(all > 0.0F)) return;  // nothing to see
+  for (float& contrast : contrasts) {
+    contrast = shaped ? std::sqrt(contrast) + share_of_all * all : all;
+  }
+  for (std::size_t b = 0; b < used; ++b) {
+    for (std::size_t c = 0; c < columns; ++c) {
+      const float value = std::clamp(unit * view[b][c] / contrasts[c], -127.0F, 127.0F);
+      values_[b * columns + c] = static_cast<std::uint8_t>(std::lround(value) + middle);
+    }
+  }
+}
+
+ColumnMatch match_columns(const ColumnProfiles& query, const ColumnProfiles& reference) {
+  require(query.used_bands() == reference.used_bands(), "bands of the query", query.used_bands(),
+          to_text(reference.used_bands()) + ", as of the reference");
+  constexpr int query_columns = kernels::matched_query_columns;
+  std::array<std::uint8_t, query_columns * bands> asked{};
+  for (std::size_t c = 0; c < query_columns; ++c) {
+    for (std::size_t b = 0; b < bands; ++b) {
+      asked[c * bands + b] = query.values()[b * columns + c * (columns / query_columns)];
+    }
+  }
+  std::array<std::uint16_t, columns> costs{};
+  kernels::match_columns(asked, reference.values(), costs, kernels::chosen_instructions());
+  const auto best = std::ranges::min_element(costs) - costs.begin();
+  // The kernel counts 16 roots of bytes.
+  const double whole =
+      16.0 * query_columns * std::sqrt(static_cast<double>(unit) * std::max(1, query.used_bands()));
+  return {static_cast<double>(costs[static_cast<std::size_t>(best)]) / whole,
+          wrap_angle(2.0 * std::numbers::pi * static_cast<double>(best) / columns)};
+}
+
+}  // namespace panonav

@@ -1,0 +1,208 @@
+#include "panonav/signature/column_profiles.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <numbers>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/geometry/angles.hpp"
+
+namespace panonav {
+namespace {
+
+/// A smooth picture around the robot: waves of the first `waves` frequencies in every row,
+/// neighbouring rows alike.
+Panorama smooth_view(std::uint64_t seed, int rows = 40, int columns = 256, int waves = 12) {
+  Random random(seed);
+  Panorama view(rows, columns, std::nullopt);
+  for (int k = 0; k < waves; ++k) {
+    for (int wave = 0; wave < 3; ++wave) {
+      const double phase = random.uniform(-std::numbers::pi, std::numbers::pi);
+      const double vertical = random.uniform(0.05, 0.5);
+      const double shift = random.uniform(0.0, 6.0);
+      const double amplitude = 0.05 * random.normal();
+      for (int y = 0; y < rows; ++y) {
+        for (int c = 0; c < columns; ++c) {
+          view.at(y, c) += static_cast<float>(
+              amplitude * std::cos(k * 2.0 * std::numbers::pi * c / columns + phase) *
+              std::cos(vertical * y + shift));
+        }
+      }
+    }
+  }
+  return view;
+}
+
+PackedSignature packed(const Panorama& view) {
+  return pack(compute_signature(view), 0.4F);
+}
+
+Panorama changed(Panorama view, float gain, float offset) {
+  for (float& value : view.values()) value = gain * value + offset;
+  return view;
+}
+
+/// A tenth of the columns, from `first` on, in one colour.
+Panorama hidden(Panorama view, int first, float colour) {
+  for (int y = 0; y < view.rows(); ++y) {
+    for (int i = 0; i < view.columns() / 10; ++i) view.at(y, (first + i) % view.columns()) = colour;
+  }
+  return view;
+}
+
+double difference(const Panorama& query, const Panorama& reference) {
+  return match_columns(ColumnProfiles(packed(query)), ColumnProfiles(packed(reference))).difference;
+}
+
+TEST(ColumnProfiles, AreThoseOfTheBandLimitedView) {
+  const Panorama view = smooth_view(1);
+  const ColumnProfiles profiles(packed(view));
+  ASSERT_EQ(profiles.used_bands(), 16);
+  // By the definition, from the picture itself: it has no wave beyond the signature's.
+  constexpr std::size_t columns = ColumnProfiles::columns;
+  std::vector<std::vector<double>> bands(16, std::vector<double>(columns));
+  for (std::size_t b = 0; b < 16; ++b) {
+    const std::size_t first = b * 40 / 16;
+    const std::size_t end = (b + 1) * 40 / 16;
+    for (std::size_t c = 0; c < columns; ++c) {
+      for (std::size_t y = first; y < end; ++y) {
+        bands[b][c] += view.at(static_cast<int>(y), static_cast<int>(2 * c)) /
+                       static_cast<double>(end - first);
+      }
+    }
+  }
+  std::vector<double> contrast(columns);
+  double all = 0.0;
+  for (std::size_t c = 0; c < columns; ++c) {
+    double mean = 0.0;
+    for (std::size_t b = 0; b < 16; ++b) mean += bands[b][c] / 16.0;
+    for (std::size_t b = 0; b < 16; ++b) {
+      bands[b][c] -= mean;
+      contrast[c] += bands[b][c] * bands[b][c] / 16.0;
+    }
+    all += contrast[c] / columns;
+  }
+  double sum = 0.0;
+  double error = 0.0;
+  for (std::size_t b = 0; b < 16; ++b) {
+    for (std::size_t c = 0; c < columns; ++c) {
+      const double wanted = 40.0 * bands[b][c] / (std::sqrt(contrast[c]) + 0.2 * std::sqrt(all));
+      const double found = profiles.values()[b * columns + c] - 128.0;
+      EXPECT_NEAR(found, std::clamp(wanted, -127.0, 127.0),
+                  8.0);  // phases and magnitudes are bytes
+      error += std::abs(found - wanted);
+      sum += std::abs(wanted);
+    }
+  }
+  EXPECT_GT(sum / (16.0 * columns), 10.0);
+  EXPECT_LT(error, 0.05 * sum);
+}
+
+TEST(ColumnProfiles, DoNotChangeWithGainAndOffset) {
+  const Panorama view = smooth_view(2);
+  const double other = difference(smooth_view(3), view);
+  // What is left is the rounding of smaller magnitudes to bytes.
+  EXPECT_LT(difference(changed(view, 0.7F, 0.0F), view), 0.3 * other);
+  EXPECT_LT(difference(changed(view, 0.7F, 0.1F), view), 0.3 * other);
+}
+
+TEST(ColumnMatch, OfTheSameViewTurnedIsZeroAndTellsTheTurn) {
+  const Panorama view = smooth_view(4);
+  for (const int turned : {0, 2, 64, 128, 130, 254}) {  // whole columns of the profiles
+    const ColumnMatch match = match_columns(ColumnProfiles(packed(turn_columns(view, turned))),
+                                            ColumnProfiles(packed(view)));
+    EXPECT_LT(match.difference, 0.1);
+    EXPECT_NEAR(
+        angle_difference(match.heading_rad, 2.0 * std::numbers::pi * turned / view.columns()), 0.0,
+        1e-9);
+  }
+  const ColumnProfiles same(packed(view));
+  EXPECT_EQ(match_columns(same, same).difference, 0.0);
+}
+
+TEST(ColumnMatch, AHiddenTenthRaisesTheDifferenceByLittle) {
+  int checked = 0;
+  for (std::uint64_t seed = 10; seed < 20; ++seed) {
+    const Panorama view = smooth_view(seed);
+    const double other = difference(smooth_view(seed + 100), view);
+    for (const float colour : {-0.5F, 0.0F, 0.5F}) {
+      const Panorama spoilt = hidden(turn_columns(view, 50), 17 * static_cast<int>(seed), colour);
+      const ColumnMatch match =
+          match_columns(ColumnProfiles(packed(spoilt)), ColumnProfiles(packed(view)));
+      EXPECT_LT(match.difference, 0.75 * other) << "seed " << seed << " colour " << colour;
+      EXPECT_NEAR(angle_difference(match.heading_rad, 2.0 * std::numbers::pi * 50 / 256), 0.0,
+                  radians(3.0));
+      ++checked;
+    }
+  }
+  EXPECT_EQ(checked, 30);
+}
+
+TEST(ColumnMatch, IsTheLeastOverAllTurns) {
+  const ColumnProfiles query(packed(smooth_view(5)));
+  const ColumnProfiles reference(packed(smooth_view(6)));
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t s = 0; s < 128; ++s) {
+    double sum = 0.0;
+    for (std::size_t c = 0; c < 32; ++c) {
+      int l1 = 0;
+      for (std::size_t b = 0; b < 16; ++b) {
+        l1 += std::abs(query.values()[b * 128 + 4 * c] -
+                       reference.values()[b * 128 + (4 * c + s) % 128]);
+      }
+      sum += std::sqrt(l1 / 40.0 / 16.0) / 32.0;
+    }
+    least = std::min(least, sum);
+  }
+  EXPECT_NEAR(match_columns(query, reference).difference, least, 1e-3);
+}
+
+TEST(ColumnProfiles, MaskedRowsDoNotCount) {
+  Panorama view = smooth_view(7);
+  std::vector<std::uint8_t> allowed(40, 1);
+  for (int y = 0; y < 10; ++y) allowed[static_cast<std::size_t>(y)] = 0;
+  const ColumnProfiles clean(packed(view), 0, allowed);
+  for (int y = 0; y < 10; ++y) {
+    for (int c = 0; c < view.columns(); ++c) view.at(y, c) = 0.1F * static_cast<float>(c % 7);
+  }
+  EXPECT_EQ(ColumnProfiles(packed(view), 0, allowed), clean);
+  EXPECT_NE(ColumnProfiles(packed(view)), clean);
+}
+
+TEST(ColumnProfiles, OfFewRowsCompareBrightness) {
+  for (const int rows : {1, 2, 3, 5}) {
+    const Panorama view = smooth_view(8, rows);
+    const ColumnProfiles profiles(packed(view));
+    EXPECT_EQ(profiles.used_bands(), rows);
+    const ColumnMatch same =
+        match_columns(ColumnProfiles(packed(turn_columns(view, 20))), profiles);
+    EXPECT_NEAR(angle_difference(same.heading_rad, 2.0 * std::numbers::pi * 20 / 256), 0.0, 1e-9);
+    EXPECT_LT(same.difference, difference(smooth_view(9, rows), view));
+  }
+}
+
+TEST(ColumnProfiles, OfAViewWithoutStructureAreFlat) {
+  const Panorama grey(16, 64, std::nullopt, std::vector<float>(16 * 64, 0.5F));
+  const ColumnProfiles profiles(packed(grey));
+  EXPECT_TRUE(std::ranges::all_of(profiles.values(), [](std::uint8_t v) { return v == 128; }));
+  EXPECT_EQ(match_columns(profiles, profiles).heading_rad, 0.0);
+}
+
+TEST(ColumnProfiles, RefuseBadInput) {
+  const PackedSignature signature = packed(smooth_view(1));
+  EXPECT_THROW(ColumnProfiles(signature, 16), ContractError);
+  EXPECT_THROW(ColumnProfiles(signature, -1), ContractError);
+  EXPECT_THROW(ColumnProfiles(signature, 0, std::vector<std::uint8_t>(3, 1)), ContractError);
+  EXPECT_THROW(
+      (void)match_columns(ColumnProfiles(signature), ColumnProfiles(packed(smooth_view(1, 5)))),
+      ContractError);
+}
+
+}  // namespace
+}  // namespace panonav
