@@ -46,10 +46,11 @@ ordered_json as_json(const Answer& answer, const VisualMemory& memory, bool area
   const auto& found = answer.localisation;
   auto matches = ordered_json::array();
   for (const auto& match : found.matches) {
-    const auto& compass = match.evidence.compass;
+    const auto& compass = match.compass;
     matches.push_back(
         {{"file", memory.info(match.view).name},
          {"dissimilarity", match.dissimilarity},
+         {"difference", match.difference},
          {"heading_rad", compass ? ordered_json(compass->heading_rad) : ordered_json()}});
   }
   ordered_json json{{"file", answer.file},
@@ -96,7 +97,7 @@ std::string as_text(const Answer& answer, const VisualMemory& memory, Session& s
   }
   if (found.heading_rad) {
     line += "  heading " + fixed(degrees(*found.heading_rad), 1) + " degrees";
-  } else if (const auto& compass = found.matches.front().evidence.compass) {
+  } else if (const auto& compass = found.matches.front().compass) {
     line += "  turned " + fixed(degrees(compass->heading_rad), 1) + " degrees from it";
   }
   for (const auto& level : answer.levels) {

@@ -16,15 +16,19 @@ double share_below(std::vector<double> values, double share) {
   return values.at(static_cast<std::size_t>(share * static_cast<double>(values.size() - 1)));
 }
 
+std::vector<RankedMatch> ranked_matches(const VisualMemory& memory, const PackedSignature& query) {
+  return ColumnRanking(memory).rank(
+      query, memory.search(query, {.top = PositionModel::candidates}).matches);
+}
+
 TEST(InterpolatedPosition, OfAMemorisedViewIsItsPosition) {
   const RememberedRoom place(21, {}, 0.4);
-  const PositionModel model = learn_position_model(place.memory);
+  const PositionModel model = learn_position_model(ColumnRanking(place.memory));
   ASSERT_TRUE(model.learnt);
   for (const ViewId view : place.memory.views()) {
-    const SearchResult found =
-        place.memory.search(place.memory.packed(view), {.top = PositionModel::candidates});
-    ASSERT_EQ(found.matches[0].dissimilarity, 0U);
-    const auto estimate = interpolate_position(place.memory, model, found.matches);
+    const auto found = ranked_matches(place.memory, place.memory.packed(view));
+    ASSERT_EQ(found[0].match.view, view);
+    const auto estimate = interpolate_position(ColumnRanking(place.memory), model, found);
     ASSERT_TRUE(estimate);
     EXPECT_NEAR(distance(estimate->position, place.memory.info(view).pose->position()), 0.0, 1e-6);
     ASSERT_TRUE(estimate->radius_m);
@@ -34,15 +38,14 @@ TEST(InterpolatedPosition, OfAMemorisedViewIsItsPosition) {
 
 TEST(InterpolatedPosition, WeightsSumToOneAndGiveThePosition) {
   const RememberedRoom place(22, {}, 0.4);
-  const PositionModel model = learn_position_model(place.memory);
+  const PositionModel model = learn_position_model(ColumnRanking(place.memory));
   Random random(1);
   for (int i = 0; i < 20; ++i) {
     const Pose2 pose = place.room.between(place.grid, place.step_m, random);
     const PackedSignature query =
         pack(compute_signature(place.room.see(pose)), place.memory.full_scale());
-    const auto estimate = interpolate_position(
-        place.memory, model,
-        place.memory.search(query, {.top = PositionModel::candidates}).matches);
+    const auto estimate = interpolate_position(ColumnRanking(place.memory), model,
+                                               ranked_matches(place.memory, query));
     ASSERT_TRUE(estimate);
     double sum = 0.0;
     Point2 mean;
@@ -64,18 +67,18 @@ TEST(InterpolatedPosition, BeatsTheNearestReferenceAndItsRadiusHolds95PerCent) {
   int inside = 0;
   for (std::uint64_t seed = 30; seed < 34; ++seed) {
     const RememberedRoom place(seed, {5.0, 4.0, seed % 2 == 0 ? 2 : 8, 0.12}, 0.3);
-    const PositionModel model = learn_position_model(place.memory);
+    const PositionModel model = learn_position_model(ColumnRanking(place.memory));
     Random random(seed, 3);
     for (int i = 0; i < 50; ++i) {
       const Pose2 pose = place.room.between(place.grid, place.step_m, random);
       const PackedSignature query =
           pack(compute_signature(place.room.see(pose, 16, 96, {1.0, 0.01}, random.next())),
                place.memory.full_scale());
-      const SearchResult found = place.memory.search(query, {.top = PositionModel::candidates});
-      const auto estimate = interpolate_position(place.memory, model, found.matches);
+      const auto found = ranked_matches(place.memory, query);
+      const auto estimate = interpolate_position(ColumnRanking(place.memory), model, found);
       ASSERT_TRUE(estimate && estimate->radius_m);
       nearest_errors.push_back(
-          distance(place.memory.info(found.matches[0].view).pose->position(), pose.position()));
+          distance(place.memory.info(found[0].match.view).pose->position(), pose.position()));
       errors.push_back(distance(estimate->position, pose.position()));
       inside += errors.back() <= *estimate->radius_m ? 1 : 0;
     }
@@ -96,17 +99,17 @@ TEST(PositionModel, OfFewOrUnposedViewsIsTheNearestReference) {
   }
   poses[3].reset();
   const VisualMemory memory = make_memory(views, poses);
-  const PositionModel model = learn_position_model(memory);
+  const PositionModel model = learn_position_model(ColumnRanking(memory));
   EXPECT_FALSE(model.learnt);
   const auto matches_of = [&](std::size_t i) {
-    return memory.search(memory.packed(memory.views()[i])).matches;
+    return ranked_matches(memory, memory.packed(memory.views()[i]));
   };
-  const auto estimate = interpolate_position(memory, model, matches_of(1));
+  const auto estimate = interpolate_position(ColumnRanking(memory), model, matches_of(1));
   ASSERT_TRUE(estimate);
   EXPECT_EQ(estimate->position, poses[1]->position());
   EXPECT_FALSE(estimate->radius_m);  // nothing to learn it from
-  EXPECT_FALSE(interpolate_position(memory, model, matches_of(3)));
-  EXPECT_FALSE(interpolate_position(memory, model, {}));
+  EXPECT_FALSE(interpolate_position(ColumnRanking(memory), model, matches_of(3)));
+  EXPECT_FALSE(interpolate_position(ColumnRanking(memory), model, {}));
 }
 
 TEST(PositionModel, StandsCoincidentAndEqualViews) {
@@ -120,27 +123,29 @@ TEST(PositionModel, StandsCoincidentAndEqualViews) {
     poses.push_back(ReferencePose{p.x_m, p.y_m, 0.0});
   }
   const VisualMemory memory = make_memory(views, poses);
-  const PositionModel model = learn_position_model(memory);
+  const PositionModel model = learn_position_model(ColumnRanking(memory));
   for (const ViewId view : memory.views()) {
-    const auto estimate = interpolate_position(
-        memory, model, memory.search(memory.packed(view), {.top = 24}).matches);
+    const auto estimate = interpolate_position(ColumnRanking(memory), model,
+                                               ranked_matches(memory, memory.packed(view)));
     ASSERT_TRUE(estimate);
     EXPECT_NEAR(distance(estimate->position, memory.info(view).pose->position()), 0.0, 1e-6);
   }
   // All at one place: no spacing, nothing to interpolate.
   for (auto& pose : poses) pose = ReferencePose{1.0, 1.0, 0.0};
-  EXPECT_FALSE(learn_position_model(make_memory(views, poses)).learnt);
+  const VisualMemory at_one_place = make_memory(views, poses);
+  EXPECT_FALSE(learn_position_model(ColumnRanking(at_one_place)).learnt);
 }
 
 TEST(PositionModel, IsTheSameForTheSameSeed) {
   const RememberedRoom place(25, {}, 0.4);
-  const PositionModel a = learn_position_model(place.memory, {.sampled_views = 15});
-  const PositionModel b = learn_position_model(place.memory, {.sampled_views = 15});
+  const PositionModel a = learn_position_model(ColumnRanking(place.memory), {.sampled_views = 15});
+  const PositionModel b = learn_position_model(ColumnRanking(place.memory), {.sampled_views = 15});
   EXPECT_EQ(a.sampled_views, 15);
   EXPECT_EQ(a.radius_m_per_deviation, b.radius_m_per_deviation);
   EXPECT_EQ(a.neighbourhood_m, b.neighbourhood_m);
-  EXPECT_THROW((void)learn_position_model(place.memory, {.sampled_views = 0}), OptionError);
-  EXPECT_THROW((void)learn_position_model(place.memory, {.components = 99}), ContractError);
+  EXPECT_THROW((void)learn_position_model(ColumnRanking(place.memory), {.sampled_views = 0}),
+               OptionError);
+  EXPECT_THROW((void)ColumnRanking(place.memory, 99), ContractError);
 }
 
 }  // namespace

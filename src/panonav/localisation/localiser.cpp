@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numbers>
 #include <span>
 #include <utility>
 #include <vector>
@@ -14,43 +16,54 @@ namespace panonav {
 
 namespace {
 
-// The mean of what the nearest references say, weighted by the inverse square of their phase
-// residual, which is about the inverse square of their variance. Only those near to the one with
-// the best evidence count: a compass that locked on to a wrong maximum must not pull the mean.
+constexpr std::size_t references = 4;  // the corners of a grid's square
+
+// The mean of what the nearest references say. The error of the compass grows with the distance,
+// and so does the square of the difference, so weights are its inverse fourth power. Only those
+// near to what the best match says count: a compass that locked on to a wrong maximum must not pull
+// the mean.
 std::optional<double> absolute_heading(const VisualMemory& memory,
                                        std::span<const LocalisedMatch> matches) {
-  constexpr std::size_t references = 4;  // the corners of a grid's square
   constexpr double agreement_rad = radians(15.0);
-  constexpr double least_residual = 1e-6;
-  struct Reading {
-    double heading_rad, evidence, weight;
-  };
-  std::vector<Reading> readings;
-  for (const LocalisedMatch& match : matches.first(std::min(references, matches.size()))) {
-    const auto& pose = memory.info(match.view).pose;
-    if (!pose || !pose->heading_rad || !match.evidence.compass) continue;
-    const double residual = std::max(least_residual, 1.0 - match.evidence.phase_correlation);
-    readings.push_back({*pose->heading_rad + match.evidence.compass->heading_rad,
-                        match.evidence.value, 1.0 / (residual * residual)});
-  }
-  if (readings.empty()) return std::nullopt;
-  const double centre_rad = std::ranges::max_element(readings, {}, &Reading::evidence)->heading_rad;
+  constexpr double least_difference = 1e-2;
+  std::optional<double> centre_rad;
   double sum = 0.0;
   double weights = 0.0;
-  for (const Reading& reading : readings) {
-    const double offset = angle_difference(reading.heading_rad, centre_rad);
+  for (const LocalisedMatch& match : matches.first(std::min(references, matches.size()))) {
+    const auto& pose = memory.info(match.view).pose;
+    if (!pose || !pose->heading_rad || !match.compass) continue;
+    const double heading_rad = *pose->heading_rad + match.compass->heading_rad;
+    if (!centre_rad) centre_rad = heading_rad;
+    const double offset = angle_difference(heading_rad, *centre_rad);
     if (std::abs(offset) > agreement_rad) continue;
-    sum += reading.weight * offset;
-    weights += reading.weight;
+    const double weight = std::pow(std::max(least_difference, match.difference), -4.0);
+    sum += weight * offset;
+    weights += weight;
   }
-  return wrap_angle(centre_rad + sum / weights);
+  if (!centre_rad) return std::nullopt;
+  return wrap_angle(*centre_rad + sum / weights);
 }
 
-PositionModelOptions position_options(const LocaliserOptions& options) {
+// Columns tell the turn to a step of theirs.
+constexpr double compass_window_rad = 2.0 * std::numbers::pi / ColumnProfiles::columns;
+
+ColumnRanking ranking_of(const VisualMemory& memory, const LocaliserOptions& options) {
   validate(options);
-  PositionModelOptions position;
-  position.components = options.components;
-  return position;
+  return ColumnRanking(memory, options.components, std::max(options.compared_views, 1));
+}
+
+// Which of the best references is the nearest one: a position that many references agree on says it
+// better than their differences one by one, in which noise decides between neighbours.
+void put_nearest_first(const VisualMemory& memory, Point2 position,
+                       std::vector<LocalisedMatch>& matches) {
+  const auto end =
+      matches.begin() + static_cast<std::ptrdiff_t>(std::min(references, matches.size()));
+  const auto distance_m = [&](const LocalisedMatch& match) {
+    const auto& pose = memory.info(match.view).pose;
+    return pose ? distance(pose->position(), position) : std::numeric_limits<double>::infinity();
+  };
+  const auto nearest = std::ranges::min_element(matches.begin(), end, {}, distance_m);
+  std::rotate(matches.begin(), nearest, nearest + 1);
 }
 
 }  // namespace
@@ -59,21 +72,32 @@ void visit_options(LocaliserOptions& options, OptionVisitor& visitor) {
   visitor.visit({.name = "top", .help = "matches listed", .low = 1, .high = 1e6}, options.top);
   visitor.visit({.name = "components", .help = "Fourier components compared, 0 for all", .low = 0},
                 options.components);
+  visitor.visit({.name = "compared_views",
+                 .help = "views compared column by column when the nearest ones do not explain "
+                         "the picture; 0 keeps the order of dissimilarity",
+                 .low = 0,
+                 .high = 1e6},
+                options.compared_views);
 }
 
 Localiser::Localiser(const VisualMemory& memory, const LocaliserOptions& options)
-    : Localiser(memory, learn_place_model(memory),
-                learn_position_model(memory, position_options(options)), options) {}
+    : Localiser(memory, ranking_of(memory, options), options) {}
 
-Localiser::Localiser(const VisualMemory& memory, PlaceModel place_model,
-                     PositionModel position_model, const LocaliserOptions& options)
+Localiser::Localiser(const VisualMemory& memory, ColumnRanking ranking,
+                     const LocaliserOptions& options)
     : memory_(&memory),
       options_(options),
-      place_model_(std::move(place_model)),
+      ranking_(std::move(ranking)),
+      place_model_(learn_place_model(ranking_)),
+      position_model_(learn_position_model(ranking_)) {}
+
+Localiser::Localiser(const VisualMemory& memory, const PlaceModel& place_model,
+                     const PositionModel& position_model, const LocaliserOptions& options)
+    : memory_(&memory),
+      options_(options),
+      ranking_(ranking_of(memory, options)),
+      place_model_(place_model),
       position_model_(position_model) {
-  validate(options_);
-  require(options_.components <= memory.shape().components, "components", options_.components,
-          "0 (all) or 1 .. " + to_text(memory.shape().components));
   require(position_model_.components == options_.components, "components of the position model",
           position_model_.components, to_text(options_.components) + ", as asked for");
 }
@@ -81,34 +105,47 @@ Localiser::Localiser(const VisualMemory& memory, PlaceModel place_model,
 Localisation Localiser::localise(const PackedSignature& query, const SearchMask& mask) const {
   Localisation result;
   result.components = options_.components == 0 ? memory_->shape().components : options_.components;
-  const int wanted = std::max({options_.top, place_model_.candidates, PositionModel::candidates});
-  SearchResult found =
-      memory_->search(query, {.top = wanted, .components = options_.components}, mask);
-  result.bytes_read = found.bytes_read;
-  result.bytes_in_full = found.bytes_in_full;
-  if (found.matches.empty()) return result;
+  const auto nearest = [&](int wanted) {
+    SearchResult found =
+        memory_->search(query, {.top = wanted, .components = options_.components}, mask);
+    result.bytes_read += found.bytes_read;
+    result.bytes_in_full = found.bytes_in_full;
+    result.views_compared += found.matches.size();
+    return ranking_.rank(query, found.matches, mask.allowed_rows);
+  };
+  const int first = std::max(options_.top, PositionModel::candidates);
+  std::vector<RankedMatch> ranked = nearest(first);
+  if (ranked.empty()) return result;
+  if (options_.compared_views > first &&
+      ranked.front().columns.difference > place_model_.neighbouring) {
+    ranked = nearest(options_.compared_views);
+  }
+  result.known = ranked.front().columns.difference <= place_model_.threshold;
+  if (options_.compared_views == 0) {
+    std::ranges::sort(ranked, {}, [](const RankedMatch& r) {
+      return std::pair(r.match.dissimilarity, r.match.view);
+    });
+  }
 
   const PackedSignature seen = with_rows(query, mask.allowed_rows);
-  const auto evidence_of = [&](ViewId view) {
-    return place_evidence(seen, with_rows(memory_->packed(view), mask.allowed_rows),
-                          place_model_.component_weights);
-  };
-  const int looked_at = std::max(options_.top, place_model_.candidates);
-  for (const Match& match : found.matches) {
-    if (static_cast<int>(result.matches.size()) == looked_at) break;
-    result.matches.push_back({match.view, match.dissimilarity, evidence_of(match.view)});
+  for (const RankedMatch& r : ranked) {
+    if (static_cast<int>(result.matches.size()) == options_.top) break;
+    std::optional<CompassReading> reading;
+    if (result.components >= 2) {
+      reading = compass_near(seen, with_rows(memory_->packed(r.match.view), mask.allowed_rows),
+                             r.columns.heading_rad, compass_window_rad,
+                             {.components = options_.components});
+    }
+    result.matches.push_back(
+        {r.match.view, r.match.dissimilarity, r.columns.difference, std::move(reading)});
   }
-  for (std::size_t i = 0; i < result.matches.size(); ++i) {
-    if (static_cast<int>(i) == place_model_.candidates) break;
-    result.evidence = std::max(result.evidence, result.matches[i].evidence.value);
-  }
-  result.known = result.evidence >= place_model_.threshold;
-
   if (result.known) {
-    result.position = interpolate_position(*memory_, position_model_, found.matches);
+    result.position = interpolate_position(ranking_, position_model_, ranked);
     result.heading_rad = absolute_heading(*memory_, result.matches);
+    if (result.position && options_.compared_views > 0) {
+      put_nearest_first(*memory_, result.position->position, result.matches);
+    }
   }
-  if (static_cast<int>(result.matches.size()) > options_.top) result.matches.resize(options_.top);
   return result;
 }
 

@@ -9,14 +9,11 @@
 
 #include "panonav/geometry/voronoi.hpp"
 #include "panonav/localisation/sample.hpp"
-#include "panonav/signature/dissimilarity.hpp"
 
 namespace panonav {
 
 namespace {
 
-// Beyond this number further references change positions by less than their error.
-constexpr std::size_t most_neighbours = 16;
 // What the learning chooses from: neighbourhoods in spacings of the memory, exponents of the
 // variogram. 1 is exact for signatures that move as a random walk, 2 would be for signatures that
 // change linearly with the position but leaves the solution without a unique answer.
@@ -27,34 +24,44 @@ constexpr std::array<double, 3> exponents = {1.0, 1.25, 1.5};
 constexpr double least_variance = 0.1;
 constexpr double coverage = 0.95;
 
-// Posed views in ascending order of their dissimilarity to the query.
+// Posed views, the best match first.
 struct Neighbours {
   std::vector<ViewId> views;
   std::vector<Point2> positions;
   Eigen::VectorXd to_query;
+  /// (i, j): view j asked, view i the reference. Comparing columns is not quite symmetric, and only
+  /// so is the answer to view j view j.
   Eigen::MatrixXd between;
 };
 
-Neighbours gather(const VisualMemory& memory, std::span<const Match> matches, int components) {
+// Differences are means of roots; their squares grow with the distance.
+double squared(double difference) {
+  return difference * difference;
+}
+
+Neighbours gather(const ColumnRanking& ranking, std::span<const RankedMatch> matches) {
   Neighbours n;
   std::vector<double> to_query;
-  std::vector<PackedSignature> signatures;
-  for (const Match& match : matches) {
+  std::vector<ColumnProfiles> profiles;
+  for (const RankedMatch& ranked : matches) {
     if (n.views.size() == PositionModel::candidates) break;
-    const auto& pose = memory.info(match.view).pose;
+    const ViewId view = ranked.match.view;
+    const auto& pose = ranking.memory().info(view).pose;
     if (!pose) continue;
-    n.views.push_back(match.view);
+    n.views.push_back(view);
     n.positions.push_back(pose->position());
-    to_query.push_back(match.dissimilarity);
-    signatures.push_back(memory.packed(match.view));
+    to_query.push_back(squared(ranked.columns.difference));
+    profiles.push_back(ranking.profiles(view));
   }
   const auto size = static_cast<Eigen::Index>(n.views.size());
   n.to_query = Eigen::Map<const Eigen::VectorXd>(to_query.data(), size);
   n.between = Eigen::MatrixXd::Zero(size, size);
   for (Eigen::Index i = 0; i < size; ++i) {
-    for (Eigen::Index j = 0; j < i; ++j) {
-      n.between(i, j) = n.between(j, i) =
-          dissimilarity_packed(signatures[i], signatures[j], components);
+    for (Eigen::Index j = 0; j < size; ++j) {
+      if (i == j) continue;
+      n.between(i, j) = squared(match_columns(profiles[static_cast<std::size_t>(j)],
+                                              profiles[static_cast<std::size_t>(i)])
+                                    .difference);
     }
   }
   return n;
@@ -69,7 +76,7 @@ struct Kriged {
 
 Kriged krige(const Neighbours& n, double neighbourhood_m, double exponent, double unit) {
   Kriged result;
-  for (std::size_t i = 0; i < n.views.size() && result.used.size() < most_neighbours; ++i) {
+  for (std::size_t i = 0; i < n.views.size(); ++i) {
     if (distance(n.positions[i], n.positions[0]) <= neighbourhood_m) result.used.push_back(i);
   }
   const auto size = static_cast<Eigen::Index>(result.used.size());
@@ -112,16 +119,15 @@ Kriged krige(const Neighbours& n, double neighbourhood_m, double exponent, doubl
 }  // namespace
 
 void visit_options(PositionModelOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "components", .help = "Fourier components compared, 0 for all", .low = 0},
-                options.components);
   visitor.visit({.name = "sampled_views", .help = "views used for learning", .low = 8, .high = 1e6},
                 options.sampled_views);
   visitor.visit({.name = "seed", .help = "seed of the draw", .low = 0}, options.seed);
 }
 
-PositionModel learn_position_model(const VisualMemory& memory,
+PositionModel learn_position_model(const ColumnRanking& ranking,
                                    const PositionModelOptions& options) {
   validate(options);
+  const VisualMemory& memory = ranking.memory();
   std::vector<ViewId> posed;
   std::vector<Point2> positions;
   for (const ViewId view : memory.views()) {
@@ -131,7 +137,7 @@ PositionModel learn_position_model(const VisualMemory& memory,
     }
   }
   PositionModel model;
-  model.components = options.components;
+  model.components = ranking.components();
   const double spacing_m = VoronoiCells(positions).spacing_m();
   if (posed.size() < PositionModel::least_views || spacing_m == 0.0) return model;
 
@@ -139,21 +145,23 @@ PositionModel learn_position_model(const VisualMemory& memory,
       sample_views(posed, options.sampled_views, static_cast<std::uint64_t>(options.seed));
   std::vector<Neighbours> neighbours;
   std::vector<Point2> truths;
-  std::vector<double> dissimilarities;
+  std::vector<double> differences;
   for (const ViewId view : sample) {
     const std::array excluded = {view};
     const SearchResult found = memory.search(
-        memory.packed(view), {.top = PositionModel::candidates, .components = options.components},
+        memory.packed(view), {.top = PositionModel::candidates, .components = ranking.components()},
         {.excluded_views = excluded, .allowed_rows = {}});
+    const std::vector<RankedMatch> ranked = ranking.rank(memory.packed(view), found.matches);
     // As in an answer, the nearest view must have a pose.
-    if (found.matches.empty() || !memory.info(found.matches[0].view).pose) continue;
-    neighbours.push_back(gather(memory, found.matches, options.components));
+    if (ranked.empty() || !memory.info(ranked[0].match.view).pose) continue;
+    neighbours.push_back(gather(ranking, ranked));
     truths.push_back(memory.info(view).pose->position());
-    dissimilarities.push_back(neighbours.back().to_query(0));
+    differences.push_back(neighbours.back().to_query(0));
   }
   if (neighbours.size() < PositionModel::least_views) return model;
   model.sampled_views = static_cast<int>(neighbours.size());
-  model.dissimilarity_unit = std::max(1.0, quantile(dissimilarities, 0.5));
+  constexpr double least_unit = 1e-4;  // for memories of equal views
+  model.difference_unit = std::max(least_unit, quantile(differences, 0.5));
 
   // Views whose nearest match only looks alike say nothing on how to interpolate; a wide
   // neighbourhood would then win because the middle of many wrong places is wrong by less.
@@ -170,7 +178,7 @@ PositionModel learn_position_model(const VisualMemory& memory,
       double sum_m = 0.0;
       for (std::size_t i = 0; i < neighbours.size(); ++i) {
         const Kriged kriged =
-            krige(neighbours[i], spacings * spacing_m, exponent, model.dissimilarity_unit);
+            krige(neighbours[i], spacings * spacing_m, exponent, model.difference_unit);
         errors.push_back(distance(kriged.position, truths[i]));
         variances.push_back(kriged.variance);
         if (is_near(i)) sum_m += errors.back();
@@ -200,21 +208,21 @@ PositionModel learn_position_model(const VisualMemory& memory,
   return model;
 }
 
-std::optional<PositionEstimate> interpolate_position(const VisualMemory& memory,
+std::optional<PositionEstimate> interpolate_position(const ColumnRanking& ranking,
                                                      const PositionModel& model,
-                                                     std::span<const Match> matches) {
+                                                     std::span<const RankedMatch> matches) {
   if (matches.empty()) return std::nullopt;
-  const auto& nearest = memory.info(matches[0].view).pose;
+  const auto& nearest = ranking.memory().info(matches[0].match.view).pose;
   if (!nearest) return std::nullopt;
   PositionEstimate estimate;
   if (!model.learnt) {
     estimate.position = nearest->position();
-    estimate.shares = {{matches[0].view, 1.0}};
+    estimate.shares = {{matches[0].match.view, 1.0}};
     return estimate;
   }
-  const Neighbours neighbours = gather(memory, matches, model.components);
+  const Neighbours neighbours = gather(ranking, matches);
   const Kriged kriged =
-      krige(neighbours, model.neighbourhood_m, model.exponent, model.dissimilarity_unit);
+      krige(neighbours, model.neighbourhood_m, model.exponent, model.difference_unit);
   estimate.position = kriged.position;
   estimate.radius_m = model.radius_m_per_deviation *
                       std::sqrt(kriged.variance + least_variance * model.variance_unit);

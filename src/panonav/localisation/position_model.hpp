@@ -5,34 +5,34 @@
 #include <vector>
 
 #include "panonav/core/options.hpp"
+#include "panonav/localisation/column_ranking.hpp"
 #include "panonav/memory/visual_memory.hpp"
 
 namespace panonav {
 
 struct PositionModelOptions {
-  int components = 0;       ///< over which the matches will be compared; 0 takes all
   int sampled_views = 200;  ///< of larger memories only so many views are used for learning
   int seed = 1;             ///< of the draw
 };
 void visit_options(PositionModelOptions& options, OptionVisitor& visitor);
 
-/// How positions follow from dissimilarities in one memory; learnt from its posed views by leaving
-/// one out. Plain numbers, so that it can be kept beside the memory.
+/// How positions follow from differences of views in one memory; learnt from its posed views by
+/// leaving one out. Plain numbers, so that it can be kept beside the memory.
 struct PositionModel {
   /// Fewest posed views to learn from.
   static constexpr int least_views = 8;
-  /// Nearest views that may take part in an interpolation, before the far ones among them are left
-  /// out.
-  static constexpr int candidates = 24;
+  /// Best matches that may take part in an interpolation, before those far from the best one are
+  /// left out. Further references change positions by less than their error.
+  static constexpr int candidates = 16;
 
   bool learnt = false;  ///< false: fewer than `least_views` posed views; the nearest view's
                         ///< position is the answer
-  int components = 0;   ///< over which its matches must be compared; 0: all
+  int components = 0;   ///< over which views were compared; 0: all
   int sampled_views = 0;
   double neighbourhood_m = 0.0;  ///< references farther than this from the nearest one take no part
   double exponent =
-      1.5;  ///< of the variogram: half the mean square distance ~ dissimilarity^exponent
-  double dissimilarity_unit = 1.0;
+      1.5;  ///< of the variogram: half the mean square distance ~ difference^(2 exponent)
+  double difference_unit = 1.0;         ///< median squared difference to the nearest view
   double variance_unit = 0.0;           ///< median kriging variance
   double radius_m_per_deviation = 0.0;  ///< radius that holds 95 % over the kriging deviation
   double median_error_m = 0.0;          ///< of the views left out
@@ -42,9 +42,9 @@ struct PositionModel {
 /// Learns the neighbourhood and the exponent that place the views of the memory best when each is
 /// left out in turn, and then how large a radius holds 95 % of those errors. Views left out are
 /// farther from the other references than queries between the references are, so the radius rather
-/// holds too many than too few. Throws OptionError, ContractError on more components than the
-/// memory's. Cost: `sampled_views` searches and about 0.3 ms for each.
-[[nodiscard]] PositionModel learn_position_model(const VisualMemory& memory,
+/// holds too many than too few. Throws OptionError. Cost: `sampled_views` searches
+/// and about 1 ms for each.
+[[nodiscard]] PositionModel learn_position_model(const ColumnRanking& ranking,
                                                  const PositionModelOptions& options = {});
 
 /// A reference view's part in an interpolated position.
@@ -61,17 +61,18 @@ struct PositionEstimate {
   std::vector<PositionShare> shares;  ///< nearest first
 };
 
-/// Ordinary kriging in the space of the signatures: the position is the weighted mean of the
+/// Ordinary kriging in the space of the views: the position is the weighted mean of the
 /// neighbouring references' positions whose expected squared error is smallest, when half the mean
-/// square distance between two views grows as dissimilarity^exponent. It accounts for references
-/// that tell the same twice, and at a memorised view it gives that view's position. [M04
-/// section 2.2: dissimilarity grows linearly with distance at short range.]
+/// square distance between two places grows as the square of their views' difference
+/// (`ColumnMatch`) to the power of the exponent. It accounts for references that tell the same
+/// twice, and at a memorised view it gives that view's position. [M04 section 2.2: dissimilarity
+/// grows linearly with distance at short range; so does the squared difference.]
 ///
-/// `matches` ascend in dissimilarity over `model.components` components; views without a pose and
-/// views far from the nearest one, which only look alike, take no part. Empty when the nearest view
-/// has no pose. Cost: pairwise dissimilarities and a dense solution of at most 17 unknowns.
-[[nodiscard]] std::optional<PositionEstimate> interpolate_position(const VisualMemory& memory,
-                                                                   const PositionModel& model,
-                                                                   std::span<const Match> matches);
+/// `matches`: the best first, over as many components as the model was learnt over; views without a
+/// pose and views far from the best one, which only look alike, take no part. Empty when the best
+/// view has no pose. Cost: 240 comparisons of columns and a dense solution of at most 17 unknowns,
+/// 0.7 ms.
+[[nodiscard]] std::optional<PositionEstimate> interpolate_position(
+    const ColumnRanking& ranking, const PositionModel& model, std::span<const RankedMatch> matches);
 
 }  // namespace panonav

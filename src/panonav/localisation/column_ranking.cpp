@@ -1,0 +1,49 @@
+#include "panonav/localisation/column_ranking.hpp"
+
+#include <algorithm>
+#include <tuple>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav {
+
+ColumnRanking::ColumnRanking(const VisualMemory& memory, int components, int most_kept)
+    : memory_(&memory), components_(components) {
+  require(components >= 0 && components <= memory.shape().components, "components", components,
+          "0 (all) or 1 .. " + to_text(memory.shape().components));
+  if (memory.size() > static_cast<std::size_t>(most_kept)) return;
+  kept_views_.assign(memory.views().begin(), memory.views().end());
+  kept_.reserve(kept_views_.size());
+  for (const ViewId view : kept_views_) kept_.emplace_back(memory.packed(view), components);
+}
+
+ColumnProfiles ColumnRanking::profiles(ViewId view) const {
+  const auto at = std::ranges::lower_bound(kept_views_, view);
+  if (at != kept_views_.end() && *at == view) {
+    return kept_[static_cast<std::size_t>(at - kept_views_.begin())];
+  }
+  return ColumnProfiles(memory_->packed(view), components_);
+}
+
+std::vector<RankedMatch> ColumnRanking::rank(const PackedSignature& query,
+                                             std::span<const Match> matches,
+                                             std::span<const std::uint8_t> allowed_rows) const {
+  const ColumnProfiles asked(query, components_, allowed_rows);
+  std::vector<RankedMatch> ranked;
+  ranked.reserve(matches.size());
+  for (const Match& match : matches) {
+    const auto at = std::ranges::lower_bound(kept_views_, match.view);
+    const bool kept = allowed_rows.empty() && at != kept_views_.end() && *at == match.view;
+    ranked.push_back(
+        {match,
+         kept ? match_columns(asked, kept_[static_cast<std::size_t>(at - kept_views_.begin())])
+              : match_columns(asked, ColumnProfiles(memory_->packed(match.view), components_,
+                                                    allowed_rows))});
+  }
+  std::ranges::sort(ranked, {}, [](const RankedMatch& r) {
+    return std::tuple(r.columns.difference, r.match.dissimilarity, r.match.view);
+  });
+  return ranked;
+}
+
+}  // namespace panonav
