@@ -76,9 +76,10 @@ TEST_F(Localise, JsonLinesHaveExactlyTheDocumentedFields) {
     EXPECT_EQ(answer["turned_rad"].get<double>(), 0.0);
     ASSERT_FALSE(answer["matches"].empty());
     for (const auto& match : answer["matches"]) {
-      EXPECT_EQ(match.size(), 3U);
+      EXPECT_EQ(match.size(), 4U);
       EXPECT_TRUE(match.at("file").is_string());
       EXPECT_TRUE(match.at("dissimilarity").is_number());
+      EXPECT_TRUE(match.at("difference").is_number());
       EXPECT_TRUE(match.at("heading_rad").is_number() || match.at("heading_rad").is_null());
     }
     if (!answer["position"].is_null()) {

@@ -108,9 +108,7 @@ TEST(RealData, SussexRouteEvenImagesRememberedOddOnesAsked) {
     return values[values.size() * percent / 100];
   };
   EXPECT_LE(quantile(nearest_m, 50), 0.03);
-  // The target is 0.09 m; two views of 227 too many lie beyond it (docs/results.md). This bound
-  // only keeps it from getting worse.
-  EXPECT_LE(quantile(nearest_m, 95), 0.10);
+  EXPECT_LE(quantile(nearest_m, 95), 0.09);
   EXPECT_LT(quantile(interpolated_m, 50), quantile(nearest_m, 50));
   EXPECT_LE(quantile(interpolated_m, 95), 0.09);
 }

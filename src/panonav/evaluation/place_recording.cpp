@@ -1,6 +1,7 @@
 #include "panonav/evaluation/place_recording.hpp"
 
 #include <optional>
+#include <utility>
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
@@ -56,10 +57,14 @@ std::vector<PlacedView> retake_queries(const PlaceRecording& place, const Sensor
 }
 
 PlaceRecording record_place(const PlaceRecordingOptions& options, Executor& executor) {
+  return record_place(make_scene(options.scene, {.seed = options.seed}), options, executor);
+}
+
+PlaceRecording record_place(Scene scene, const PlaceRecordingOptions& options, Executor& executor) {
   require(options.queries >= 1, "queries", options.queries, ">= 1");
   PlaceRecording place;
   place.seed = options.seed;
-  place.scene = make_scene(options.scene, {.seed = options.seed});
+  place.scene = std::move(scene);
   place.spacing_m = options.spacing_m;
   place.free_space =
       std::make_shared<const FreeSpace>(place.scene, free_space_options(place.scene));

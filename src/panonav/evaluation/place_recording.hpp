@@ -48,6 +48,10 @@ struct PlaceRecordingOptions {
 
 /// References with heading 0, queries at random headings, both with the sensor's noise.
 [[nodiscard]] PlaceRecording record_place(const PlaceRecordingOptions& options, Executor& executor);
+/// The same in a scene that the caller made or read; `options.scene` does not count. Throws
+/// ContractError when no place is free at this spacing.
+[[nodiscard]] PlaceRecording record_place(Scene scene, const PlaceRecordingOptions& options,
+                                          Executor& executor);
 
 /// One picture more in that place, at its camera height. The same pose, seed and sensor give the
 /// same bits; views may be taken from several threads.

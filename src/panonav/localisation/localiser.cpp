@@ -47,9 +47,11 @@ std::optional<double> absolute_heading(const VisualMemory& memory,
 // Columns tell the turn to a step of theirs.
 constexpr double compass_window_rad = 2.0 * std::numbers::pi / ColumnProfiles::columns;
 
-ColumnRanking ranking_of(const VisualMemory& memory, const LocaliserOptions& options) {
+std::shared_ptr<const ColumnRanking> ranking_of(const VisualMemory& memory,
+                                                const LocaliserOptions& options) {
   validate(options);
-  return ColumnRanking(memory, options.components, std::max(options.compared_views, 1));
+  return std::make_shared<const ColumnRanking>(memory, options.components,
+                                               std::max(options.compared_views, 1));
 }
 
 // Which of the best references is the nearest one: a position that many references agree on says it
@@ -83,19 +85,21 @@ void visit_options(LocaliserOptions& options, OptionVisitor& visitor) {
 Localiser::Localiser(const VisualMemory& memory, const LocaliserOptions& options)
     : Localiser(memory, ranking_of(memory, options), options) {}
 
-Localiser::Localiser(const VisualMemory& memory, ColumnRanking ranking,
+Localiser::Localiser(const VisualMemory& memory, std::shared_ptr<const ColumnRanking> ranking,
                      const LocaliserOptions& options)
     : memory_(&memory),
       options_(options),
       ranking_(std::move(ranking)),
-      place_model_(learn_place_model(ranking_)),
-      position_model_(learn_position_model(ranking_)) {}
+      support_(*ranking_),
+      place_model_(learn_place_model(*ranking_)),
+      position_model_(learn_position_model(*ranking_)) {}
 
 Localiser::Localiser(const VisualMemory& memory, const PlaceModel& place_model,
                      const PositionModel& position_model, const LocaliserOptions& options)
     : memory_(&memory),
       options_(options),
       ranking_(ranking_of(memory, options)),
+      support_(*ranking_),
       place_model_(place_model),
       position_model_(position_model) {
   require(position_model_.components == options_.components, "components of the position model",
@@ -111,7 +115,7 @@ Localisation Localiser::localise(const PackedSignature& query, const SearchMask&
     result.bytes_read += found.bytes_read;
     result.bytes_in_full = found.bytes_in_full;
     result.views_compared += found.matches.size();
-    return ranking_.rank(query, found.matches, mask.allowed_rows);
+    return ranking_->rank(query, found.matches, mask.allowed_rows);
   };
   const int first = std::max(options_.top, PositionModel::candidates);
   std::vector<RankedMatch> ranked = nearest(first);
@@ -121,6 +125,10 @@ Localisation Localiser::localise(const PackedSignature& query, const SearchMask&
     ranked = nearest(options_.compared_views);
   }
   result.known = ranked.front().columns.difference <= place_model_.threshold;
+  // Profiles of the references are kept over all rows.
+  if (options_.compared_views > 0 && mask.allowed_rows.empty()) {
+    support_.put_best_supported_first(ColumnProfiles(query, options_.components), ranked);
+  }
   if (options_.compared_views == 0) {
     std::ranges::sort(ranked, {}, [](const RankedMatch& r) {
       return std::pair(r.match.dissimilarity, r.match.view);
@@ -140,7 +148,7 @@ Localisation Localiser::localise(const PackedSignature& query, const SearchMask&
         {r.match.view, r.match.dissimilarity, r.columns.difference, std::move(reading)});
   }
   if (result.known) {
-    result.position = interpolate_position(ranking_, position_model_, ranked);
+    result.position = interpolate_position(*ranking_, position_model_, ranked);
     result.heading_rad = absolute_heading(*memory_, result.matches);
     if (result.position && options_.compared_views > 0) {
       put_nearest_first(*memory_, result.position->position, result.matches);

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "panonav/core/options.hpp"
 #include "panonav/localisation/column_ranking.hpp"
+#include "panonav/localisation/neighbour_support.hpp"
 #include "panonav/localisation/place_model.hpp"
 #include "panonav/localisation/position_model.hpp"
 #include "panonav/memory/visual_memory.hpp"
@@ -26,8 +28,9 @@ struct LocalisedMatch {
 struct Localisation {
   /// False: this is no place of the memory (`PlaceModel`). The matches are listed all the same.
   bool known = false;
-  /// Ascending (difference, dissimilarity, view); of the first four the one nearest to `position`
-  /// is put first.
+  /// Those of the chosen place and its neighbours first, then all others, each ascending
+  /// (difference, dissimilarity, view); of the first four the one nearest to `position` is put
+  /// first.
   std::vector<LocalisedMatch> matches;
   /// Interpolated between references; empty when the place is unknown or the nearest view has no
   /// pose.
@@ -70,7 +73,8 @@ class Localiser {
   /// Topological localisation. The exact search finds the views of least dissimilarity; comparing
   /// columns puts them in order. When the best of them differs more than neighbouring views of the
   /// memory do, a part of the view may be hidden, which the dissimilarity cannot know: then up to
-  /// `compared_views` views are compared. By the visual compass, near the turn at which the columns
+  /// `compared_views` views are compared. Between places that look alike the references around each
+  /// decide (`NeighbourSupport`). By the visual compass, near the turn at which the columns
   /// fit, follows the heading relative to each match; then whether the place is known, the position
   /// between the references [M04 footnote 1] and the absolute heading: the weighted mean over the
   /// four nearest references, so that the opposite parallaxes of references on opposite sides
@@ -80,11 +84,13 @@ class Localiser {
                                       const SearchMask& mask = {}) const;
 
  private:
-  Localiser(const VisualMemory& memory, ColumnRanking ranking, const LocaliserOptions& options);
+  Localiser(const VisualMemory& memory, std::shared_ptr<const ColumnRanking> ranking,
+            const LocaliserOptions& options);
 
   const VisualMemory* memory_;
   LocaliserOptions options_;
-  ColumnRanking ranking_;
+  std::shared_ptr<const ColumnRanking> ranking_;  ///< shared by copies; `support_` looks at it
+  NeighbourSupport support_;
   PlaceModel place_model_;
   PositionModel position_model_;
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
 
 #include "panonav/core/error.hpp"
@@ -116,6 +117,14 @@ void free_view_of_mean(Rebuilt& view, std::size_t used) {
   }
 }
 
+constexpr int query_columns = ColumnProfiles::compared_columns;
+static_assert(query_columns == kernels::matched_query_columns);
+
+void check_bands(const ColumnProfiles& query, const ColumnProfiles& reference) {
+  require(query.used_bands() == reference.used_bands(), "bands of the query", query.used_bands(),
+          to_text(reference.used_bands()) + ", as of the reference");
+}
+
 }  // namespace
 
 ColumnProfiles::ColumnProfiles(const PackedSignature& signature, int components,
@@ -161,9 +170,7 @@ ColumnProfiles::ColumnProfiles(const PackedSignature& signature, int components,
 }
 
 ColumnMatch match_columns(const ColumnProfiles& query, const ColumnProfiles& reference) {
-  require(query.used_bands() == reference.used_bands(), "bands of the query", query.used_bands(),
-          to_text(reference.used_bands()) + ", as of the reference");
-  constexpr int query_columns = kernels::matched_query_columns;
+  check_bands(query, reference);
   std::array<std::uint8_t, query_columns * bands> asked{};
   for (std::size_t c = 0; c < query_columns; ++c) {
     for (std::size_t b = 0; b < bands; ++b) {
@@ -178,6 +185,33 @@ ColumnMatch match_columns(const ColumnProfiles& query, const ColumnProfiles& ref
       16.0 * query_columns * std::sqrt(static_cast<double>(unit) * std::max(1, query.used_bands()));
   return {static_cast<double>(costs[static_cast<std::size_t>(best)]) / whole,
           wrap_angle(2.0 * std::numbers::pi * static_cast<double>(best) / columns)};
+}
+
+std::array<double, ColumnProfiles::compared_columns> column_distances_near(
+    const ColumnProfiles& query, const ColumnProfiles& reference, double heading_rad) {
+  check_bands(query, reference);
+  const auto nearest =
+      static_cast<int>(std::lround(wrap_angle(heading_rad) * columns / (2.0 * std::numbers::pi)));
+  std::array<int, query_columns> least{};
+  for (int turn = nearest - 1; turn <= nearest + 1; ++turn) {
+    const auto shift = static_cast<std::size_t>((turn + 2 * columns) % columns);
+    std::array<int, query_columns> sums{};
+    for (std::size_t b = 0; b < bands; ++b) {
+      const std::uint8_t* const mine = query.values().data() + b * columns;
+      const std::uint8_t* const theirs = reference.values().data() + b * columns;
+      for (std::size_t c = 0; c < query_columns; ++c) {
+        const std::size_t at = c * (columns / query_columns);
+        sums[c] += std::abs(mine[at] - theirs[(at + shift) % columns]);
+      }
+    }
+    for (std::size_t c = 0; c < query_columns; ++c) {
+      least[c] = turn == nearest - 1 ? sums[c] : std::min(least[c], sums[c]);
+    }
+  }
+  std::array<double, query_columns> distances{};
+  const double whole = static_cast<double>(unit) * std::max(1, query.used_bands());
+  for (std::size_t c = 0; c < query_columns; ++c) distances[c] = least[c] / whole;
+  return distances;
 }
 
 }  // namespace panonav

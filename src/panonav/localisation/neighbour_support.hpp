@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "panonav/localisation/column_ranking.hpp"
+
+namespace panonav {
+
+/// Decides between places that look alike. A view taken between references is explained by several
+/// of them together: what the nearest one shows from too far to the left, another shows from too
+/// far to the right. At a place that only looks alike no neighbour explains what the best match
+/// does not. Needs references with headings; others take part in nothing here.
+class NeighbourSupport {
+ public:
+  /// Neighbours are the 8 nearest references within 1.5 spacings of the memory. The ranking must
+  /// outlive *this.
+  explicit NeighbourSupport(const ColumnRanking& ranking);
+
+  /// Ascending by distance; empty for a view without a position or heading.
+  [[nodiscard]] std::vector<ViewId> neighbours(ViewId view) const;
+
+  /// How much the query and the place of `match` differ, as `ColumnMatch::difference`: of the place
+  /// and its neighbours, all in the heading that `match` tells, the four that fit best are taken,
+  /// and in each column the mean of the two that fit best there. Empty for a view without a
+  /// position or heading. Both over all rows.
+  [[nodiscard]] std::optional<double> supported_difference(const ColumnProfiles& query,
+                                                           const RankedMatch& match) const;
+
+  /// Puts the match with the least supported difference and its neighbours first, each group in
+  /// the order that it was in. Only matches whose difference is within a quarter of the first one's
+  /// are looked at, 30 at most. `ranked` stays as it is when no match has neighbours.
+  void put_best_supported_first(const ColumnProfiles& query,
+                                std::vector<RankedMatch>& ranked) const;
+
+ private:
+  struct Site {
+    std::int64_t cell_x, cell_y;
+    ViewId view;
+  };
+  [[nodiscard]] const ReferencePose* placed(ViewId view) const;
+  [[nodiscard]] std::pair<std::int64_t, std::int64_t> cell_of(Point2 position) const;
+
+  const ColumnRanking* ranking_;
+  double radius_m_ = 0.0;
+  std::vector<Site> sites_;  ///< ascending by cell, then view
+};
+
+}  // namespace panonav
