@@ -71,8 +71,13 @@ TEST(PlaceModel, DoesNotNeedPoses) {
   const RememberedRoom place(12, {}, 0.4);
   VisualMemory without = place.memory;
   for (const ViewId view : without.views()) without.set_pose(view, std::nullopt);
-  EXPECT_EQ(learn_place_model(ColumnRanking(without)).threshold,
-            learn_place_model(ColumnRanking(place.memory)).threshold);
+  const PlaceModel blind = learn_place_model(ColumnRanking(without));
+  const PlaceModel posed = learn_place_model(ColumnRanking(place.memory));
+  EXPECT_TRUE(blind.learnt && posed.learnt && posed.beside);
+  EXPECT_FALSE(blind.beside);
+  EXPECT_EQ(blind.mirrored, posed.mirrored);
+  // Positions can only make it stricter.
+  EXPECT_GE(blind.threshold, posed.threshold);
 }
 
 // Rooms of several kinds, each remembered on a 25 cm grid, each asked for views between its own

@@ -17,6 +17,24 @@ PackedSignature mirrored(PackedSignature signature) {
   return signature;
 }
 
+// Among views that were taken elsewhere: a robot that stands still takes the same view again.
+std::optional<ViewId> nearest_in_space(const VisualMemory& memory, ViewId view) {
+  const auto& pose = memory.info(view).pose;
+  if (!pose) return std::nullopt;
+  std::optional<ViewId> nearest;
+  double nearest_m = std::numeric_limits<double>::infinity();
+  for (const ViewId other : memory.views()) {
+    const auto& there = memory.info(other).pose;
+    if (!there) continue;
+    const double distance_m = distance(there->position(), pose->position());
+    if (distance_m > 0.0 && distance_m < nearest_m) {
+      nearest_m = distance_m;
+      nearest = other;
+    }
+  }
+  return nearest;
+}
+
 }  // namespace
 
 void visit_options(PlaceModelOptions& options, OptionVisitor& visitor) {
@@ -51,6 +69,7 @@ PlaceModel learn_place_model(const ColumnRanking& ranking, const PlaceModelOptio
   std::vector<double> between;
   std::vector<double> nearest;
   std::vector<double> nearest_of_mirrored;
+  std::vector<double> beside;
   for (const ViewId view : sample) {
     const ColumnProfiles own = ranking.profiles(view);
     const ColumnProfiles reversed(mirrored(memory.packed(view)), ranking.components());
@@ -64,14 +83,21 @@ PlaceModel learn_place_model(const ColumnRanking& ranking, const PlaceModelOptio
       best = std::min(best, between.back());
     }
     nearest.push_back(best);
+    if (const auto neighbour = nearest_in_space(memory, view)) {
+      beside.push_back(match_columns(own, ranking.profiles(*neighbour)).difference);
+    }
     nearest_of_mirrored.push_back(best_of_mirrored);
   }
   model.neighbouring = quantile(nearest, 0.5);
   model.arbitrary = quantile(between, 0.5);
   model.mirrored = quantile(nearest_of_mirrored, 0.5);
-  model.threshold = std::max(
-      0.5 * (model.neighbouring + model.mirrored),
-      std::min(PlaceModel::related_share * model.arbitrary, PlaceModel::unrelated_difference));
+  double least =
+      std::min(PlaceModel::related_share * model.arbitrary, PlaceModel::unrelated_difference);
+  if (beside.size() >= static_cast<std::size_t>(PlaceModel::least_views)) {
+    model.beside = quantile(beside, 0.9);
+    least = std::min(least, *model.beside);
+  }
+  model.threshold = std::max(0.5 * (model.neighbouring + model.mirrored), least);
   model.learnt = true;
   return model;
 }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "panonav/core/options.hpp"
 #include "panonav/localisation/column_ranking.hpp"
 
@@ -31,12 +33,15 @@ struct PlaceModel {
   double threshold = unlearnt_threshold;
   bool learnt = false;  ///< false: fewer than `least_views` views
   int sampled_views = 0;
-  double neighbouring = 0.0;  ///< median difference of a view to the nearest of all others
+  double neighbouring = 0.0;  ///< median difference of a view to the one most alike of all others
   double arbitrary = 0.0;     ///< median difference between two views
-  double mirrored = 0.0;      ///< median difference of a mirrored view to the nearest of all views
+  double mirrored = 0.0;      ///< median difference of a mirrored view to the one most alike
+  /// Nine of ten views differ by no more from the one taken nearest to them; empty where fewer than
+  /// `least_views` of the sampled views have a position.
+  std::optional<double> beside;
 };
 
-/// Learns the criterion from the memory itself; no pose, no other scene and no label is needed.
+/// Learns the criterion from the memory itself; no other scene and no label is needed.
 ///
 /// A view mirrored left to right shows a place that does not exist, with all the brightness, edges
 /// and textures of this memory: what its best match reaches by chance, a place elsewhere reaches
@@ -45,7 +50,7 @@ struct PlaceModel {
 /// a mirrored one does (medians). In a place that is its own mirror image, a corridor, mirrored
 /// views do find their match, and this says nothing; therefore the threshold is at least
 /// `related_share` of the median difference between arbitrary views, as far as that stays below
-/// `unrelated_difference`.
+/// `unrelated_difference` and, where positions are known, below `beside`.
 ///
 /// Throws OptionError. Cost: two comparisons of columns for each pair of a sampled and a compared
 /// view: 0.2 s for the defaults and a memory of 1000 views.
