@@ -16,7 +16,26 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Scene load_scene(const std::string& name, const SimulationOptions& options) {
+using Given = std::function<bool(const std::string& section, const std::string& name)>;
+
+/// What stands in a scene of a file is as the file says: options that vary built-in scenes would be
+/// ignored.
+void refuse_variations_of_file(const std::string& file, const Given& given) {
+  struct Variation {
+    const char* name;
+    const char* flag;
+  };
+  for (const auto& [name, flag] :
+       {Variation{"scene_seed", "--scene-seed"}, Variation{"moved_objects", "--moved-objects"},
+        Variation{"moved_seed", "--moved-seed"}}) {
+    if (given("simulation", name)) {
+      throw UsageError(std::string(flag) + " varies built-in scenes only; '" + file +
+                       "' is a file, leave it out");
+    }
+  }
+}
+
+Scene load_scene(const std::string& name, const SimulationOptions& options, const Given& given) {
   const auto names = scene_names();
   if (std::find(names.begin(), names.end(), name) != names.end()) {
     return make_scene(name, {.seed = static_cast<std::uint64_t>(options.scene_seed),
@@ -30,6 +49,7 @@ Scene load_scene(const std::string& name, const SimulationOptions& options) {
     for (const auto known : names) all += (all.empty() ? "" : ", ") + std::string(known);
     throw UsageError("'" + name + "' is neither a file nor a built-in scene; allowed: " + all);
   }
+  refuse_variations_of_file(name, given);
   Scene scene;
   std::string ending = fs::path(name).extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(),
@@ -79,8 +99,9 @@ void visit_options(SimulationOptions& options, OptionVisitor& visitor) {
       options.elevation_high_deg);
   visitor.visit({.name = "seed", .help = "of poses, noise, tilt and odometry", .low = 0},
                 options.seed);
-  visitor.visit({.name = "scene_seed", .help = "varies textures and furniture", .low = 0},
-                options.scene_seed);
+  visitor.visit(
+      {.name = "scene_seed", .help = "varies textures and furniture of built-in scenes", .low = 0},
+      options.scene_seed);
   visitor.visit({.name = "moved_objects",
                  .help = "share of the movable objects that stand elsewhere",
                  .low = 0,
@@ -108,7 +129,7 @@ void declare_simulation(Arguments& arguments, SimulationArguments& wanted) {
 SimulatedWorld::SimulatedWorld(
     const std::string& scene, SimulationArguments wanted,
     const std::function<bool(const std::string&, const std::string&)>& given, Executor& executor)
-    : wanted_(wanted), scene_(load_scene(scene, wanted.simulation)) {
+    : wanted_(wanted), scene_(load_scene(scene, wanted.simulation, given)) {
   const auto& simulation = wanted_.simulation;
   if (simulation.elevation_low_deg >= simulation.elevation_high_deg) {
     throw OptionError("elevation_low_deg is " + to_text(simulation.elevation_low_deg) +

@@ -46,7 +46,9 @@ void declare_simulation(Arguments& arguments, SimulationArguments& wanted);
 class SimulatedWorld {
  public:
   /// `scene`: name of a built-in scene, or a Gazebo world or mesh file. `given`: says whether the
-  /// user chose a member of a section. Throws UsageError on a name that is neither.
+  /// user chose a member of a section. Throws UsageError on a name that is neither, and when the
+  /// user chose what only varies built-in scenes (scene_seed, moved_objects, moved_seed) for a
+  /// file.
   SimulatedWorld(const std::string& scene, SimulationArguments wanted,
                  const std::function<bool(const std::string&, const std::string&)>& given,
                  Executor& executor);

@@ -62,6 +62,25 @@ TEST(Simulate, WritesADataSetThatSaysWhereEachViewWasTaken) {
   EXPECT_NE(bytes_of(dataset.entries[0].path), bytes_of(dataset.entries[1].path));
 }
 
+TEST(Simulate, ArenaOnAGridNeedsNoFurtherFlags) {
+  const TemporaryFolder folder;
+  const auto out = folder / "run";
+  const auto result = run_panonav({"simulate", "arena", out, "--grid", "0.2"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Dataset dataset = read_dataset(out);
+  ASSERT_GE(dataset.entries.size(), 8U);
+  EXPECT_EQ(dataset.source.kind, PictureKind::mirror);
+  std::set<double> columns;
+  for (const auto& entry : dataset.entries) {
+    EXPECT_TRUE(fs::is_regular_file(entry.path)) << entry.path;
+    ASSERT_TRUE(entry.pose);
+    const double steps = (entry.pose->x_m - dataset.entries.front().pose->x_m) / 0.2;
+    EXPECT_NEAR(steps, std::round(steps), 1e-9);
+    columns.insert(std::round(steps));
+  }
+  EXPECT_GE(columns.size(), 3U);
+}
+
 TEST(Simulate, SameSeedSamePicturesOtherSeedOthers) {
   const TemporaryFolder folder;
   const auto run = [&](const std::string& name, const std::string& seed) {
@@ -126,6 +145,32 @@ TEST(Simulate, BrokenFilesAreNamed) {
   EXPECT_NE(line.find("way.csv"), std::string::npos) << line;
   EXPECT_NE(line.find("y_m"), std::string::npos) << line;
   EXPECT_FALSE(fs::exists(out));
+}
+
+TEST(Simulate, WhatVariesBuiltInScenesIsRefusedForAFile) {
+  const TemporaryFolder folder;
+  const auto out = folder / "run";
+  const auto mesh = folder / "room.obj";
+  // A floor of 4 m x 4 m.
+  std::ofstream(mesh) << "v -2 -2 0\nv 2 -2 0\nv 2 2 0\nv -2 2 0\nf 1 2 3 4\n";
+  const auto world = folder / "room.world";
+  std::ofstream(world) << "<sdf version='1.6'><world name='room'/></sdf>\n";
+  for (const auto& file : {mesh, world}) {
+    for (const std::string flag : {"--scene-seed", "--moved-objects", "--moved-seed"}) {
+      const auto line = refusal({"simulate", file, out, "--random", "1", flag, "1"});
+      EXPECT_NE(line.find(flag), std::string::npos) << line;
+      EXPECT_NE(line.find(file), std::string::npos) << line;
+      EXPECT_NE(line.find("built-in"), std::string::npos) << line;
+    }
+  }
+  std::ofstream(folder.path() / "run.toml") << "[simulation]\nscene_seed = 2\n";
+  const auto line =
+      refusal({"simulate", mesh, out, "--random", "1", "--config", folder / "run.toml"});
+  EXPECT_NE(line.find("--scene-seed"), std::string::npos) << line;
+  EXPECT_FALSE(fs::exists(out)) << "refused, but something was written";
+  // The same file without such a flag is rendered.
+  const auto result = run_panonav(with_small({"simulate", mesh, out, "--random", "1"}));
+  EXPECT_EQ(result.exit_code, 0) << result.err;
 }
 
 TEST(Simulate, WritesOnlyIntoANewOrEmptyFolder) {
