@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <limits>
 #include <numbers>
+#include <span>
 #include <vector>
 
 #include "panonav/core/error.hpp"
@@ -163,6 +164,79 @@ TEST(ColumnMatch, IsTheLeastOverAllTurns) {
   EXPECT_NEAR(match_columns(query, reference).difference, least, 1e-3);
 }
 
+double mean_of_roots(std::span<const double> distances) {
+  double sum = 0.0;
+  for (const double distance : distances) sum += std::sqrt(distance);
+  return sum / static_cast<double>(distances.size());
+}
+
+constexpr double turn_step_rad = 2.0 * std::numbers::pi / ColumnProfiles::columns;
+
+TEST(ColumnDistances, NearTheMatchedTurnTheirRootsAreAtMostTheDifference) {
+  int below = 0;
+  for (std::uint64_t seed = 30; seed < 40; ++seed) {
+    const ColumnProfiles query(packed(smooth_view(seed)));
+    const ColumnProfiles reference(packed(smooth_view(seed + 100)));
+    const ColumnMatch match = match_columns(query, reference);
+    const double mean = mean_of_roots(column_distances_near(query, reference, match.heading_rad));
+    EXPECT_GT(mean, 0.0);
+    EXPECT_LE(mean, match.difference + 1e-3) << "seed " << seed;  // roots are rounded to bytes
+    below += mean < match.difference - 1e-3;
+  }
+  EXPECT_GT(below, 0) << "columns may take the turn beside the nearest one";
+}
+
+TEST(ColumnDistances, AreTheLeastOfThreeTurnsColumnByColumn) {
+  const ColumnProfiles query(packed(smooth_view(5)));
+  const ColumnProfiles reference(packed(smooth_view(6)));
+  for (const int nearest : {0, 1, 63, 64, 90, 127}) {
+    // Any heading less than half a step away, on any lap.
+    for (const double heading_rad : {nearest * turn_step_rad, (nearest + 0.4) * turn_step_rad,
+                                     (nearest - 0.4) * turn_step_rad - 2.0 * std::numbers::pi}) {
+      const auto distances = column_distances_near(query, reference, heading_rad);
+      for (std::size_t c = 0; c < distances.size(); ++c) {
+        double least = std::numeric_limits<double>::infinity();
+        for (int turn = nearest - 1; turn <= nearest + 1; ++turn) {
+          const std::size_t at = (4 * c + static_cast<std::size_t>(turn + 128)) % 128;
+          int l1 = 0;
+          for (std::size_t b = 0; b < 16; ++b) {
+            l1 += std::abs(query.values()[b * 128 + 4 * c] - reference.values()[b * 128 + at]);
+          }
+          least = std::min(least, l1 / 40.0 / 16.0);
+        }
+        EXPECT_NEAR(distances[c], least, 1e-12) << "turn " << nearest << " column " << c;
+      }
+    }
+  }
+}
+
+TEST(ColumnDistances, OfTheSameViewTurnedByWholeStepsAreZero) {
+  const PackedSignature view = packed(smooth_view(4));
+  const ColumnProfiles reference(view);
+  for (const int turned : {0, 1, 31, 64, 127}) {
+    // A step is two units of a packed phase, so nothing is rounded but the values of the profiles.
+    PackedSignature query = view;
+    for (std::size_t i = 0; i < query.phases.size(); ++i) {
+      const auto k = static_cast<int>(i) / view.shape.rows;
+      query.phases[i] = static_cast<std::uint8_t>(query.phases[i] + 2 * k * turned);
+    }
+    const ColumnProfiles profiles(query);
+    // One band of 16 that is rounded the other way.
+    constexpr double rounding = 1.0 / (40.0 * 16.0) + 1e-12;
+    for (const double off : {0.0, 0.9, -0.9}) {
+      const auto distances =
+          column_distances_near(profiles, reference, (turned + off) * turn_step_rad);
+      for (const double distance : distances) EXPECT_LE(distance, rounding) << turned << " " << off;
+      EXPECT_GE(std::ranges::count(distances, 0.0), 28);
+    }
+    const auto elsewhere = column_distances_near(profiles, reference, (turned + 8) * turn_step_rad);
+    EXPECT_GT(std::ranges::max(elsewhere), 0.1);
+  }
+  for (const double distance : column_distances_near(reference, reference, 0.0)) {
+    EXPECT_EQ(distance, 0.0);
+  }
+}
+
 TEST(ColumnProfiles, MaskedRowsDoNotCount) {
   Panorama view = smooth_view(7);
   std::vector<std::uint8_t> allowed(40, 1);
@@ -202,6 +276,9 @@ TEST(ColumnProfiles, RefuseBadInput) {
   EXPECT_THROW(
       (void)match_columns(ColumnProfiles(signature), ColumnProfiles(packed(smooth_view(1, 5)))),
       ContractError);
+  EXPECT_THROW((void)column_distances_near(ColumnProfiles(signature),
+                                           ColumnProfiles(packed(smooth_view(1, 5))), 0.0),
+               ContractError);
 }
 
 }  // namespace

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <limits>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include "panonav/core/error.hpp"
@@ -193,6 +195,140 @@ TEST(Compass, PackedAgreesWithFloat) {
     ++compared;
   }
   EXPECT_EQ(compared, 100);
+}
+
+/// The definition of the correlation, over the bytes of packed signatures.
+class PackedOracle {
+ public:
+  PackedOracle(const PackedSignature& query, const PackedSignature& reference) {
+    double query_energy = 0.0;
+    double reference_energy = 0.0;
+    terms_.resize(static_cast<std::size_t>(query.shape.components));
+    for (int k = 1; k < query.shape.components; ++k) {
+      for (int y = 0; y < query.shape.rows; ++y) {
+        const auto i = static_cast<std::size_t>(k * query.shape.rows + y);
+        const double a = query.magnitudes[i];
+        const double b = reference.magnitudes[i];
+        terms_[static_cast<std::size_t>(k)] +=
+            std::polar(a * b, std::numbers::pi / 128.0 * (query.phases[i] - reference.phases[i]));
+        query_energy += a * a;
+        reference_energy += b * b;
+      }
+    }
+    norm_ = std::sqrt(query_energy * reference_energy);
+  }
+  [[nodiscard]] double at(double heading_rad) const {
+    double sum = 0.0;
+    for (std::size_t k = 1; k < terms_.size(); ++k) {
+      sum += (terms_[k] * std::polar(1.0, -static_cast<double>(k) * heading_rad)).real();
+    }
+    return sum / norm_;
+  }
+  [[nodiscard]] double best_within(double heading_rad, double within_rad) const {
+    constexpr int steps = 4000;
+    double best = -1.0;
+    for (int i = 0; i <= steps; ++i) {
+      best = std::max(best, at(heading_rad + within_rad * (2.0 * i / steps - 1.0)));
+    }
+    return best;
+  }
+
+ private:
+  std::vector<std::complex<double>> terms_;
+  double norm_ = 1.0;
+};
+
+/// The compass' cosines have 14 bits.
+constexpr double packed_rounding = 1e-4;
+
+struct PackedPair {
+  PackedSignature query, reference;
+};
+
+PackedPair unrelated_views(Random& random) {
+  const SignatureShape shape{1 + static_cast<int>(random.index(4)),
+                             3 + static_cast<int>(random.index(20))};
+  const auto draw = [&] { return pack(random_signature(random, shape), 1.0F); };
+  PackedSignature query = draw();
+  return {std::move(query), draw()};
+}
+
+TEST(CompassNear, AllAroundItFindsTheGlobalMaximum) {
+  Random random(12);
+  for (int trial = 0; trial < 60; ++trial) {
+    const auto [query, reference] = unrelated_views(random);
+    const auto global = compass(query, reference);
+    ASSERT_TRUE(global);
+    for (const double around : {0.0, std::numbers::pi, random.uniform(-10.0, 10.0)}) {
+      const auto near = compass_near(query, reference, around, std::numbers::pi);
+      ASSERT_TRUE(near);
+      EXPECT_NEAR(near->correlation, global->correlation, 1e-9) << "trial " << trial;
+      EXPECT_GE(near->heading_rad, -std::numbers::pi);
+      EXPECT_LT(near->heading_rad, std::numbers::pi);
+      EXPECT_EQ(near->distinctness, 1.0);
+    }
+  }
+}
+
+TEST(CompassNear, AroundTheGlobalMaximumItFindsThat) {
+  Random random(13);
+  for (int trial = 0; trial < 60; ++trial) {
+    const auto [query, reference] = unrelated_views(random);
+    const auto global = compass(query, reference);
+    ASSERT_TRUE(global);
+    for (const double within : {0.01, 0.1, 0.5}) {
+      const double around = global->heading_rad + random.uniform(-0.9, 0.9) * within;
+      const auto near = compass_near(query, reference, around, within);
+      ASSERT_TRUE(near);
+      EXPECT_NEAR(near->correlation, global->correlation, 1e-9)
+          << "trial " << trial << " within " << within;
+      EXPECT_LT(heading_error(*near, global->heading_rad), 1e-5);
+    }
+  }
+}
+
+TEST(CompassNear, ElsewhereItFindsTheBestWithinTheWindow) {
+  Random random(14);
+  int at_the_edge = 0;
+  int inside = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    const auto [query, reference] = unrelated_views(random);
+    const auto global = compass(query, reference);
+    ASSERT_TRUE(global);
+    const double within = random.uniform(0.02, 2.0);
+    const double away = random.uniform(within + 0.01, 2.0 * std::numbers::pi - within - 0.01);
+    const double around = global->heading_rad + away;
+    const auto near = compass_near(query, reference, around, within);
+    ASSERT_TRUE(near);
+    const double off = std::abs(angle_difference(near->heading_rad, around));
+    EXPECT_LE(off, within + 1e-9) << "trial " << trial;
+    const PackedOracle oracle(query, reference);
+    EXPECT_GE(near->correlation, oracle.best_within(around, within) - packed_rounding)
+        << "trial " << trial << " around " << around << " within " << within;
+    EXPECT_NEAR(near->correlation, oracle.at(near->heading_rad), packed_rounding);
+    EXPECT_LE(near->correlation, global->correlation + 1e-9);
+    ++(off > within - 1e-9 ? at_the_edge : inside);
+  }
+  EXPECT_GT(at_the_edge, 10);
+  EXPECT_GT(inside, 10);
+}
+
+TEST(CompassNear, RefusesWindowsAndHasNoAnswerWithoutStructure) {
+  Random random(15);
+  const PackedSignature view = pack(random_signature(random, {3, 15}), 1.0F);
+  for (const double within :
+       {0.0, -0.1, std::numbers::pi + 1e-9, std::numeric_limits<double>::quiet_NaN()}) {
+    EXPECT_THROW(static_cast<void>(compass_near(view, view, 0.0, within)), ContractError) << within;
+  }
+  EXPECT_THROW(static_cast<void>(compass_near(view, view, 0.0, 1.0, {.components = 16})),
+               ContractError);
+  const PackedSignature flat =
+      pack(compute_signature(Panorama(3, 512, std::nullopt, std::vector<float>(3 * 512, 0.7F)), 15),
+           1.0F);
+  EXPECT_TRUE(compass_near(view, view, 0.0, 1.0));
+  EXPECT_FALSE(compass_near(flat, view, 0.0, 1.0));
+  EXPECT_FALSE(compass_near(view, flat, 0.0, 1.0));
+  EXPECT_FALSE(compass_near(flat, flat, 0.0, 1.0));
 }
 
 TEST(Compass, UsesTheComponentsAskedFor) {

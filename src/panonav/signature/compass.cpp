@@ -5,6 +5,7 @@
 #include <cmath>
 #include <complex>
 #include <cstdint>
+#include <limits>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -287,19 +288,28 @@ std::optional<CompassReading> compass_near(const PackedSignature& query,
   // As fine as `highest_peaks` looks.
   const int steps = 1 + static_cast<int>(std::ceil(within_rad * 8.0 * spectrum->highest() / pi));
   const double step = 2.0 * within_rad / steps;
-  Peak best{heading_rad - within_rad, evaluate(*spectrum, heading_rad - within_rad).value};
-  int at = 0;
-  for (int i = 1; i <= steps; ++i) {
-    const double heading = heading_rad - within_rad + i * step;
-    const double value = evaluate(*spectrum, heading).value;
-    if (value > best.value) {
-      best = {heading, value};
-      at = i;
-    }
+  const double first = heading_rad - within_rad;
+  std::vector<Point> points;
+  points.reserve(static_cast<std::size_t>(steps) + 1);
+  Peak best{first, -std::numeric_limits<double>::infinity()};
+  for (int i = 0; i <= steps; ++i) {
+    const double heading = first + i * step;
+    points.push_back(evaluate(*spectrum, heading));
+    if (points.back().value > best.value) best = {heading, points.back().value};
   }
-  if (at > 0 && at < steps) {
-    const Peak refined = refine(*spectrum, best.heading_rad - step, best.heading_rad + step);
-    if (refined.value >= best.value) best = refined;
+  // By Bernstein's inequality C rises by at most (highest * half a step)^2 / 2 <= 0.08 of its bound
+  // between two points.
+  double bound = 0.0;
+  for (const auto& term : spectrum->terms) bound += std::abs(term);
+  const double least = best.value - 0.08 * bound;
+  for (int i = 0; i < steps; ++i) {
+    const Point& low = points[static_cast<std::size_t>(i)];
+    const Point& high = points[static_cast<std::size_t>(i) + 1];
+    if (!(low.slope > 0.0 && high.slope < 0.0 && std::max(low.value, high.value) >= least)) {
+      continue;
+    }
+    const Peak peak = refine(*spectrum, first + i * step, first + (i + 1) * step);
+    if (peak.value > best.value) best = peak;
   }
   return CompassReading{wrap_angle(best.heading_rad),
                         std::clamp(best.value / spectrum->norm, -1.0, 1.0), 1.0};
