@@ -41,7 +41,7 @@ TEST(ColumnRanking, IsInOrderAndTheSameWhetherProfilesAreKept) {
       EXPECT_EQ(ranked[k].columns.difference, again[k].columns.difference);
       EXPECT_TRUE(std::ranges::find(found.matches, ranked[k].match) != found.matches.end());
       if (k > 0) {
-        EXPECT_GE(ranked[k].columns.difference, ranked[k - 1].columns.difference);
+        EXPECT_GE(ranked[k].score(), ranked[k - 1].score());
       }
     }
   }

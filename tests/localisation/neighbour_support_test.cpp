@@ -90,11 +90,11 @@ TEST(NeighbourSupport, PutsThePlaceAndItsNeighboursFirst) {
     first_right += distance(best, pose.position()) < place.step_m ? 1 : 0;
     // A group of neighbours, in order, then all others, in order.
     std::size_t k = 1;
-    while (k < size && ranked[k].columns.difference >= ranked[k - 1].columns.difference) {
+    while (k < size && ranked[k].score() >= ranked[k - 1].score()) {
       ++k;
     }
     for (std::size_t j = k + 1; j < size; ++j) {
-      EXPECT_GE(ranked[j].columns.difference, ranked[j - 1].columns.difference);
+      EXPECT_GE(ranked[j].score(), ranked[j - 1].score());
     }
   }
   EXPECT_GE(first_right, 29);

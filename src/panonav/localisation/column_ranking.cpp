@@ -1,11 +1,19 @@
 #include "panonav/localisation/column_ranking.hpp"
 
 #include <algorithm>
-#include <tuple>
+#include <cmath>
+#include <utility>
 
 #include "panonav/core/error.hpp"
 
 namespace panonav {
+
+double RankedMatch::score_of(double difference) const {
+  // Two views may agree in all columns to the last byte and not in brightness, or the reverse.
+  constexpr double least = 1e-6;
+  constexpr double weight_of_dissimilarity = 0.25;
+  return (difference + least) * std::pow(match.dissimilarity + least, weight_of_dissimilarity);
+}
 
 ColumnRanking::ColumnRanking(const VisualMemory& memory, int components, int most_kept)
     : memory_(&memory), components_(components) {
@@ -40,9 +48,8 @@ std::vector<RankedMatch> ColumnRanking::rank(const PackedSignature& query,
               : match_columns(asked, ColumnProfiles(memory_->packed(match.view), components_,
                                                     allowed_rows))});
   }
-  std::ranges::sort(ranked, {}, [](const RankedMatch& r) {
-    return std::tuple(r.columns.difference, r.match.dissimilarity, r.match.view);
-  });
+  std::ranges::sort(ranked, {},
+                    [](const RankedMatch& r) { return std::pair(r.score(), r.match.view); });
   return ranked;
 }
 

@@ -13,6 +13,14 @@ namespace panonav {
 struct RankedMatch {
   Match match;
   ColumnMatch columns;
+
+  /// By what matches are put in order; the least is the best. Columns carry most of it. The
+  /// dissimilarity, at a quarter of its weight, adds what columns are freed of: how bright each is.
+  /// What hides a part of the view raises the dissimilarity to all references, so it then tells
+  /// them apart less and counts less by itself.
+  [[nodiscard]] double score() const { return score_of(columns.difference); }
+  /// The same for another measure of the columns' difference.
+  [[nodiscard]] double score_of(double difference) const;
 };
 
 /// Puts what the search found in the order of how well it fits column by column. The search looks
@@ -25,7 +33,7 @@ class ColumnRanking {
   /// `components`: compared, 0 for all. Throws ContractError on more than the memory's.
   explicit ColumnRanking(const VisualMemory& memory, int components = 0, int most_kept = 1000);
 
-  /// Ascending (difference, dissimilarity, view). `allowed_rows` as in SearchMask. Cost: 2.5
+  /// Ascending (score, view). `allowed_rows` as in SearchMask. Cost: 2.5
   /// microseconds a match whose profiles are kept, about 20 for others.
   [[nodiscard]] std::vector<RankedMatch> rank(
       const PackedSignature& query, std::span<const Match> matches,

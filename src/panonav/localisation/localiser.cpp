@@ -120,11 +120,14 @@ Localisation Localiser::localise(const PackedSignature& query, const SearchMask&
   const int first = std::max(options_.top, PositionModel::candidates);
   std::vector<RankedMatch> ranked = nearest(first);
   if (ranked.empty()) return result;
-  if (options_.compared_views > first &&
-      ranked.front().columns.difference > place_model_.neighbouring) {
+  const auto least_difference = [&] {
+    return std::ranges::min(ranked, {}, [](const RankedMatch& r) { return r.columns.difference; })
+        .columns.difference;
+  };
+  if (options_.compared_views > first && least_difference() > place_model_.neighbouring) {
     ranked = nearest(options_.compared_views);
   }
-  result.known = ranked.front().columns.difference <= place_model_.threshold;
+  result.known = least_difference() <= place_model_.threshold;
   // Profiles of the references are kept over all rows.
   if (options_.compared_views > 0 && mask.allowed_rows.empty()) {
     support_.put_best_supported_first(ColumnProfiles(query, options_.components), ranked);

@@ -28,8 +28,8 @@ struct LocalisedMatch {
 struct Localisation {
   /// False: this is no place of the memory (`PlaceModel`). The matches are listed all the same.
   bool known = false;
-  /// Those of the chosen place and its neighbours first, then all others, each ascending
-  /// (difference, dissimilarity, view); of the first four the one nearest to `position` is put
+  /// Those of the chosen place and its neighbours first, then all others, each ascending in their
+  /// score (`RankedMatch`); of the first four the one nearest to `position` is put
   /// first.
   std::vector<LocalisedMatch> matches;
   /// Interpolated between references; empty when the place is unknown or the nearest view has no

@@ -116,14 +116,14 @@ std::optional<double> NeighbourSupport::supported_difference(const ColumnProfile
 void NeighbourSupport::put_best_supported_first(const ColumnProfiles& query,
                                                 std::vector<RankedMatch>& ranked) const {
   if (ranked.empty() || sites_.empty()) return;
-  const double limit = looked_at_share * ranked.front().columns.difference;
+  const double limit = looked_at_share * ranked.front().score();
   const RankedMatch* chosen = nullptr;
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < std::min(most_looked_at, ranked.size()); ++i) {
-    if (ranked[i].columns.difference > limit) break;
+    if (ranked[i].score() > limit) break;
     const auto difference = supported_difference(query, ranked[i]);
-    if (difference && *difference < least) {
-      least = *difference;
+    if (difference && ranked[i].score_of(*difference) < least) {
+      least = ranked[i].score_of(*difference);
       chosen = &ranked[i];
     }
   }

@@ -29,9 +29,9 @@ class NeighbourSupport {
   [[nodiscard]] std::optional<double> supported_difference(const ColumnProfiles& query,
                                                            const RankedMatch& match) const;
 
-  /// Puts the match with the least supported difference and its neighbours first, each group in
-  /// the order that it was in. Only matches whose difference is within a quarter of the first one's
-  /// are looked at, 30 at most. `ranked` stays as it is when no match has neighbours.
+  /// Puts the match with the least score, by its supported difference, and its neighbours first,
+  /// each group in the order that it was in. Only matches whose score is within a quarter of the
+  /// first one's are looked at, 30 at most. `ranked` stays as it is when no match has neighbours.
   void put_best_supported_first(const ColumnProfiles& query,
                                 std::vector<RankedMatch>& ranked) const;
 
