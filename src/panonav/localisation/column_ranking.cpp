@@ -11,7 +11,7 @@ namespace panonav {
 double RankedMatch::score_of(double difference) const {
   // Two views may agree in all columns to the last byte and not in brightness, or the reverse.
   constexpr double least = 1e-6;
-  constexpr double weight_of_dissimilarity = 0.25;
+  constexpr double weight_of_dissimilarity = 0.125;
   return (difference + least) * std::pow(match.dissimilarity + least, weight_of_dissimilarity);
 }
 

@@ -15,7 +15,7 @@ struct RankedMatch {
   ColumnMatch columns;
 
   /// By what matches are put in order; the least is the best. Columns carry most of it. The
-  /// dissimilarity, at a quarter of its weight, adds what columns are freed of: how bright each is.
+  /// dissimilarity, at an eighth of the weight, adds what columns are freed of: how bright each is.
   /// What hides a part of the view raises the dissimilarity to all references, so it then tells
   /// them apart less and counts less by itself.
   [[nodiscard]] double score() const { return score_of(columns.difference); }
