@@ -13,6 +13,7 @@
 #include "panonav/camera/mirror_overlay.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/io/image_file.hpp"
+#include "support/sanitizers.hpp"
 
 namespace panonav {
 namespace {
@@ -154,6 +155,7 @@ MirrorPicture random_picture(std::uint64_t seed) {
 }
 
 TEST(FindMirror, ManySeedsOfAllKinds) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   // Known limits, stated in find_mirror.hpp: between surroundings as patterned as the scene some
   // mirrors are not found, and a ring as grey as the scene beside it is taken for a part of the
   // mirror.

@@ -9,6 +9,7 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/simulation/load_gazebo.hpp"
+#include "support/sanitizers.hpp"
 
 namespace panonav {
 namespace {
@@ -60,6 +61,7 @@ INSTANTIATE_TEST_SUITE_P(Worlds, GazeboWorld, testing::Values("small_warehouse",
                          [](const auto& world) { return std::string(world.param); });
 
 TEST(PlaceExperiment, OfOnePlaceTellsItFromOthersAndIsTheSameOnAnyNumberOfThreads) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   std::vector<PlaceRecording> places;
   Executor two(2);
   for (const auto& [scene, seed] :

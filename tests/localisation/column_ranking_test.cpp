@@ -8,6 +8,7 @@
 #include "localisation/ray_cast_room.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/localisation/localiser.hpp"
+#include "support/sanitizers.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -49,6 +50,7 @@ TEST(ColumnRanking, IsInOrderAndTheSameWhetherProfilesAreKept) {
 }
 
 TEST(ColumnRanking, FindsThePlaceWhereSomebodyStandsInView) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   int by_columns = 0;
   int by_dissimilarity = 0;
   int asked = 0;

@@ -10,6 +10,7 @@
 #include "localisation/ray_cast_room.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/localisation/localiser.hpp"
+#include "support/sanitizers.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -83,6 +84,7 @@ TEST(PlaceModel, DoesNotNeedPoses) {
 // Rooms of several kinds, each remembered on a 25 cm grid, each asked for views between its own
 // references with noise, and for views of all other rooms.
 TEST(PlaceModel, AcceptsItsOwnPlacesAndRefusesOtherRooms) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   const std::array kinds = {RoomKind{4.0, 3.0, 1, 0.2}, RoomKind{4.0, 3.5, 8, 0.15},
                             RoomKind{3.5, 3.5, 4, 0.04}, RoomKind{9.0, 1.8, 2, 0.12}};
   constexpr double step_m = 0.25;
