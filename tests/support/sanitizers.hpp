@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panonav::test_support {
+namespace panonav::test {
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 inline constexpr bool sanitized = true;
@@ -10,10 +10,10 @@ inline constexpr bool sanitized = true;
 inline constexpr bool sanitized = false;
 #endif
 
-}  // namespace panonav::test_support
+}  // namespace panonav::test
 
 /// For tests that count rates over thousands of trials: other tests run the same code once, and
 /// under a sanitizer the trials take minutes.
 #define PANONAV_SKIP_RATES_UNDER_SANITIZERS() \
-  if (panonav::test_support::sanitized)       \
+  if (panonav::test::sanitized)       \
   GTEST_SKIP() << "a rate over many trials: asked without sanitizers"
