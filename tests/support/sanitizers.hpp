@@ -14,6 +14,5 @@ inline constexpr bool sanitized = false;
 
 /// For tests that count rates over thousands of trials: other tests run the same code once, and
 /// under a sanitizer the trials take minutes.
-#define PANONAV_SKIP_RATES_UNDER_SANITIZERS()                                             \
-  if (panonav::test::sanitized) GTEST_SKIP() << "a rate over many trials: asked without " \
-                                                "sanitizers"
+#define PANONAV_SKIP_RATES_UNDER_SANITIZERS() \
+  if (panonav::test::sanitized) GTEST_SKIP() << "a rate over many trials"
