@@ -147,8 +147,7 @@ Localisation Localiser::localise(const PackedSignature& query, const SearchMask&
                              r.columns.heading_rad, compass_window_rad,
                              {.components = options_.components});
     }
-    result.matches.push_back(
-        {r.match.view, r.match.dissimilarity, r.columns.difference, std::move(reading)});
+    result.matches.push_back({r.match.view, r.match.dissimilarity, r.columns.difference, reading});
   }
   if (result.known) {
     result.position = interpolate_position(*ranking_, position_model_, ranked);

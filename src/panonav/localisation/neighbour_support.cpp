@@ -131,7 +131,7 @@ void NeighbourSupport::put_best_supported_first(const ColumnProfiles& query,
   std::vector<ViewId> group = neighbours(chosen->match.view);
   group.push_back(chosen->match.view);
   const double heading_rad = *placed(chosen->match.view)->heading_rad + chosen->columns.heading_rad;
-  std::ranges::stable_partition(ranked, [&](const RankedMatch& r) {
+  std::stable_partition(ranked.begin(), ranked.end(), [&](const RankedMatch& r) {
     if (std::ranges::find(group, r.match.view) == group.end()) return false;
     return std::abs(angle_difference(*placed(r.match.view)->heading_rad + r.columns.heading_rad,
                                      heading_rad)) <= heading_tolerance_rad;
