@@ -25,11 +25,14 @@ ColumnRanking::ColumnRanking(const VisualMemory& memory, int components, int mos
   for (const ViewId view : kept_views_) kept_.emplace_back(memory.packed(view), components);
 }
 
-ColumnProfiles ColumnRanking::profiles(ViewId view) const {
+const ColumnProfiles* ColumnRanking::kept(ViewId view) const {
   const auto at = std::ranges::lower_bound(kept_views_, view);
-  if (at != kept_views_.end() && *at == view) {
-    return kept_[static_cast<std::size_t>(at - kept_views_.begin())];
-  }
+  if (at == kept_views_.end() || *at != view) return nullptr;
+  return &kept_[static_cast<std::size_t>(at - kept_views_.begin())];
+}
+
+ColumnProfiles ColumnRanking::profiles(ViewId view) const {
+  if (const ColumnProfiles* const found = kept(view)) return *found;
   return ColumnProfiles(memory_->packed(view), components_);
 }
 
@@ -40,13 +43,13 @@ std::vector<RankedMatch> ColumnRanking::rank(const PackedSignature& query,
   std::vector<RankedMatch> ranked;
   ranked.reserve(matches.size());
   for (const Match& match : matches) {
-    const auto at = std::ranges::lower_bound(kept_views_, match.view);
-    const bool kept = allowed_rows.empty() && at != kept_views_.end() && *at == match.view;
-    ranked.push_back(
-        {match,
-         kept ? match_columns(asked, kept_[static_cast<std::size_t>(at - kept_views_.begin())])
-              : match_columns(asked, ColumnProfiles(memory_->packed(match.view), components_,
-                                                    allowed_rows))});
+    // Kept profiles are over all rows.
+    const ColumnProfiles* const found = allowed_rows.empty() ? kept(match.view) : nullptr;
+    const ColumnMatch columns =
+        found != nullptr ? match_columns(asked, *found)
+                         : match_columns(asked, ColumnProfiles(memory_->packed(match.view),
+                                                               components_, allowed_rows));
+    ranked.push_back({match, columns});
   }
   std::ranges::sort(ranked, {},
                     [](const RankedMatch& r) { return std::pair(r.score(), r.match.view); });

@@ -46,6 +46,9 @@ class ColumnRanking {
   [[nodiscard]] int components() const noexcept { return components_; }
 
  private:
+  /// Null for a view whose profiles are not kept.
+  [[nodiscard]] const ColumnProfiles* kept(ViewId view) const;
+
   const VisualMemory* memory_;
   int components_;
   std::vector<ViewId> kept_views_;  ///< ascending, as `kept_`
