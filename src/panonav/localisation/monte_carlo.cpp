@@ -1,0 +1,418 @@
+#include "panonav/localisation/monte_carlo.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <string>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/localisation/hierarchical.hpp"
+#include "panonav/localisation/resampling.hpp"
+#include "panonav/localisation/view_likelihood.hpp"
+
+namespace panonav {
+
+struct MonteCarloLocaliser::Implementation {
+  std::shared_ptr<const ColumnRanking> ranking;
+  ObservationModel model;
+  MonteCarloOptions options;
+  OdometryNoise odometry;
+  ViewLikelihood likelihood;
+  std::optional<ReferenceAreas> areas;
+  Random random;
+  std::vector<Particle> particles;
+  std::vector<double> log_ratios;
+  double outside = 0.5;
+  bool was_localised = false;
+  MonteCarloEstimate latest;
+
+  Implementation(std::shared_ptr<const ColumnRanking> ranking_, const ObservationModel& model_,
+                 const MonteCarloOptions& options_, const OdometryNoise& odometry_)
+      : ranking(std::move(ranking_)),
+        model(model_),
+        options(options_),
+        odometry(odometry_),
+        likelihood(*ranking, model, options.compass),
+        random(static_cast<std::uint64_t>(options.seed)) {
+    validate(options);
+    validate(odometry);
+    if (options.redraw == Redraw::topological) areas.emplace(ranking->memory());
+  }
+
+  [[nodiscard]] PoseBins bins() const { return {.cell_m = model.spacing_m, .headings = 24}; }
+
+  Pose2 anywhere(std::optional<double> heading_rad) {
+    const auto sites = likelihood.sites();
+    const auto& site = sites[random.index(sites.size())];
+    const double half = 0.5 * model.spacing_m;
+    const double x = static_cast<double>(site.x_m) + random.uniform(-half, half);
+    const double y = static_cast<double>(site.y_m) + random.uniform(-half, half);
+    const double turn = random.uniform(-std::numbers::pi, std::numbers::pi);
+    return {x, y, heading_rad.value_or(turn)};
+  }
+
+  // The heading that a new particle has when no compass tells it: somebody else's.
+  double borrowed_heading() { return particles[random.index(particles.size())].pose.heading_rad; }
+
+  void compare_views(const PackedSignature& view);
+  int redraw_fixed(const PackedSignature& view);
+  MonteCarloEstimate observe(const PackedSignature& view);
+  void describe(MonteCarloEstimate& estimate, const ParticleModes& found) const;
+};
+
+namespace {
+
+constexpr int searched_views = 16;
+
+}  // namespace
+
+void visit_options(MonteCarloOptions& options, OptionVisitor& visitor) {
+  visitor.visit({.name = "least_particles", .help = "fewest particles", .low = 1, .high = 1e7},
+                options.least_particles);
+  visitor.visit({.name = "most_particles", .help = "most particles", .low = 1, .high = 1e7},
+                options.most_particles);
+  visitor.visit(
+      {.name = "kld_error",
+       .help = "allowed error of the particles' distribution; smaller needs more particles",
+       .low = 1e-4,
+       .high = 1.0},
+      options.kld_error);
+  visitor.visit({.name = "resample_below",
+                 .help = "effective sample size below which particles are resampled, as a share",
+                 .low = 0.0,
+                 .high = 1.0},
+                options.resample_below);
+  visitor.visit({.name = "compass", .help = "weigh headings by the visual compass"},
+                options.compass);
+  constexpr std::array<std::string_view, 4> kinds{"none", "uniform", "topological", "explained"};
+  int kind = static_cast<int>(options.redraw);
+  visitor.visit({.name = "redraw", .help = "where new particles are drawn"}, kinds, kind);
+  options.redraw = static_cast<Redraw>(kind);
+  visitor.visit({.name = "redraw_share",
+                 .help = "share of particles redrawn by 'topological'",
+                 .low = 0.0,
+                 .high = 1.0},
+                options.redraw_share);
+  visitor.visit(
+      {.name = "redraw_number", .help = "particles redrawn by 'uniform'", .low = 0, .high = 1e7},
+      options.redraw_number);
+  visitor.visit({.name = "compared_views",
+                 .help = "views compared column by column when no near one explains the picture",
+                 .low = 0,
+                 .high = 1e6},
+                options.compared_views);
+  visitor.visit({.name = "seed", .help = "seed of all random choices", .low = 0}, options.seed);
+}
+
+std::string_view name_of(LocalisationState state) {
+  switch (state) {
+    case LocalisationState::localised:
+      return "localised";
+    case LocalisationState::ambiguous:
+      return "ambiguous";
+    case LocalisationState::lost:
+      break;
+  }
+  return "lost";
+}
+
+// What is compared column by column: the views that the search finds, those around the best of
+// them, and those around the particles.
+void MonteCarloLocaliser::Implementation::compare_views(const PackedSignature& view) {
+  likelihood.begin(view);
+  const auto sites = likelihood.sites();
+  const auto compare_found = [&](int count) {
+    const SearchResult found =
+        ranking->memory().search(view, {.top = count, .components = ranking->components()});
+    for (const Match& match : found.matches) {
+      if (const auto site = likelihood.site_of(match.view)) likelihood.compare(*site);
+    }
+  };
+  compare_found(searched_views);
+
+  std::vector<float> mass(sites.size());
+  std::vector<std::uint32_t> carried;
+  for (const Particle& particle : particles) {
+    const auto near = likelihood.sites_near(particle.pose.position());
+    for (const std::uint32_t site : near.first(std::min<std::size_t>(4, near.size()))) {
+      if (mass[site] == 0.0F) carried.push_back(site);
+      mass[site] += static_cast<float>(particle.weight);
+    }
+  }
+  const std::size_t count = std::min<std::size_t>(16, carried.size());
+  std::partial_sort(carried.begin(), carried.begin() + static_cast<std::ptrdiff_t>(count),
+                    carried.end(), [&](std::uint32_t a, std::uint32_t b) {
+                      return mass[a] != mass[b] ? mass[a] > mass[b] : a < b;
+                    });
+  carried.resize(count);
+  for (const std::uint32_t site : carried) likelihood.compare(site);
+
+  const auto best_of = [&](std::span<const std::uint32_t> of) {
+    std::optional<std::uint32_t> best;
+    for (const std::uint32_t site : of) {
+      if (likelihood.compared(site) && (!best || sites[site].likeness > sites[*best].likeness)) {
+        best = site;
+      }
+    }
+    return best;
+  };
+  const auto here = likelihood.least_difference(carried);
+  const auto anywhere_least = likelihood.least_difference(likelihood.compared_sites());
+  const bool held = was_localised && here && anywhere_least && *here <= *anywhere_least;
+  if (!held && anywhere_least && *anywhere_least > model.neighbouring_difference) {
+    if (sites.size() <= static_cast<std::size_t>(options.compared_views)) {
+      for (std::uint32_t s = 0; s < sites.size(); ++s) likelihood.compare(s);
+    } else if (options.compared_views > searched_views) {
+      compare_found(options.compared_views);
+    }
+  }
+  if (const auto best = best_of(likelihood.compared_sites())) {
+    const Point2 place{static_cast<double>(sites[*best].x_m),
+                       static_cast<double>(sites[*best].y_m)};
+    for (const std::uint32_t site : likelihood.sites_near(place)) likelihood.compare(site);
+  }
+  latest.difference_here = likelihood.least_difference(carried);
+  latest.difference_anywhere = likelihood.least_difference(likelihood.compared_sites());
+  latest.views_compared = likelihood.compared_sites().size();
+}
+
+// The uniform and the topological redraw: new particles in the place of random ones.
+int MonteCarloLocaliser::Implementation::redraw_fixed(const PackedSignature& view) {
+  const std::size_t size = particles.size();
+  std::size_t count = 0;
+  std::vector<Match> candidates;
+  if (options.redraw == Redraw::uniform) {
+    count = std::min(size, static_cast<std::size_t>(options.redraw_number));
+  } else if (options.redraw == Redraw::topological) {
+    constexpr double tolerance = 0.25;
+    auto levels =
+        localise_hierarchically(ranking->memory(), *areas, view,
+                                {.components = ranking->components(), .tolerance = tolerance});
+    if (!levels.empty()) candidates = std::move(levels.back().candidates);
+    std::erase_if(candidates, [&](const Match& m) { return !likelihood.site_of(m.view); });
+    if (candidates.empty()) return 0;
+    count = static_cast<std::size_t>(std::lround(options.redraw_share * static_cast<double>(size)));
+  }
+  for (std::size_t n = 0; n < count; ++n) {
+    Particle& particle = particles[random.index(size)];
+    if (options.redraw == Redraw::uniform) {
+      const double heading = borrowed_heading();
+      particle.pose = anywhere(options.compass ? std::nullopt : std::optional(heading));
+    } else {
+      const auto site = *likelihood.site_of(candidates[random.index(candidates.size())].view);
+      likelihood.compare(site);
+      const auto& s = likelihood.sites()[site];
+      const double half = 0.5 * model.spacing_m;
+      const double borrowed = borrowed_heading();
+      const double told =
+          static_cast<double>(s.heading_rad) + random.normal(0.0, 0.25 * model.heading_width_rad);
+      particle.pose = {static_cast<double>(s.x_m) + random.uniform(-half, half),
+                       static_cast<double>(s.y_m) + random.uniform(-half, half),
+                       wrap_angle(options.compass && !std::isnan(s.heading_rad) ? told : borrowed)};
+    }
+    particle.weight = 1.0 / static_cast<double>(size);
+  }
+  double sum = 0.0;
+  for (const Particle& particle : particles) sum += particle.weight;
+  for (Particle& particle : particles) particle.weight /= sum;
+  return static_cast<int>(count);
+}
+
+MonteCarloEstimate MonteCarloLocaliser::Implementation::observe(const PackedSignature& view) {
+  latest = {};
+  compare_views(view);
+  latest.redrawn = redraw_fixed(view);
+
+  const auto sites = likelihood.sites();
+  log_ratios.resize(particles.size());
+  double most = 0.0;
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    log_ratios[i] = likelihood.log_ratio(particles[i].pose);
+    most = std::max(most, log_ratios[i]);
+  }
+  // Evidence of the view where the particles are, and anywhere in the memory.
+  double here = 0.0;
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    here += particles[i].weight * std::exp(log_ratios[i] - most);
+  }
+  const double log_here = most + std::log(here);
+
+  std::vector<std::pair<std::uint32_t, double>> places;
+  double most_there = 0.0;
+  for (const std::uint32_t s : likelihood.compared_sites()) {
+    const bool directed = options.compass && !std::isnan(sites[s].heading_rad);
+    const Pose2 pose{static_cast<double>(sites[s].x_m), static_cast<double>(sites[s].y_m),
+                     directed ? static_cast<double>(sites[s].heading_rad) : 0.0};
+    places.emplace_back(s, likelihood.log_ratio(pose));
+    most_there = std::max(most_there, places.back().second);
+  }
+  double there = 0.0;
+  for (auto& [site, value] : places) {
+    value = std::exp(value - most_there);
+    there += value;
+  }
+  const double log_there =
+      most_there + std::log(there / static_cast<double>(sites.size())) +
+      (options.compass ? std::log(model.heading_width_rad / std::numbers::pi) : 0.0);
+  latest.log_here = log_here;
+  latest.log_there = log_there;
+
+  double sum = 0.0;
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    particles[i].weight *= std::exp(log_ratios[i] - most) + 1e-4;
+    sum += particles[i].weight;
+  }
+  for (Particle& particle : particles) particle.weight /= sum;
+
+  if (options.redraw == Redraw::explained && !places.empty()) {
+    constexpr double hazard = 0.01;
+    const double odds = hazard / (1.0 - hazard) * std::exp(std::min(50.0, log_there - log_here));
+    const double mass = odds / (1.0 + odds);
+    const auto size = static_cast<double>(particles.size());
+    if (mass > 1e-4) {
+      const auto count = static_cast<std::size_t>(
+          std::max(std::lround(0.05 * size), std::lround(0.5 * mass * size)));
+      std::vector<double> weights;
+      for (const auto& [site, value] : places) weights.push_back(value);
+      const auto drawn = low_variance_resample(weights, count, random);
+      std::vector<Particle> fresh;
+      double fresh_sum = 0.0;
+      for (const std::size_t d : drawn) {
+        const auto& s = sites[places[d].first];
+        const double borrowed = borrowed_heading();
+        const double told =
+            static_cast<double>(s.heading_rad) + random.normal(0.0, 0.25 * model.heading_width_rad);
+        Pose2 pose{static_cast<double>(s.x_m) + random.normal(0.0, 0.4 * model.spacing_m),
+                   static_cast<double>(s.y_m) + random.normal(0.0, 0.4 * model.spacing_m),
+                   wrap_angle(options.compass && !std::isnan(s.heading_rad) ? told : borrowed)};
+        const double weight =
+            std::exp(likelihood.log_ratio(pose) - most_there) / places[d].second + 1e-12;
+        fresh.push_back({pose, weight});
+        fresh_sum += weight;
+      }
+      // They take the places of the lightest particles.
+      std::vector<std::size_t> order(particles.size());
+      for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+      std::ranges::sort(order, {},
+                        [&](std::size_t i) { return std::pair(particles[i].weight, i); });
+      double lost = 0.0;
+      for (std::size_t n = 0; n < fresh.size(); ++n) lost += particles[order[n]].weight;
+      for (Particle& p : particles) p.weight *= (1.0 - mass) / std::max(1e-9, 1.0 - lost);
+      for (std::size_t n = 0; n < fresh.size(); ++n) {
+        particles[order[n]] = {fresh[n].pose, mass * fresh[n].weight / fresh_sum};
+      }
+      latest.redrawn = static_cast<int>(fresh.size());
+      sum = 0.0;
+      for (const Particle& p : particles) sum += p.weight;
+      for (Particle& p : particles) p.weight /= sum;
+    }
+  }
+
+  const ParticleModes found = find_modes(particles, bins());
+  latest.particles = static_cast<int>(particles.size());
+  std::vector<double> weights;
+  for (const Particle& p : particles) weights.push_back(p.weight);
+  latest.effective_particles = effective_sample_size(weights);
+  describe(latest, found);
+
+  const std::size_t wanted = std::clamp(kld_sample_size(found.occupied_bins, options.kld_error),
+                                        static_cast<std::size_t>(options.least_particles),
+                                        static_cast<std::size_t>(options.most_particles));
+  if (latest.effective_particles < options.resample_below * static_cast<double>(weights.size())) {
+    latest.resampled = true;
+    const auto survivors = low_variance_resample(weights, wanted, random);
+    std::vector<Particle> next;
+    next.reserve(wanted);
+    for (const std::size_t s : survivors) {
+      next.push_back({particles[s].pose, 1.0 / static_cast<double>(wanted)});
+    }
+    particles = std::move(next);
+  }
+  return latest;
+}
+
+void MonteCarloLocaliser::Implementation::describe(MonteCarloEstimate& estimate,
+                                                   const ParticleModes& found) const {
+  estimate.modes = found.modes;
+  estimate.whole = summarise(particles);
+  if (!estimate.modes.empty()) estimate.pose = estimate.modes.front().mean;
+}
+
+MonteCarloLocaliser::MonteCarloLocaliser(const VisualMemory& memory,
+                                         const MonteCarloOptions& options,
+                                         const OdometryNoise& odometry) {
+  validate(options);
+  auto ranking = std::make_shared<const ColumnRanking>(memory, 0);
+  const ObservationModel model = learn_observation_model(*ranking, {.seed = options.seed});
+  implementation_ = std::make_unique<Implementation>(ranking, model, options, odometry);
+  start_anywhere();
+}
+
+MonteCarloLocaliser::MonteCarloLocaliser(std::shared_ptr<const ColumnRanking> ranking,
+                                         const ObservationModel& model,
+                                         const MonteCarloOptions& options,
+                                         const OdometryNoise& odometry)
+    : implementation_(
+          std::make_unique<Implementation>(std::move(ranking), model, options, odometry)) {
+  start_anywhere();
+}
+
+MonteCarloLocaliser::~MonteCarloLocaliser() = default;
+MonteCarloLocaliser::MonteCarloLocaliser(MonteCarloLocaliser&&) noexcept = default;
+MonteCarloLocaliser& MonteCarloLocaliser::operator=(MonteCarloLocaliser&&) noexcept = default;
+
+void MonteCarloLocaliser::start_anywhere(std::optional<double> heading_rad) {
+  auto& own = *implementation_;
+  own.particles.clear();
+  const auto count = static_cast<std::size_t>(own.options.most_particles);
+  for (std::size_t i = 0; i < count; ++i) {
+    own.particles.push_back({own.anywhere(heading_rad), 1.0 / static_cast<double>(count)});
+  }
+  own.was_localised = false;
+}
+
+void MonteCarloLocaliser::start_at(const Pose2& pose, double deviation_m,
+                                   double heading_deviation_rad) {
+  auto& own = *implementation_;
+  own.particles.clear();
+  const auto count = static_cast<std::size_t>(own.options.most_particles);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double x = own.random.normal(pose.x_m, deviation_m);
+    const double y = own.random.normal(pose.y_m, deviation_m);
+    const double heading = own.random.normal(pose.heading_rad, heading_deviation_rad);
+    own.particles.push_back({{x, y, wrap_angle(heading)}, 1.0 / static_cast<double>(count)});
+  }
+  own.was_localised = false;
+}
+
+void MonteCarloLocaliser::move(const Pose2& step) {
+  auto& own = *implementation_;
+  for (Particle& particle : own.particles) {
+    particle.pose = particle.pose * sample_step(step, own.odometry, own.random);
+  }
+}
+
+MonteCarloEstimate MonteCarloLocaliser::observe(const PackedSignature& view) {
+  return implementation_->observe(view);
+}
+
+MonteCarloEstimate MonteCarloLocaliser::estimate() const {
+  MonteCarloEstimate estimate = implementation_->latest;
+  implementation_->describe(estimate,
+                            find_modes(implementation_->particles, implementation_->bins()));
+  return estimate;
+}
+
+std::span<const Particle> MonteCarloLocaliser::particles() const noexcept {
+  return implementation_->particles;
+}
+
+const ObservationModel& MonteCarloLocaliser::model() const noexcept {
+  return implementation_->model;
+}
+
+}  // namespace panonav

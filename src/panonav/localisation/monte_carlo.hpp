@@ -1,0 +1,113 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "panonav/core/options.hpp"
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/localisation/observation_model.hpp"
+#include "panonav/localisation/particle_modes.hpp"
+#include "panonav/memory/visual_memory.hpp"
+#include "panonav/motion/odometry.hpp"
+
+namespace panonav {
+
+/// Which particles are thrown away at each image, so that a robot that was carried away is found
+/// again, and from where new ones are drawn.
+enum class Redraw {
+  none,         ///< none
+  uniform,      ///< a fixed number, anywhere in the memorised area: the standard way
+  topological,  ///< a fixed share, in the areas of the best matches [M03 section 4.1]
+  explained,    ///< as many as the view is better explained elsewhere than where the particles are
+};
+
+struct MonteCarloOptions {
+  int least_particles = 200;
+  int most_particles = 5000;
+  double kld_error = 0.05;      ///< allowed between the particles' distribution and the true one
+  double resample_below = 0.5;  ///< effective sample size, share of the particles
+  bool compass = true;          ///< the visual compass weighs headings too
+  Redraw redraw = Redraw::explained;
+  double redraw_share = 0.1;  ///< of a topological redraw [M03 section 4.1]
+  int redraw_number = 50;     ///< of a uniform redraw [M03 figure 8]
+  int compared_views = 1000;  ///< compared column by column when no near view explains the picture
+  int seed = 1;
+};
+void visit_options(MonteCarloOptions& options, OptionVisitor& visitor);
+
+enum class LocalisationState {
+  localised,  ///< one mode, no wider than the references' spacing can tell, and it explains the
+              ///< views
+  ambiguous,  ///< the views are of this memory, but several places or a large area explain them
+  lost,       ///< the views are not explained by this memory
+};
+/// "localised", "ambiguous", "lost".
+[[nodiscard]] std::string_view name_of(LocalisationState state);
+
+struct MonteCarloEstimate {
+  LocalisationState state = LocalisationState::lost;
+  /// Heaviest first; all that hold at least 1 % of the weight.
+  std::vector<PoseMode> modes;
+  /// Mean of the heaviest mode; empty when lost.
+  std::optional<Pose2> pose;
+  PoseMode whole;  ///< all particles taken together
+  int particles = 0;
+  double effective_particles = 0.0;  ///< before resampling
+  bool resampled = false;
+  int redrawn = 0;
+  /// How well the view is explained by the references near the particles, and by those anywhere:
+  /// the least difference (`ColumnMatch`) there; empty when none was compared.
+  std::optional<double> difference_here;
+  std::optional<double> difference_anywhere;
+  double log_here = 0.0, log_there = 0.0;
+  std::uint64_t views_compared = 0;  ///< column by column
+};
+
+/// Monte-Carlo localisation over the posed views of a memory [M03 section 4].
+///
+/// A robot that knows nothing of its position finds it within a few images, keeps it where images
+/// are missing or tell nothing, and is found again after it was carried away. In places that look
+/// alike it keeps several modes.
+///
+/// Runs in the calling thread. Same memory, options and calls: same bits.
+class MonteCarloLocaliser {
+ public:
+  /// Starts anywhere in the memorised area, with any heading. The memory must outlive *this and
+  /// must not change. Throws OptionError; ContractError as `learn_observation_model`.
+  explicit MonteCarloLocaliser(const VisualMemory& memory, const MonteCarloOptions& options = {},
+                               const OdometryNoise& odometry = {});
+  /// With a model learnt before.
+  MonteCarloLocaliser(std::shared_ptr<const ColumnRanking> ranking, const ObservationModel& model,
+                      const MonteCarloOptions& options = {}, const OdometryNoise& odometry = {});
+  ~MonteCarloLocaliser();
+  MonteCarloLocaliser(MonteCarloLocaliser&&) noexcept;
+  MonteCarloLocaliser& operator=(MonteCarloLocaliser&&) noexcept;
+
+  /// Forgets everything. `heading_rad`: where it is known.
+  void start_anywhere(std::optional<double> heading_rad = std::nullopt);
+  /// Around a known pose; deviations of each coordinate, >= 0.
+  void start_at(const Pose2& pose, double deviation_m, double heading_deviation_rad);
+
+  /// The robot moved by `robot_old_from_robot_new`, as its odometry says; any number of steps may
+  /// pass between two images.
+  void move(const Pose2& step);
+
+  /// The robot took a picture. Throws ContractError on a signature of another shape than the
+  /// memory's.
+  MonteCarloEstimate observe(const PackedSignature& view);
+  /// What is known now, without a picture.
+  [[nodiscard]] MonteCarloEstimate estimate() const;
+
+  [[nodiscard]] std::span<const Particle> particles() const noexcept;
+  [[nodiscard]] const ObservationModel& model() const noexcept;
+
+ private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace panonav

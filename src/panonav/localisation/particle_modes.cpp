@@ -1,0 +1,187 @@
+#include "panonav/localisation/particle_modes.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+#include <unordered_map>
+
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr int reach = 2;  // bins beside the heaviest one
+
+struct Bin {
+  std::int32_t x, y, heading;
+  double weight;
+  int mode;
+};
+
+// Sums of one mode relative to an anchor, so that nothing is lost far from the origin.
+struct Moments {
+  Pose2 anchor;
+  bool anchored = false;
+  double weight = 0.0;
+  std::array<double, 3> first{};
+  std::array<double, 6> second{};  // xx xy xh yy yh hh
+
+  void add(const Particle& particle) {
+    if (!anchored) {
+      anchor = particle.pose;
+      anchored = true;
+    }
+    const double w = particle.weight;
+    const double x = particle.pose.x_m - anchor.x_m;
+    const double y = particle.pose.y_m - anchor.y_m;
+    const double h = angle_difference(particle.pose.heading_rad, anchor.heading_rad);
+    weight += w;
+    first[0] += w * x;
+    first[1] += w * y;
+    first[2] += w * h;
+    second[0] += w * x * x;
+    second[1] += w * x * y;
+    second[2] += w * x * h;
+    second[3] += w * y * y;
+    second[4] += w * y * h;
+    second[5] += w * h * h;
+  }
+
+  [[nodiscard]] PoseMode mode() const {
+    PoseMode mode;
+    mode.weight = weight;
+    if (!(weight > 0.0)) return mode;
+    const double x = first[0] / weight;
+    const double y = first[1] / weight;
+    const double h = first[2] / weight;
+    mode.mean = {anchor.x_m + x, anchor.y_m + y, wrap_angle(anchor.heading_rad + h)};
+    const double xx = std::max(0.0, second[0] / weight - x * x);
+    const double xy = second[1] / weight - x * y;
+    const double xh = second[2] / weight - x * h;
+    const double yy = std::max(0.0, second[3] / weight - y * y);
+    const double yh = second[4] / weight - y * h;
+    const double hh = std::max(0.0, second[5] / weight - h * h);
+    mode.covariance = {xx, xy, xh, xy, yy, yh, xh, yh, hh};
+    mode.spread_m = std::sqrt(xx + yy);
+    mode.heading_spread_rad = std::sqrt(hh);
+    return mode;
+  }
+};
+
+std::uint64_t key_of(std::int32_t x, std::int32_t y, std::int32_t heading) {
+  return (static_cast<std::uint64_t>(static_cast<std::uint32_t>(x) & 0xFFFFFFU) << 40U) |
+         (static_cast<std::uint64_t>(static_cast<std::uint32_t>(y) & 0xFFFFFFU) << 16U) |
+         static_cast<std::uint64_t>(static_cast<std::uint32_t>(heading) & 0xFFFFU);
+}
+
+}  // namespace
+
+ParticleModes find_modes(std::span<const Particle> particles, const PoseBins& bins,
+                         double least_weight) {
+  require(bins.cell_m > 0.0, "side of a bin", bins.cell_m, "> 0 m");
+  require(bins.headings >= 1, "sectors of the circle", bins.headings, ">= 1");
+  ParticleModes result;
+  result.mode_of.assign(particles.size(), -1);
+
+  std::vector<Bin> cells;
+  std::unordered_map<std::uint64_t, std::uint32_t> index;
+  index.reserve(particles.size());
+  std::vector<std::uint32_t> bin_of(particles.size());
+  const double sectors_per_radian = bins.headings / (2.0 * std::numbers::pi);
+  double sum = 0.0;
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    const Pose2& pose = particles[i].pose;
+    const auto x = static_cast<std::int32_t>(std::floor(pose.x_m / bins.cell_m));
+    const auto y = static_cast<std::int32_t>(std::floor(pose.y_m / bins.cell_m));
+    const auto sector = static_cast<std::int32_t>(
+        std::floor((pose.heading_rad + std::numbers::pi) * sectors_per_radian));
+    const std::int32_t heading = std::clamp(sector, 0, bins.headings - 1);
+    const auto [at, fresh] =
+        index.try_emplace(key_of(x, y, heading), static_cast<std::uint32_t>(cells.size()));
+    if (fresh) cells.push_back({x, y, heading, 0.0, -1});
+    cells[at->second].weight += particles[i].weight;
+    bin_of[i] = at->second;
+    sum += particles[i].weight;
+  }
+  if (!(sum > 0.0)) return result;
+
+  const double share = sum / static_cast<double>(particles.size());
+  for (const Bin& bin : cells) result.occupied_bins += bin.weight >= 0.5 * share ? 1 : 0;
+
+  std::vector<std::uint32_t> order(cells.size());
+  for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::ranges::sort(order, [&](std::uint32_t a, std::uint32_t b) {
+    if (cells[a].weight != cells[b].weight) return cells[a].weight > cells[b].weight;
+    return a < b;
+  });
+  int modes = 0;
+  std::vector<double> weights;
+  for (const std::uint32_t seed : order) {
+    if (cells[seed].mode >= 0) continue;
+    // No later mode can be heavier than all its bins at this weight.
+    constexpr double most_bins = (2 * reach + 1) * (2 * reach + 1) * (2 * reach + 1);
+    if (cells[seed].weight * most_bins < least_weight * sum) break;
+    double weight = 0.0;
+    const std::int32_t turn_reach = bins.headings > 2 * reach ? reach : 0;
+    for (std::int32_t dx = -reach; dx <= reach; ++dx) {
+      for (std::int32_t dy = -reach; dy <= reach; ++dy) {
+        for (std::int32_t dh = -turn_reach; dh <= turn_reach; ++dh) {
+          const std::int32_t heading = (cells[seed].heading + dh + bins.headings) % bins.headings;
+          const auto found = index.find(key_of(cells[seed].x + dx, cells[seed].y + dy, heading));
+          if (found == index.end() || cells[found->second].mode >= 0) continue;
+          cells[found->second].mode = modes;
+          weight += cells[found->second].weight;
+        }
+      }
+    }
+    weights.push_back(weight);
+    ++modes;
+  }
+
+  std::vector<int> ranks(weights.size(), -1);
+  std::vector<int> by_weight;
+  for (int m = 0; m < modes; ++m) {
+    if (weights[static_cast<std::size_t>(m)] >= least_weight * sum) by_weight.push_back(m);
+  }
+  std::ranges::stable_sort(by_weight, std::greater{},
+                           [&](int m) { return weights[static_cast<std::size_t>(m)]; });
+  for (std::size_t r = 0; r < by_weight.size(); ++r) {
+    ranks[static_cast<std::size_t>(by_weight[r])] = static_cast<int>(r);
+  }
+  std::vector<Moments> moments(by_weight.size());
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    const int mode = cells[bin_of[i]].mode;
+    if (mode < 0 || ranks[static_cast<std::size_t>(mode)] < 0) continue;
+    result.mode_of[i] = ranks[static_cast<std::size_t>(mode)];
+    moments[static_cast<std::size_t>(result.mode_of[i])].add(particles[i]);
+  }
+  for (const Moments& m : moments) {
+    result.modes.push_back(m.mode());
+    result.modes.back().weight /= sum;
+  }
+  return result;
+}
+
+PoseMode summarise(std::span<const Particle> particles) {
+  // Headings are measured from their circular mean: an anchor far from it would cut the circle in
+  // the wrong place.
+  double c = 0.0;
+  double s = 0.0;
+  for (const Particle& particle : particles) {
+    c += particle.weight * std::cos(particle.pose.heading_rad);
+    s += particle.weight * std::sin(particle.pose.heading_rad);
+  }
+  Moments moments;
+  if (!particles.empty()) {
+    moments.anchored = true;
+    moments.anchor = particles.front().pose;
+    moments.anchor.heading_rad = std::atan2(s, c);
+  }
+  for (const Particle& particle : particles) moments.add(particle);
+  return moments.mode();
+}
+
+}  // namespace panonav

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "panonav/localisation/column_ranking.hpp"
+#include "panonav/localisation/observation_model.hpp"
+#include "panonav/memory/visual_memory.hpp"
+
+namespace panonav {
+
+/// How well one view fits at any pose, also between references (`ObservationModel`).
+///
+/// The likeness of the view to the references around a pose is correlated with what is expected
+/// there, exp(-distance / range): with amplitude a free, least squares explain
+/// (sum likeness expected)^2 / sum expected^2 of the squared likeness. A heading that differs from
+/// what a reference tells takes that reference's likeness away. References that were not compared
+/// count as unlike.
+class ViewLikelihood {
+ public:
+  /// Over the posed views of the ranking's memory; the ranking must outlive *this. Cost: linear in
+  /// them. `compass` false: headings do not count.
+  ViewLikelihood(const ColumnRanking& ranking, const ObservationModel& model, bool compass);
+
+  /// The position of a posed view.
+  struct Site {
+    ViewId view;
+    float x_m, y_m;
+    float heading_rad;  ///< absolute, of the robot that took the view compared; NaN: not known
+    float likeness;     ///< 0: unlike, or not compared
+    std::uint32_t compared_at;  ///< number of the view that it was compared with
+  };
+
+  /// Forgets the last view. Throws ContractError on a signature of another shape.
+  void begin(const PackedSignature& view);
+  /// Compares the view with a site's reference, unless it was; returns their difference. Cost: 2.5
+  /// microseconds.
+  double compare(std::uint32_t site);
+  [[nodiscard]] bool compared(std::uint32_t site) const noexcept {
+    return sites_[site].compared_at == number_;
+  }
+  [[nodiscard]] std::optional<double> least_difference(std::span<const std::uint32_t> sites) const;
+
+  /// Log-likelihood of the view at a pose, over that of a view which no reference there explains;
+  /// >= 0. Cost: 50 ns.
+  [[nodiscard]] double log_ratio(const Pose2& pose) const noexcept;
+
+  [[nodiscard]] std::span<const Site> sites() const noexcept { return sites_; }
+  /// Nearest sites of a place, 12 at most; empty far from all references.
+  [[nodiscard]] std::span<const std::uint32_t> sites_near(Point2 position) const noexcept;
+  [[nodiscard]] std::optional<std::uint32_t> site_of(ViewId view) const noexcept;
+  /// Compared with the view so far, in the order of comparison.
+  [[nodiscard]] std::span<const std::uint32_t> compared_sites() const noexcept {
+    return compared_sites_;
+  }
+
+ private:
+  struct Cell {
+    std::int32_t x, y;
+    std::uint32_t begin, end;  ///< in `near_`
+  };
+  void index_sites();
+  [[nodiscard]] const Cell* cell_at(Point2 position) const noexcept;
+
+  const ColumnRanking* ranking_;
+  ObservationModel model_;
+  bool compass_;
+  std::vector<Site> sites_;
+  std::vector<float> differences_;
+  std::vector<ColumnProfiles> profiles_;
+  std::vector<ViewId> views_;  ///< of the sites, ascending
+  std::vector<Cell> table_;    ///< open addressing, a power of two
+  std::vector<std::uint32_t> near_;
+  std::vector<std::uint32_t> compared_sites_;
+  std::optional<ColumnProfiles> asked_;
+  std::uint32_t number_ = 0;
+  double cell_m_ = 1.0;
+};
+
+}  // namespace panonav
