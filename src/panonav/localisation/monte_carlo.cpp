@@ -59,6 +59,19 @@ struct MonteCarloLocaliser::Implementation {
   double borrowed_heading() { return particles[random.index(particles.size())].pose.heading_rad; }
 
   void compare_views(const PackedSignature& view);
+  // At a site, as far as the compass tells the heading, else with somebody's heading.
+  Pose2 pose_told_by(std::uint32_t site, double heading_deviation_rad) {
+    const auto& s = likelihood.sites()[site];
+    const double heading =
+        options.compass && !std::isnan(s.heading_rad)
+            ? static_cast<double>(s.heading_rad) +
+                  (heading_deviation_rad > 0.0 ? random.normal(0.0, heading_deviation_rad) : 0.0)
+            : borrowed_heading();
+    return {static_cast<double>(s.x_m), static_cast<double>(s.y_m), wrap_angle(heading)};
+  }
+  double weigh();
+  void resample(std::size_t count, bool spread);
+  int redraw_explained(double log_here);
   int redraw_fixed(const PackedSignature& view);
   MonteCarloEstimate observe(const PackedSignature& view);
   void describe(MonteCarloEstimate& estimate, const ParticleModes& found) const;
@@ -67,6 +80,10 @@ struct MonteCarloLocaliser::Implementation {
 namespace {
 
 constexpr int searched_views = 16;
+constexpr int most_stages = 6;
+constexpr double most_against = 9.0;  // about 1 : 10 000
+constexpr double hazard = 0.01;
+constexpr double least_redrawn_mass = 1e-4;
 
 }  // namespace
 
@@ -205,14 +222,10 @@ int MonteCarloLocaliser::Implementation::redraw_fixed(const PackedSignature& vie
     } else {
       const auto site = *likelihood.site_of(candidates[random.index(candidates.size())].view);
       likelihood.compare(site);
-      const auto& s = likelihood.sites()[site];
       const double half = 0.5 * model.spacing_m;
-      const double borrowed = borrowed_heading();
-      const double told =
-          static_cast<double>(s.heading_rad) + random.normal(0.0, 0.25 * model.heading_width_rad);
-      particle.pose = {static_cast<double>(s.x_m) + random.uniform(-half, half),
-                       static_cast<double>(s.y_m) + random.uniform(-half, half),
-                       wrap_angle(options.compass && !std::isnan(s.heading_rad) ? told : borrowed)};
+      particle.pose = pose_told_by(site, 0.25 * model.heading_width_rad);
+      particle.pose.x_m += random.uniform(-half, half);
+      particle.pose.y_m += random.uniform(-half, half);
     }
     particle.weight = 1.0 / static_cast<double>(size);
   }
@@ -222,95 +235,167 @@ int MonteCarloLocaliser::Implementation::redraw_fixed(const PackedSignature& vie
   return static_cast<int>(count);
 }
 
+// The share of the log-likelihood, at most `most`, after which the particles' effective number is
+// still a third of them.
+double bearable_share(std::span<const Particle> particles, std::span<const double> log_weights,
+                      double most) {
+  constexpr double least_effective = 1.0 / 3.0;
+  const auto effective = [&](double share) {
+    double sum = 0.0;
+    double squares = 0.0;
+    for (std::size_t i = 0; i < particles.size(); ++i) {
+      const double weight = particles[i].weight * std::exp(share * log_weights[i]);
+      sum += weight;
+      squares += weight * weight;
+    }
+    return sum * sum / squares;
+  };
+  const double wanted = least_effective * static_cast<double>(particles.size());
+  if (effective(most) >= wanted) return most;
+  double low = 0.0;
+  double high = most;
+  for (int i = 0; i < 6; ++i) {
+    const double middle = 0.5 * (low + high);
+    (effective(middle) >= wanted ? low : high) = middle;
+  }
+  return std::max(low, most / 64.0);
+}
+
+// Weighs the particles by the view, in stages when one would leave only few of them: after each
+// stage they are resampled and spread by the kernel that their number and spread call for
+// (progressive correction of a regularised particle filter; Musso, Oudjane and Le Gland 2001).
+// Returns the logarithm of the mean likelihood.
+double MonteCarloLocaliser::Implementation::weigh() {
+  double evidence = 0.0;
+  double left = 1.0;
+  for (int stage = 0; stage < most_stages; ++stage) {
+    log_ratios.resize(particles.size());
+    double most = 0.0;
+    for (std::size_t i = 0; i < particles.size(); ++i) {
+      log_ratios[i] = likelihood.log_ratio(particles[i].pose);
+      most = std::max(most, log_ratios[i]);
+    }
+    for (double& ratio : log_ratios) ratio = ratio - most;
+    const double share =
+        stage + 1 == most_stages ? left : bearable_share(particles, log_ratios, left);
+    double sum = 0.0;
+    for (std::size_t i = 0; i < particles.size(); ++i) {
+      particles[i].weight *= std::exp(share * log_ratios[i]);
+      sum += particles[i].weight;
+    }
+    for (Particle& particle : particles) particle.weight /= sum;
+    evidence += share * most + std::log(sum);
+    left -= share;
+    if (!(left > 1e-9)) break;
+    resample(particles.size(), true);
+  }
+  return evidence;
+}
+
+void MonteCarloLocaliser::Implementation::resample(std::size_t count, bool spread) {
+  std::vector<double> weights;
+  weights.reserve(particles.size());
+  for (const Particle& p : particles) weights.push_back(p.weight);
+  const auto survivors = low_variance_resample(weights, count, random);
+  ParticleModes found;
+  std::vector<std::size_t> members;
+  if (spread) {
+    found = find_modes(particles, bins());
+    members.resize(found.modes.size());
+    for (const std::size_t s : survivors) {
+      if (found.mode_of[s] >= 0) ++members[static_cast<std::size_t>(found.mode_of[s])];
+    }
+  }
+  std::vector<Particle> next;
+  next.reserve(count);
+  for (const std::size_t s : survivors) {
+    Pose2 pose = particles[s].pose;
+    if (spread && found.mode_of[s] >= 0) {
+      // The kernel of least mean squared error for a normal distribution in three dimensions
+      // (Silverman 1986, eq. 4.14 and table 4.1: exponent 1 / (d + 4), factor (4 / (d + 2))).
+      const auto m = static_cast<std::size_t>(found.mode_of[s]);
+      const PoseMode& mode = found.modes[m];
+      const double width =
+          std::pow(0.8 / static_cast<double>(std::max<std::size_t>(1, members[m])), 1.0 / 7.0);
+      pose.x_m += random.normal(0.0, width * std::sqrt(mode.covariance[0]));
+      pose.y_m += random.normal(0.0, width * std::sqrt(mode.covariance[4]));
+      pose.heading_rad =
+          wrap_angle(pose.heading_rad + random.normal(0.0, width * std::sqrt(mode.covariance[8])));
+    }
+    next.push_back({pose, 1.0 / static_cast<double>(count)});
+  }
+  particles = std::move(next);
+}
+
+// New particles where the view is explained, with the share of the weight that their evidence
+// earns them.
+int MonteCarloLocaliser::Implementation::redraw_explained(double log_here) {
+  const auto sites = likelihood.sites();
+  std::vector<std::uint32_t> places;
+  std::vector<double> values;
+  double most = 0.0;
+  for (const std::uint32_t s : likelihood.compared_sites()) {
+    places.push_back(s);
+    values.push_back(likelihood.log_ratio(pose_told_by(s, 0.0)));
+    most = std::max(most, values.back());
+  }
+  if (places.empty()) return 0;
+  double sum = 0.0;
+  for (double& value : values) {
+    value = std::exp(value - most);
+    sum += value;
+  }
+  const double log_there =
+      most + std::log(sum / static_cast<double>(sites.size())) +
+      (options.compass ? std::log(model.heading_width_rad / std::numbers::pi) : 0.0);
+  latest.log_there = log_there;
+  const double odds =
+      hazard / (1.0 - hazard) * std::exp(std::clamp(log_there - log_here, -50.0, 50.0));
+  const double mass = odds / (1.0 + odds);
+  if (mass < least_redrawn_mass) return 0;
+
+  const auto size = static_cast<double>(particles.size());
+  const auto count =
+      static_cast<std::size_t>(std::max(1L, std::lround(std::max(0.05, 0.5 * mass) * size)));
+  std::vector<Particle> fresh;
+  double fresh_sum = 0.0;
+  for (const std::size_t d : low_variance_resample(values, count, random)) {
+    Pose2 pose = pose_told_by(places[d], 0.25 * model.heading_width_rad);
+    pose.x_m += random.normal(0.0, 0.4 * model.spacing_m);
+    pose.y_m += random.normal(0.0, 0.4 * model.spacing_m);
+    const double weight =
+        std::exp(std::max(likelihood.log_ratio(pose) - most, -most_against)) / values[d];
+    fresh.push_back({pose, weight});
+    fresh_sum += weight;
+  }
+  // They take the places of the lightest particles.
+  std::vector<std::size_t> order(particles.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  const auto lightest = order.begin() + static_cast<std::ptrdiff_t>(fresh.size());
+  std::nth_element(order.begin(), lightest, order.end(), [&](std::size_t a, std::size_t b) {
+    return particles[a].weight != particles[b].weight ? particles[a].weight < particles[b].weight
+                                                      : a < b;
+  });
+  for (std::size_t n = 0; n < fresh.size(); ++n) {
+    particles[order[n]] = {fresh[n].pose, 0.0};
+  }
+  double kept = 0.0;
+  for (const Particle& p : particles) kept += p.weight;
+  for (Particle& p : particles) p.weight *= (1.0 - mass) / kept;
+  for (std::size_t n = 0; n < fresh.size(); ++n) {
+    particles[order[n]].weight = mass * fresh[n].weight / fresh_sum;
+  }
+  return static_cast<int>(fresh.size());
+}
+
 MonteCarloEstimate MonteCarloLocaliser::Implementation::observe(const PackedSignature& view) {
   latest = {};
   compare_views(view);
-  latest.redrawn = redraw_fixed(view);
-
-  const auto sites = likelihood.sites();
-  log_ratios.resize(particles.size());
-  double most = 0.0;
-  for (std::size_t i = 0; i < particles.size(); ++i) {
-    log_ratios[i] = likelihood.log_ratio(particles[i].pose);
-    most = std::max(most, log_ratios[i]);
+  if (options.redraw == Redraw::uniform || options.redraw == Redraw::topological) {
+    latest.redrawn = redraw_fixed(view);
   }
-  // Evidence of the view where the particles are, and anywhere in the memory.
-  double here = 0.0;
-  for (std::size_t i = 0; i < particles.size(); ++i) {
-    here += particles[i].weight * std::exp(log_ratios[i] - most);
-  }
-  const double log_here = most + std::log(here);
-
-  std::vector<std::pair<std::uint32_t, double>> places;
-  double most_there = 0.0;
-  for (const std::uint32_t s : likelihood.compared_sites()) {
-    const bool directed = options.compass && !std::isnan(sites[s].heading_rad);
-    const Pose2 pose{static_cast<double>(sites[s].x_m), static_cast<double>(sites[s].y_m),
-                     directed ? static_cast<double>(sites[s].heading_rad) : 0.0};
-    places.emplace_back(s, likelihood.log_ratio(pose));
-    most_there = std::max(most_there, places.back().second);
-  }
-  double there = 0.0;
-  for (auto& [site, value] : places) {
-    value = std::exp(value - most_there);
-    there += value;
-  }
-  const double log_there =
-      most_there + std::log(there / static_cast<double>(sites.size())) +
-      (options.compass ? std::log(model.heading_width_rad / std::numbers::pi) : 0.0);
-  latest.log_here = log_here;
-  latest.log_there = log_there;
-
-  double sum = 0.0;
-  for (std::size_t i = 0; i < particles.size(); ++i) {
-    particles[i].weight *= std::exp(log_ratios[i] - most) + 1e-4;
-    sum += particles[i].weight;
-  }
-  for (Particle& particle : particles) particle.weight /= sum;
-
-  if (options.redraw == Redraw::explained && !places.empty()) {
-    constexpr double hazard = 0.01;
-    const double odds = hazard / (1.0 - hazard) * std::exp(std::min(50.0, log_there - log_here));
-    const double mass = odds / (1.0 + odds);
-    const auto size = static_cast<double>(particles.size());
-    if (mass > 1e-4) {
-      const auto count = static_cast<std::size_t>(
-          std::max(std::lround(0.05 * size), std::lround(0.5 * mass * size)));
-      std::vector<double> weights;
-      for (const auto& [site, value] : places) weights.push_back(value);
-      const auto drawn = low_variance_resample(weights, count, random);
-      std::vector<Particle> fresh;
-      double fresh_sum = 0.0;
-      for (const std::size_t d : drawn) {
-        const auto& s = sites[places[d].first];
-        const double borrowed = borrowed_heading();
-        const double told =
-            static_cast<double>(s.heading_rad) + random.normal(0.0, 0.25 * model.heading_width_rad);
-        Pose2 pose{static_cast<double>(s.x_m) + random.normal(0.0, 0.4 * model.spacing_m),
-                   static_cast<double>(s.y_m) + random.normal(0.0, 0.4 * model.spacing_m),
-                   wrap_angle(options.compass && !std::isnan(s.heading_rad) ? told : borrowed)};
-        const double weight =
-            std::exp(likelihood.log_ratio(pose) - most_there) / places[d].second + 1e-12;
-        fresh.push_back({pose, weight});
-        fresh_sum += weight;
-      }
-      // They take the places of the lightest particles.
-      std::vector<std::size_t> order(particles.size());
-      for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-      std::ranges::sort(order, {},
-                        [&](std::size_t i) { return std::pair(particles[i].weight, i); });
-      double lost = 0.0;
-      for (std::size_t n = 0; n < fresh.size(); ++n) lost += particles[order[n]].weight;
-      for (Particle& p : particles) p.weight *= (1.0 - mass) / std::max(1e-9, 1.0 - lost);
-      for (std::size_t n = 0; n < fresh.size(); ++n) {
-        particles[order[n]] = {fresh[n].pose, mass * fresh[n].weight / fresh_sum};
-      }
-      latest.redrawn = static_cast<int>(fresh.size());
-      sum = 0.0;
-      for (const Particle& p : particles) sum += p.weight;
-      for (Particle& p : particles) p.weight /= sum;
-    }
-  }
+  latest.log_here = weigh();
+  if (options.redraw == Redraw::explained) latest.redrawn = redraw_explained(latest.log_here);
 
   const ParticleModes found = find_modes(particles, bins());
   latest.particles = static_cast<int>(particles.size());
@@ -318,19 +403,12 @@ MonteCarloEstimate MonteCarloLocaliser::Implementation::observe(const PackedSign
   for (const Particle& p : particles) weights.push_back(p.weight);
   latest.effective_particles = effective_sample_size(weights);
   describe(latest, found);
-
-  const std::size_t wanted = std::clamp(kld_sample_size(found.occupied_bins, options.kld_error),
-                                        static_cast<std::size_t>(options.least_particles),
-                                        static_cast<std::size_t>(options.most_particles));
   if (latest.effective_particles < options.resample_below * static_cast<double>(weights.size())) {
     latest.resampled = true;
-    const auto survivors = low_variance_resample(weights, wanted, random);
-    std::vector<Particle> next;
-    next.reserve(wanted);
-    for (const std::size_t s : survivors) {
-      next.push_back({particles[s].pose, 1.0 / static_cast<double>(wanted)});
-    }
-    particles = std::move(next);
+    resample(std::clamp(kld_sample_size(found.occupied_bins, options.kld_error),
+                        static_cast<std::size_t>(options.least_particles),
+                        static_cast<std::size_t>(options.most_particles)),
+             false);
   }
   return latest;
 }

@@ -1,6 +1,7 @@
 #include "panonav/localisation/observation_model.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -23,6 +24,8 @@ namespace {
 constexpr std::size_t near_sites = 12;  // as many as decide a likelihood
 constexpr double far_spacings = 6.0;
 constexpr double fitted_spacings = 4.0;
+constexpr double least_range_spacings = 0.4;
+constexpr double most_range_spacings = 20.0;
 // Beyond this no view is told apart better, and one odd view would count for all others.
 constexpr double most_log_likelihood = 50.0;
 // Columns tell turns in steps; three of them are what a neighbouring view may be off by.
@@ -82,41 +85,37 @@ class LeftOutView {
   std::vector<std::optional<ColumnMatch>> matches_;
 };
 
+// Negative for views more unlike than views far from each other are on average.
 double likeness_of(const ColumnMatch& match, double far) {
-  return std::max(0.0, far * far - match.difference * match.difference);
+  return far * far - match.difference * match.difference;
 }
 
-// Slope of log mean likeness over distance. A bin that has fallen to a tenth of what views far from
-// each other could lose says nothing but noise.
+// Slope of the logarithm of the mean likeness over distance. At no distance a view is like itself,
+// so the line starts at far^2. Bins that have fallen to a twentieth of that say nothing but noise.
 double fit_range(std::span<const std::pair<double, double>> distance_and_likeness, double spacing_m,
                  double far) {
-  constexpr int bins = static_cast<int>(2 * fitted_spacings);
-  std::vector<double> distances(bins), likenesses(bins), counts(bins);
+  constexpr auto bins = static_cast<std::size_t>(2.0 * fitted_spacings);
+  std::array<double, bins> distances{}, likenesses{}, counts{};
   for (const auto& [distance_m, likeness] : distance_and_likeness) {
     const auto bin = static_cast<std::size_t>(2.0 * distance_m / spacing_m);
-    if (bin >= static_cast<std::size_t>(bins)) continue;
+    if (bin >= bins) continue;
     distances[bin] += distance_m;
     likenesses[bin] += likeness;
     counts[bin] += 1.0;
   }
-  double n = 0.0, x = 0.0, y = 0.0, xx = 0.0, xy = 0.0;
-  for (std::size_t b = 0; b < distances.size(); ++b) {
-    if (!(counts[b] > 0.0) || likenesses[b] < 0.1 * far * far * counts[b]) continue;
-    const double r = distances[b] / counts[b];
-    const double l = std::log(likenesses[b] / counts[b]);
-    n += counts[b];
-    x += counts[b] * r;
-    y += counts[b] * l;
-    xx += counts[b] * r * r;
-    xy += counts[b] * r * l;
+  double product = 0.0;
+  double square = 0.0;
+  for (std::size_t b = 0; b < bins; ++b) {
+    if (!(likenesses[b] > 0.05 * far * far * counts[b])) continue;
+    const double distance_m = distances[b] / counts[b];
+    product -= counts[b] * distance_m * std::log(likenesses[b] / (counts[b] * far * far));
+    square += counts[b] * distance_m * distance_m;
   }
-  const double spread = n * xx - x * x;
-  const double slope = spread > 0.0 ? (n * xy - x * y) / spread : 0.0;
-  const double shortest = 0.5 * spacing_m;
-  const double longest = 20.0 * spacing_m;
-  // Too few distances, or views that do not change: the spacing is all that is known.
-  if (!(slope < 0.0)) return n > 0.0 && spread > 0.0 ? longest : 1.5 * spacing_m;
-  return std::clamp(-1.0 / slope, shortest, longest);
+  // Nothing like a view beside it: what is known is that the range is no longer than that.
+  if (!(square > 0.0)) return least_range_spacings * spacing_m;
+  if (!(product > 0.0)) return most_range_spacings * spacing_m;
+  return std::clamp(square / product, least_range_spacings * spacing_m,
+                    most_range_spacings * spacing_m);
 }
 
 /// Squared likeness explained at each candidate place, the view's own one first.
@@ -189,7 +188,6 @@ ObservationModel learn_observation_model(const ColumnRanking& ranking,
   const auto seed = static_cast<std::uint64_t>(options.seed);
   const PlaceModel place = learn_place_model(ranking, {.seed = options.seed});
   model.explained_difference = place.threshold;
-  model.neighbouring_difference = place.neighbouring;
 
   const std::vector<ViewId> sampled = sample_views(views, options.sampled_views, seed);
   model.sampled_views = static_cast<int>(sampled.size());
@@ -237,10 +235,15 @@ ObservationModel learn_observation_model(const ColumnRanking& ranking,
     }
   }
   model.range_m = fit_range(curve, model.spacing_m, model.far_difference);
+  model.neighbouring_difference =
+      model.far_difference * std::sqrt(1.0 - std::exp(-model.spacing_m / model.range_m));
   model.heading_width_rad = least_heading_width_rad;
   if (!turns.empty()) {
-    model.heading_width_rad =
-        std::clamp(quantile(turns, 0.95), least_heading_width_rad, std::numbers::pi / 4);
+    // Three median errors; turns at which the columns fit by chance or by symmetry are no errors.
+    std::erase_if(turns, [](double turn) { return turn > std::numbers::pi / 4; });
+    if (!turns.empty()) {
+      model.heading_width_rad = std::max(3.0 * quantile(turns, 0.5), least_heading_width_rad);
+    }
   }
 
   std::vector<std::vector<std::uint32_t>> near(sites.size());
@@ -258,7 +261,8 @@ ObservationModel learn_observation_model(const ColumnRanking& ranking,
         const double expected =
             std::exp(-distance(sites[s].position, sites[where].position) / model.range_m);
         square += expected * expected;
-        product += expected * likeness_of(left_out[i].match(s), model.far_difference);
+        product +=
+            expected * std::max(0.0, likeness_of(left_out[i].match(s), model.far_difference));
       }
       return square > 0.0 ? product * product / square : 0.0;
     };

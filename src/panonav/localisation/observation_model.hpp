@@ -35,7 +35,7 @@ struct ObservationModel {
   double heading_width_rad = 0.0;        ///< headings farther off than this do not explain a view
   double explained_difference = 0.5;     ///< a view of the memory's places differs by less from the
                                          ///< best reference (`PlaceModel::threshold`)
-  double neighbouring_difference = 0.4;  ///< median of a view to the one most alike (`PlaceModel`)
+  double neighbouring_difference = 0.4;  ///< expected between references one spacing apart
   int sampled_views = 0;
 };
 

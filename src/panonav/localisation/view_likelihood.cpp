@@ -15,7 +15,10 @@ namespace panonav {
 namespace {
 
 constexpr std::size_t most_near = 12;  // a grid's square and the ring around it
-constexpr double near_spacings = 1.5;  // more than the diagonal of a grid's square
+constexpr double near_spacings = 2.0;  // beyond the border of the references too, twelve are near
+
+// Mean distance of a place in a square of a grid from the nearest corner.
+constexpr double nearest_spacings = 0.3826;
 
 std::uint32_t hash_of(std::int32_t x, std::int32_t y) {
   auto h = static_cast<std::uint64_t>(static_cast<std::uint32_t>(x)) << 32U |
@@ -128,6 +131,8 @@ void ViewLikelihood::begin(const PackedSignature& view) {
           to_text(shape.rows) + " with " + to_text(shape.components) + " components");
   asked_.emplace(view, ranking_->components());
   compared_sites_.clear();
+  most_likeness_ = 0.0;
+  blur_square_m2_ = 0.0F;
   ++number_;
 }
 
@@ -138,6 +143,12 @@ double ViewLikelihood::compare(std::uint32_t site) {
   const double far = model_.far_difference;
   s.compared_at = number_;
   s.likeness = static_cast<float>(std::max(0.0, far * far - match.difference * match.difference));
+  if (static_cast<double>(s.likeness) > most_likeness_) {
+    most_likeness_ = static_cast<double>(s.likeness);
+    const double apart_m = model_.range_m * std::log(far * far / most_likeness_);
+    const double nearest_m = nearest_spacings * model_.spacing_m;
+    blur_square_m2_ = static_cast<float>(std::max(0.0, apart_m * apart_m - nearest_m * nearest_m));
+  }
   const auto& heading = ranking_->memory().info(s.view).pose->heading_rad;
   s.heading_rad = heading ? static_cast<float>(*heading + match.heading_rad)
                           : std::numeric_limits<float>::quiet_NaN();
@@ -171,7 +182,7 @@ double ViewLikelihood::log_ratio(const Pose2& pose) const noexcept {
     const Site& s = sites_[near_[i]];
     const float dx = s.x_m - x;
     const float dy = s.y_m - y;
-    const float expected = decay(std::sqrt(dx * dx + dy * dy) * per_metre);
+    const float expected = decay(std::sqrt(dx * dx + dy * dy + blur_square_m2_) * per_metre);
     square += expected * expected;
     if (s.compared_at != number_ || !(s.likeness > 0.0F)) continue;
     float likeness = s.likeness;

@@ -76,6 +76,8 @@ class ViewLikelihood {
   std::vector<std::uint32_t> near_;
   std::vector<std::uint32_t> compared_sites_;
   std::optional<ColumnProfiles> asked_;
+  double most_likeness_ = 0.0;
+  float blur_square_m2_ = 0.0F;
   std::uint32_t number_ = 0;
   double cell_m_ = 1.0;
 };
