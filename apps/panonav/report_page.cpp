@@ -17,6 +17,7 @@ h1 { font-size: 1.9rem; margin: 1.5rem 0 .3rem; }
 h2 { font-size: 1.3rem; margin: 2.5rem 0 .5rem; padding-top: .8rem; border-top: 1px solid var(--line); }
 p { max-width: 48rem; }
 .lead { font-size: 1.1rem; }
+.link { font-size: 1.1rem; font-weight: 600; }
 .figures { display: flex; flex-wrap: wrap; gap: 1rem; margin: 1.2rem 0; }
 .figures div { background: var(--soft); border-radius: .5rem; padding: .7rem 1.1rem; min-width: 8rem; }
 .figures b { display: block; font-size: 1.5rem; color: var(--accent); }
@@ -108,6 +109,10 @@ void ReportPage::pictures(const std::vector<ReportPicture>& pictures) {
              "</figure>\n";
   }
   body_ += "</div>\n";
+}
+
+void ReportPage::link(std::string_view file, std::string_view text) {
+  body_ += "<p class=\"link\"><a href=\"" + escaped(file) + "\">" + escaped(text) + "</a></p>\n";
 }
 
 void ReportPage::commands(const std::vector<std::string>& command_lines) {

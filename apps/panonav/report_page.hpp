@@ -29,6 +29,8 @@ class ReportPage {
              const std::vector<std::vector<std::string>>& rows);
   /// Side by side where the window is wide enough.
   void pictures(const std::vector<ReportPicture>& pictures);
+  /// A file beside the page to open: "track.html" "Play the run".
+  void link(std::string_view file, std::string_view text);
   /// Command lines as typed.
   void commands(const std::vector<std::string>& command_lines);
 

@@ -18,6 +18,7 @@ namespace panonav::command {
 [[nodiscard]] Verb memorise_verb();
 [[nodiscard]] Verb reproduce_verb();
 [[nodiscard]] Verb simulate_verb();
+[[nodiscard]] Verb track_verb();
 [[nodiscard]] Verb unwrap_verb();
 [[nodiscard]] Verb verify_verb();
 

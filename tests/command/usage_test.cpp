@@ -12,7 +12,7 @@ std::vector<std::string> verbs() {
 #ifdef PANONAV_COMMAND_SIMULATES
       "simulate",  "demo",   "reproduce", "evaluate",
 #endif
-      "calibrate", "unwrap", "memorise",  "info",     "verify", "forget", "localise"};
+      "calibrate", "unwrap", "memorise",  "info",     "verify", "forget", "localise", "track"};
 }
 
 TEST(Usage, VersionAndHelpGoToStandardOutput) {

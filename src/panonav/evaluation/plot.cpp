@@ -169,10 +169,14 @@ std::string map_text(const MapPlot& map, const std::string& prefix) {
         take_label(!layer.filled_polygons.empty()));
     add(name + "lines", polygons_text(layer.lines, false), "with lines lw 2" + colour,
         take_label(!layer.lines.empty()));
+    add(name + "dots", points_text(layer.dots), "with points pt 7 ps 0.35" + colour,
+        take_label(!layer.dots.empty()));
     add(name + "circles", points_text(layer.circles), "with points pt 6 ps 0.8" + colour,
         take_label(!layer.circles.empty()));
     add(name + "crosses", points_text(layer.crosses), "with points pt 2 ps 1.6 lw 3" + colour,
         take_label(!layer.crosses.empty()));
+    add(name + "squares", points_text(layer.squares), "with points pt 5 ps 1.3" + colour,
+        take_label(!layer.squares.empty()));
   }
   std::ostringstream text;
   text << blocks.str() << "set title " << quoted(map.title) << "\n"
@@ -200,6 +204,8 @@ struct Bounds {
     for (const auto& layer : map.layers) {
       include(layer.circles);
       include(layer.crosses);
+      include(layer.dots);
+      include(layer.squares);
       for (const auto& line : layer.lines) include(line);
       for (const auto& polygon : layer.filled_polygons) include(polygon);
     }

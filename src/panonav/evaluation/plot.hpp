@@ -56,6 +56,8 @@ struct MapLayer {
   std::vector<Point2> crosses;
   std::vector<std::vector<Point2>> lines;
   std::vector<std::vector<Point2>> filled_polygons;
+  std::vector<Point2> dots;  ///< small ones, for many points
+  std::vector<Point2> squares;
 };
 struct MapPlot {
   std::string title;

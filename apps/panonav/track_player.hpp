@@ -1,0 +1,167 @@
+#pragma once
+
+#include <string_view>
+
+namespace panonav::command {
+
+/// The page that plays a run, up to its script element. The script draws what `run` holds.
+inline constexpr std::string_view track_player_head = R"(<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>panonav track: the run, image by image</title>
+<style>
+:root { color-scheme: light dark; }
+body { font: 16px/1.5 system-ui, sans-serif; margin: 0 auto; max-width: 62rem; padding: 1rem 1.5rem 3rem; }
+h1 { font-size: 1.5rem; margin: .5rem 0; }
+canvas { width: 100%; background: #fff; border: 1px solid #8884; border-radius: .3rem; display: block; }
+.controls { display: flex; gap: .8rem; align-items: center; margin: .8rem 0; flex-wrap: wrap; }
+.controls input[type=range] { flex: 1 1 16rem; }
+button, select { font: inherit; padding: .2rem .8rem; }
+#state { font-weight: 700; padding: .1rem .6rem; border-radius: .3rem; color: #fff; }
+#said { margin: .3rem 0; min-height: 1.6em; font-variant-numeric: tabular-nums; }
+.legend { display: flex; flex-wrap: wrap; gap: .3rem 1.4rem; font-size: .92rem; margin-top: .6rem; }
+.legend svg { vertical-align: -2px; margin-right: .35rem; background: #fff; }
+</style>
+</head>
+<body>
+<h1>The run, image by image</h1>
+<p id="said"><span id="state"></span> <span id="text"></span></p>
+<canvas id="map"></canvas>
+<div class="controls">
+<button id="play">Play</button>
+<input id="slider" type="range" min="0" value="0" aria-label="image">
+<label>speed <select id="speed"><option value="1000">1 image/s</option>
+<option value="400" selected>2.5 images/s</option><option value="100">10 images/s</option></select></label>
+</div>
+<div class="legend">
+<span><svg width="14" height="14"><circle cx="7" cy="7" r="4" fill="none" stroke="#999"/></svg>remembered views</span>
+<span><svg width="14" height="14"><circle cx="7" cy="7" r="2.5" fill="#e0201b"/></svg>particles: where the robot may be</span>
+<span><svg width="14" height="14"><rect x="2" y="2" width="10" height="10"/></svg>estimate, with its heading (hollow: a guess among several)</span>
+<span><svg width="20" height="14"><path d="M0 7H20" stroke="#000" stroke-width="2"/></svg>estimated path</span>
+<span id="truth-legend"><svg width="20" height="14"><path d="M0 7H20" stroke="#1f5fd0" stroke-width="2"/></svg>true path; ring: true place</span>
+</div>
+)";
+
+inline constexpr std::string_view track_player_script = R"JS(
+const canvas = document.getElementById('map'), context = canvas.getContext('2d');
+const slider = document.getElementById('slider'), button = document.getElementById('play');
+const images = run.images;
+const stateColours = { localised: '#1a7f37', ambiguous: '#b35900', lost: '#c0201b' };
+slider.max = images.length - 1;
+
+// What is sure to be seen: references, true path, localised places.
+const bounds = { left: Infinity, right: -Infinity, low: Infinity, high: -Infinity };
+function include(point) {
+  bounds.left = Math.min(bounds.left, point[0]); bounds.right = Math.max(bounds.right, point[0]);
+  bounds.low = Math.min(bounds.low, point[1]); bounds.high = Math.max(bounds.high, point[1]);
+}
+run.references.forEach(include);
+for (const image of images) {
+  if (image.truth) include(image.truth);
+  if (image.pose && image.state === 'localised') include(image.pose);
+}
+const margin = Math.max(run.spacing, 0.1);
+bounds.left -= margin; bounds.right += margin; bounds.low -= margin; bounds.high += margin;
+
+let scale = 1, shownWidth = 1, shownHeight = 1;
+function fit() {
+  const ratio = window.devicePixelRatio || 1;
+  const wide = bounds.right - bounds.left, tall = bounds.high - bounds.low;
+  shownWidth = canvas.clientWidth;
+  scale = Math.min(shownWidth / wide, 0.7 * window.innerHeight / tall);
+  shownHeight = Math.max(1, Math.round(scale * tall));
+  canvas.style.height = shownHeight + 'px';
+  canvas.width = Math.round(shownWidth * ratio); canvas.height = Math.round(shownHeight * ratio);
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+}
+const middle = () => (bounds.left + bounds.right) / 2;
+const px = x => shownWidth / 2 + (x - middle()) * scale;
+const py = y => shownHeight - (y - bounds.low) * scale;
+
+function circle(x, y, radius, fill, stroke, width) {
+  context.beginPath(); context.arc(px(x), py(y), radius, 0, 2 * Math.PI);
+  if (fill) { context.fillStyle = fill; context.fill(); }
+  if (stroke) { context.strokeStyle = stroke; context.lineWidth = width || 1; context.stroke(); }
+}
+function path(points, colour) {  // null interrupts it
+  context.strokeStyle = colour; context.lineWidth = 2; context.beginPath();
+  let pen = false;
+  for (const point of points) {
+    if (!point) { pen = false; continue; }
+    if (pen) context.lineTo(px(point[0]), py(point[1])); else context.moveTo(px(point[0]), py(point[1]));
+    pen = true;
+  }
+  context.stroke();
+}
+function pointer(pose, length, colour) {
+  context.strokeStyle = colour; context.lineWidth = 2.5; context.beginPath();
+  context.moveTo(px(pose[0]), py(pose[1]));
+  context.lineTo(px(pose[0]) + length * Math.cos(pose[2]), py(pose[1]) - length * Math.sin(pose[2]));
+  context.stroke();
+}
+function scaleBar() {
+  const length = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500].find(l => l * scale >= 60) || 1000;
+  context.strokeStyle = context.fillStyle = '#333'; context.lineWidth = 2; context.beginPath();
+  context.moveTo(12, shownHeight - 12); context.lineTo(12 + length * scale, shownHeight - 12); context.stroke();
+  context.font = '13px sans-serif'; context.fillText(length + ' m', 14, shownHeight - 18);
+}
+
+let shown = 0;
+function draw() {
+  const image = images[shown];
+  context.clearRect(0, 0, shownWidth, shownHeight);
+  const referenceRadius = Math.max(1.5, Math.min(5, 0.18 * run.spacing * scale));
+  for (const [x, y] of run.references) circle(x, y, referenceRadius, null, '#999');
+  const past = images.slice(0, shown + 1);
+  path(past.map(i => i.truth), '#1f5fd0');
+  path(past.map(i => i.state === 'localised' ? i.pose : null), '#000');
+  for (let p = 0; p < image.particles.length; p += 2) {
+    circle(image.particles[p], image.particles[p + 1], 2, '#e0201bb0');
+  }
+  if (image.pose) {
+    const x = px(image.pose[0]), y = py(image.pose[1]);
+    pointer(image.pose, 22, '#000');
+    if (image.state === 'localised') { context.fillStyle = '#000'; context.fillRect(x - 6, y - 6, 12, 12); }
+    else { context.strokeStyle = '#000'; context.lineWidth = 2; context.strokeRect(x - 6, y - 6, 12, 12); }
+  }
+  if (image.truth) {
+    circle(image.truth[0], image.truth[1], 10, null, '#1f5fd0', 2.5);
+    if (image.truth.length === 3) {
+      const [x, y, h] = image.truth;
+      context.strokeStyle = '#1f5fd0'; context.lineWidth = 2.5; context.beginPath();
+      context.moveTo(px(x) + 10 * Math.cos(h), py(y) - 10 * Math.sin(h));
+      context.lineTo(px(x) + 22 * Math.cos(h), py(y) - 22 * Math.sin(h)); context.stroke();
+    }
+  }
+  scaleBar();
+  const state = document.getElementById('state');
+  state.textContent = image.state; state.style.background = stateColours[image.state];
+  const said = [`${image.file}, image ${shown + 1} of ${images.length}`];
+  if (image.state === 'localised') said.push(`x ${image.pose[0].toFixed(2)} m, y ${image.pose[1].toFixed(2)} m`);
+  if (image.state === 'localised' && image.error !== null) said.push(`error ${image.error.toFixed(2)} m`);
+  if (image.state === 'ambiguous') said.push(image.modes === 1 ? 'one place, not yet sure' : `${image.modes} places`);
+  said.push(`${image.count} particles` + (image.redrawn > 0 ? `, ${image.redrawn} drawn anew` : ''));
+  document.getElementById('text').textContent = said.join(' \u00b7 ');
+}
+function show(index) { shown = index; slider.value = index; draw(); }
+
+let timer = null;
+function stop() { clearInterval(timer); timer = null; button.textContent = 'Play'; }
+function start() {
+  if (shown === images.length - 1) show(0);
+  button.textContent = 'Pause';
+  timer = setInterval(() => { if (shown < images.length - 1) show(shown + 1); else stop(); },
+                      Number(document.getElementById('speed').value));
+}
+button.onclick = () => timer ? stop() : start();
+document.getElementById('speed').onchange = () => { if (timer) { stop(); start(); } };
+slider.oninput = () => { stop(); show(Number(slider.value)); };
+window.onresize = () => { fit(); draw(); };
+if (!images.some(image => image.truth)) document.getElementById('truth-legend').remove();
+fit();
+draw();
+)JS";
+
+}  // namespace panonav::command

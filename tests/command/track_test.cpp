@@ -1,0 +1,317 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <set>
+
+#include "command_runner.hpp"
+#include "landmark_world.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+
+namespace panonav::testing {
+namespace {
+
+using nlohmann::json;
+
+/// What the table of a run holds besides files and odometry.
+struct RunColumns {
+  bool stamps = true;
+  bool truth = true;
+  bool odometry = true;
+};
+
+/// A circle of 0.6 m around the middle of the 5 x 5 grid.
+std::vector<Pose2> circle_poses(int count) {
+  std::vector<Pose2> poses;
+  for (int i = 0; i < count; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / 40.0;
+    poses.push_back({1.0 + 0.6 * std::cos(angle), 1.0 + 0.6 * std::sin(angle),
+                     wrap_angle(angle + 0.5 * std::numbers::pi)});
+  }
+  return poses;
+}
+
+/// Pictures, and a table whose odometry is the true pose seen from `odometry_from_world`.
+void write_run(const std::filesystem::path& folder, const LandmarkWorld& world,
+               const std::vector<Pose2>& poses, const Pose2& odometry_from_world = {},
+               RunColumns columns = {}) {
+  write_dataset(folder, world, poses);
+  std::ofstream csv(folder / "poses.csv");
+  csv << "file" << (columns.stamps ? ",stamp_s" : "")
+      << (columns.truth ? ",x_m,y_m,heading_deg" : "")
+      << (columns.odometry ? ",odom_x_m,odom_y_m,odom_heading_deg" : "") << '\n';
+  const auto pose_text = [](const Pose2& pose) {
+    return "," + to_text(pose.x_m) + "," + to_text(pose.y_m) + "," +
+           to_text(degrees(pose.heading_rad));
+  };
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    csv << view_name(i);
+    if (columns.stamps) csv << ',' << to_text(0.5 * static_cast<double>(i));
+    if (columns.truth) csv << pose_text(poses[i]);
+    if (columns.odometry) csv << pose_text(odometry_from_world * poses[i]);
+    csv << '\n';
+  }
+}
+
+/// A memory of a 5 x 5 grid and a run through it, made once for all tests of this file.
+class Track : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new TemporaryFolder;
+    world_ = new LandmarkWorld(7);
+    write_dataset(folder_->path() / "grid", *world_, grid_poses(5));
+    write_run(folder_->path() / "run", *world_, circle_poses(count), {3.0, -1.0, 0.7});
+    const auto made = run_panonav({"memorise", *folder_ / "grid", memory()});
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+  }
+  static void TearDownTestSuite() {
+    delete folder_;
+    delete world_;
+  }
+  static constexpr int count = 20;
+  static std::string memory() { return *folder_ / "grid.panonav"; }
+  static std::string run() { return *folder_ / "run"; }
+
+  static std::vector<json> tracked(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"track", memory()});
+    arguments.push_back("--json");
+    const auto result = run_panonav(arguments);
+    EXPECT_LE(result.exit_code, 1) << result.err;
+    std::vector<json> parsed;
+    for (const auto& line : lines(result.out)) parsed.push_back(json::parse(line));
+    return parsed;
+  }
+
+  static TemporaryFolder* folder_;
+  static LandmarkWorld* world_;
+};
+TemporaryFolder* Track::folder_ = nullptr;
+LandmarkWorld* Track::world_ = nullptr;
+
+std::set<std::string> keys_of(const json& object) {
+  std::set<std::string> keys;
+  for (const auto& [key, value] : object.items()) keys.insert(key);
+  return keys;
+}
+
+TEST_F(Track, JsonLinesHaveExactlyTheDocumentedFields) {
+  const auto all = tracked({run()});
+  const auto truth = circle_poses(count);
+  ASSERT_EQ(all.size(), truth.size());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const json& image = all[i];
+    EXPECT_EQ(keys_of(image),
+              (std::set<std::string>{"file", "stamp_s", "state", "pose", "modes", "particles",
+                                     "effective_particles", "resampled", "redrawn",
+                                     "difference_here", "difference_anywhere", "truth"}));
+    EXPECT_EQ(image["file"], view_name(i));
+    EXPECT_EQ(image["stamp_s"], 0.5 * static_cast<double>(i));
+    const std::string state = image["state"];
+    EXPECT_TRUE(state == "localised" || state == "ambiguous" || state == "lost") << state;
+    if (!image["pose"].is_null()) {
+      EXPECT_EQ(keys_of(image["pose"]), (std::set<std::string>{"x_m", "y_m", "heading_rad"}));
+    }
+    EXPECT_NEAR(image["truth"]["x_m"], truth[i].x_m, 1e-12);
+    EXPECT_NEAR(image["truth"]["heading_rad"], truth[i].heading_rad, 1e-12);
+    EXPECT_GE(image["particles"].get<int>(), 1);
+    EXPECT_LE(image["effective_particles"].get<double>(), image["particles"].get<double>() + 1e-6);
+    EXPECT_GE(image["redrawn"].get<int>(), 0);
+    EXPECT_TRUE(image["resampled"].is_boolean());
+    double weight = 0.0;
+    double last = 1.0;
+    for (const auto& mode : image["modes"]) {
+      EXPECT_EQ(keys_of(mode),
+                (std::set<std::string>{"weight", "x_m", "y_m", "heading_rad", "spread_m",
+                                       "heading_spread_rad", "covariance"}));
+      const double own = mode["weight"];
+      EXPECT_LE(own, last);
+      weight += last = own;
+      ASSERT_EQ(mode["covariance"].size(), 9U);
+      EXPECT_EQ(mode["covariance"][1], mode["covariance"][3]);
+      const double variance =
+          mode["covariance"][0].get<double>() + mode["covariance"][4].get<double>();
+      EXPECT_NEAR(variance, std::pow(mode["spread_m"].get<double>(), 2), 1e-9);
+    }
+    EXPECT_LE(weight, 1.0 + 1e-9);
+  }
+}
+
+TEST_F(Track, TheOdometryFrameDoesNotMatter) {
+  write_run(folder_->path() / "other_frame", *world_, circle_poses(count), {-7.0, 20.0, -2.5});
+  const auto one = tracked({run()});
+  const auto other = tracked({*folder_ / "other_frame"});
+  ASSERT_EQ(one.size(), static_cast<std::size_t>(count));
+  ASSERT_EQ(other.size(), one.size());
+  for (std::size_t i = 0; i < one.size(); ++i) {
+    EXPECT_EQ(one[i]["state"], other[i]["state"]);
+    ASSERT_FALSE(one[i]["modes"].empty());
+    ASSERT_FALSE(other[i]["modes"].empty());
+    EXPECT_NEAR(one[i]["modes"][0]["x_m"], other[i]["modes"][0]["x_m"], 1e-6) << i;
+  }
+}
+
+TEST_F(Track, SameOutputOnAnyNumberOfThreads) {
+  const auto one = run_panonav({"track", memory(), run(), "--json", "--threads", "1"});
+  const auto four = run_panonav({"track", memory(), run(), "--json", "--threads", "4"});
+  EXPECT_EQ(lines(one.out).size(), static_cast<std::size_t>(count));
+  EXPECT_EQ(one.out, four.out);
+  const auto other = run_panonav({"track", memory(), run(), "--json", "--seed", "2"});
+  EXPECT_NE(one.out, other.out) << "the seed is without effect";
+}
+
+TEST_F(Track, EveryNthPictureIsLookedAtWithAllOdometryBetween) {
+  const auto all = tracked({run(), "--every", "6"});
+  ASSERT_EQ(all.size(), 4U);
+  for (std::size_t i = 0; i < all.size(); ++i) EXPECT_EQ(all[i]["file"], view_name(6 * i));
+  // Without noise, and from the true start, odometry alone carries the particles along the circle.
+  std::vector<std::string> blind{run(), "--every", "6", "--redraw", "none"};
+  for (const char* noise : {"translation-from-translation", "translation-from-rotation",
+                            "rotation-from-translation", "rotation-from-rotation"}) {
+    blind.insert(blind.end(), {std::string("--odometry-") + noise, "0"});
+  }
+  blind.insert(blind.end(), {"--start-x-m", "1.6", "--start-y-m", "1", "--start-heading-deg", "90",
+                             "--start-deviation-m", "0", "--start-heading-deviation-deg", "0"});
+  for (const auto& image : tracked(blind)) {
+    ASSERT_EQ(image["modes"].size(), 1U);
+    EXPECT_NEAR(image["modes"][0]["x_m"], image["truth"]["x_m"], 1e-6);
+    EXPECT_NEAR(image["modes"][0]["y_m"], image["truth"]["y_m"], 1e-6);
+    EXPECT_NEAR(angle_difference(image["modes"][0]["heading_rad"], image["truth"]["heading_rad"]),
+                0.0, 1e-6);
+  }
+}
+
+TEST_F(Track, AKnownHeadingAloneLeavesThePlaceOpen) {
+  // No odometry noise in the heading, no compass: all particles keep the heading they start with.
+  const auto all = tracked({run(), "--start-heading-deg", "90", "--redraw", "none", "--compass",
+                            "false", "--odometry-rotation-from-translation", "0",
+                            "--odometry-rotation-from-rotation", "0"});
+  ASSERT_EQ(all.size(), static_cast<std::size_t>(count));
+  for (const auto& image : all) {
+    for (const auto& mode : image["modes"]) {
+      EXPECT_NEAR(angle_difference(mode["heading_rad"], image["truth"]["heading_rad"]), 0.0, 1e-6);
+    }
+  }
+  const json& last = all.back();
+  ASSERT_FALSE(last["modes"].empty());
+  EXPECT_NEAR(last["modes"][0]["x_m"], last["truth"]["x_m"], 0.5);
+  EXPECT_NEAR(last["modes"][0]["y_m"], last["truth"]["y_m"], 0.5);
+}
+
+TEST_F(Track, TextSaysTheSameAsJson) {
+  const auto result = run_panonav({"track", memory(), run()});
+  const auto all = tracked({run()});
+  const auto said = lines(result.out);
+  ASSERT_GT(said.size(), all.size()) << "no summary";
+  std::size_t localised = 0;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const std::string state = all[i]["state"];
+    EXPECT_EQ(said[i].find(view_name(i) + "  " + state), 0U) << said[i];
+    localised += state == "localised" ? 1 : 0;
+  }
+  EXPECT_EQ(said[all.size()].find("localised at " + std::to_string(localised) + " of 20 images"),
+            0U)
+      << said[all.size()];
+  EXPECT_EQ(result.exit_code, localised > 0 ? 0 : 1);
+}
+
+TEST_F(Track, ATrajectoryOfTheLocalisedImages) {
+  const auto tum = *folder_ / "estimate.tum";
+  const auto all = tracked({run(), "--tum", tum});
+  std::ifstream in(tum);
+  ASSERT_TRUE(in);
+  std::vector<double> stamps;
+  for (std::string line; std::getline(in, line);) {
+    if (!line.starts_with("#")) stamps.push_back(std::stod(line));
+  }
+  std::vector<double> expected;
+  for (const auto& image : all) {
+    if (image["state"] == "localised") expected.push_back(image["stamp_s"]);
+  }
+  EXPECT_EQ(stamps, expected);
+}
+
+TEST_F(Track, WithoutStampsATrajectoryCountsPictures) {
+  write_run(folder_->path() / "plain", *world_, circle_poses(4), {},
+            {.stamps = false, .truth = false});
+  const auto tum = *folder_ / "plain.tum";
+  const auto result = run_panonav({"track", memory(), *folder_ / "plain", "--tum", tum, "--json"});
+  EXPECT_LE(result.exit_code, 1) << result.err;
+  ASSERT_EQ(lines(result.err).size(), 1U) << result.err;
+  EXPECT_NE(result.err.find("no column 'stamp_s'"), std::string::npos) << result.err;
+  ASSERT_EQ(lines(result.out).size(), 4U);
+  for (const auto& line : lines(result.out)) {
+    EXPECT_TRUE(json::parse(line)["truth"].is_null());
+    EXPECT_TRUE(json::parse(line)["stamp_s"].is_null());
+  }
+  EXPECT_TRUE(std::filesystem::exists(tum));
+}
+
+TEST_F(Track, StampsThatDoNotGrowMakeNoTrajectory) {
+  write_run(folder_->path() / "back", *world_, circle_poses(3));
+  const auto table = folder_->path() / "back/poses.csv";
+  std::ifstream in(table);
+  std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  in.close();
+  const auto at = text.find(view_name(2) + ",1,");
+  ASSERT_NE(at, std::string::npos) << text;
+  std::ofstream(table) << text.replace(at + view_name(2).size() + 1, 1, "0.5");
+  EXPECT_LE(run_panonav({"track", memory(), *folder_ / "back"}).exit_code, 1);
+  const auto line = refusal({"track", memory(), *folder_ / "back", "--tum", *folder_ / "back.tum"});
+  EXPECT_NE(line.find("stamp_s of " + view_name(2) + " is 0.5"), std::string::npos) << line;
+  EXPECT_FALSE(std::filesystem::exists(*folder_ / "back.tum"));
+}
+
+TEST_F(Track, ARunWithoutOdometryIsRefusedWithTheColumnsThatAreMissing) {
+  const auto line = refusal({"track", memory(), *folder_ / "grid"});
+  for (const char* word : {"grid", "odom_x_m", "odom_y_m", "odom_heading_deg"}) {
+    EXPECT_NE(line.find(word), std::string::npos) << line;
+  }
+}
+
+TEST_F(Track, AMemoryWithTooFewPositionsIsRefusedByName) {
+  const auto small = *folder_ / "small.panonav";
+  write_dataset(folder_->path() / "few", *world_, grid_poses(2));
+  ASSERT_EQ(run_panonav({"memorise", *folder_ / "few", small}).exit_code, 0);
+  const auto line = refusal({"track", small, run()});
+  EXPECT_NE(line.find("small.panonav: holds 4 views with a position; allowed: 8"),
+            std::string::npos)
+      << line;
+  const auto heap = *folder_ / "heap.panonav";
+  write_dataset(folder_->path() / "one_place", *world_,
+                std::vector<Pose2>(9, Pose2{1.0, 1.0, 0.0}));
+  ASSERT_EQ(run_panonav({"memorise", *folder_ / "one_place", heap}).exit_code, 0);
+  EXPECT_NE(refusal({"track", heap, run()}).find("heap.panonav"), std::string::npos);
+}
+
+TEST_F(Track, WrongValuesAreNamedWithTheirRange) {
+  const auto refused = [](std::vector<std::string> more) {
+    more.insert(more.begin(), {"track", memory(), run()});
+    return refusal(more);
+  };
+  EXPECT_NE(refused({"--every", "0"}).find("--every is '0'"), std::string::npos);
+  EXPECT_NE(refused({"--start-x-m", "1"}).find("go together"), std::string::npos);
+  EXPECT_NE(refused({"--start-x-m", "1", "--start-y-m", "1"}).find("--start-heading-deg"),
+            std::string::npos);
+  EXPECT_NE(refused({"--start-heading-deg", "north"}).find("--start-heading-deg is 'north'"),
+            std::string::npos);
+  EXPECT_NE(refused({"--start-deviation-m", "-1"}).find("deviation_m is -1"), std::string::npos);
+  EXPECT_NE(refused({"--start-deviation-m", "1"}).find("go with --start-x-m"), std::string::npos);
+  EXPECT_NE(refused({"--redraw", "sometimes"}).find("redraw"), std::string::npos);
+  EXPECT_NE(refused({"--kld-error", "2"}).find("kld_error is 2"), std::string::npos);
+  EXPECT_NE(refused({"--least-particles", "300", "--most-particles", "200"})
+                .find("--least-particles is 300; allowed: at most"),
+            std::string::npos);
+  EXPECT_NE(refusal({"track", memory(), *folder_ / "nowhere"}).find("nowhere"), std::string::npos);
+  EXPECT_NE(refusal({"track", *folder_ / "no.panonav", run()}).find("no.panonav"),
+            std::string::npos);
+  EXPECT_NE(refused({"--tum", *folder_ / "nowhere/estimate.tum"}).find("estimate.tum"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace panonav::testing
