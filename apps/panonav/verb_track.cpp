@@ -1,7 +1,8 @@
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
 #include "memory_pipeline.hpp"
 #include "panonav/core/error.hpp"
@@ -41,6 +42,9 @@ void visit_options(StartOptions& options, OptionVisitor& visitor) {
                 options.heading_deviation_deg);
 }
 
+/// Of positions that are taken for metres; what lies farther is a mistake.
+constexpr double farthest_m = 1e9;
+
 struct TrackArguments {
   std::string memory;
   std::string dataset;
@@ -68,6 +72,11 @@ void check(const Arguments& arguments, const TrackArguments& wanted) {
         "--start-deviation-m and --start-heading-deviation-deg go with --start-x-m, --start-y-m "
         "and --start-heading-deg");
   }
+  if (x && std::max(std::abs(*wanted.start_x_m), std::abs(*wanted.start_y_m)) > farthest_m) {
+    throw UsageError("--start-x-m and --start-y-m are " + to_text(*wanted.start_x_m) + " and " +
+                     to_text(*wanted.start_y_m) + "; allowed: " + to_text(-farthest_m) + " to " +
+                     to_text(farthest_m));
+  }
   if (wanted.filter.least_particles > wanted.filter.most_particles) {
     throw UsageError("--least-particles is " + std::to_string(wanted.filter.least_particles) +
                      "; allowed: at most --most-particles, which is " +
@@ -82,6 +91,11 @@ Dataset read_run(const std::string& folder) {
       throw FileError(folder,
                       "has no odometry; allowed: a table with the columns 'odom_x_m', 'odom_y_m' "
                       "and 'odom_heading_deg'");
+    }
+    const double largest = std::max(std::abs(entry.odometry->x_m), std::abs(entry.odometry->y_m));
+    if (largest > farthest_m) {
+      throw FileError(folder, "odometry of " + entry.file + " is " + to_text(largest) +
+                                  " m from its origin; allowed: at most " + to_text(farthest_m));
     }
   }
   return run;

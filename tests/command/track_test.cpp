@@ -266,6 +266,22 @@ TEST_F(Track, StampsThatDoNotGrowMakeNoTrajectory) {
   EXPECT_FALSE(std::filesystem::exists(*folder_ / "back.tum"));
 }
 
+TEST_F(Track, PositionsThatCannotBeMetresAreRefused) {
+  auto far = circle_poses(3);
+  far[1].x_m = 1e300;
+  write_run(folder_->path() / "far", *world_, far);
+  const auto line = refusal({"track", memory(), *folder_ / "far"});
+  EXPECT_NE(line.find("odometry of " + view_name(1)), std::string::npos) << line;
+  EXPECT_NE(line.find("at most 1e"), std::string::npos) << line;
+  std::vector<std::string> start{"track", memory(),      run(), "--start-x-m",
+                                 "1e12",  "--start-y-m", "0",   "--start-heading-deg",
+                                 "0"};
+  EXPECT_NE(refusal(start).find("--start-x-m"), std::string::npos);
+  // Far, but possible: no answer and no crash.
+  start[4] = "9e8";
+  EXPECT_LE(run_panonav(start).exit_code, 1);
+}
+
 TEST_F(Track, ARunWithoutOdometryIsRefusedWithTheColumnsThatAreMissing) {
   const auto line = refusal({"track", memory(), *folder_ / "grid"});
   for (const char* word : {"grid", "odom_x_m", "odom_y_m", "odom_heading_deg"}) {

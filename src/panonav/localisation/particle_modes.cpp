@@ -77,6 +77,13 @@ std::uint64_t key_of(std::int32_t x, std::int32_t y, std::int32_t heading) {
          static_cast<std::uint64_t>(static_cast<std::uint32_t>(heading) & 0xFFFFU);
 }
 
+// Particles beyond any map, or at no number, share the outermost bin.
+std::int32_t bin_at(double cells) {
+  constexpr double most = 8e6;  // key_of keeps 24 bits
+  const double cell = std::floor(cells);
+  return static_cast<std::int32_t>(std::abs(cell) < most ? cell : std::copysign(most, cell));
+}
+
 }  // namespace
 
 ParticleModes find_modes(std::span<const Particle> particles, const PoseBins& bins,
@@ -94,10 +101,9 @@ ParticleModes find_modes(std::span<const Particle> particles, const PoseBins& bi
   double sum = 0.0;
   for (std::size_t i = 0; i < particles.size(); ++i) {
     const Pose2& pose = particles[i].pose;
-    const auto x = static_cast<std::int32_t>(std::floor(pose.x_m / bins.cell_m));
-    const auto y = static_cast<std::int32_t>(std::floor(pose.y_m / bins.cell_m));
-    const auto sector = static_cast<std::int32_t>(
-        std::floor((pose.heading_rad + std::numbers::pi) * sectors_per_radian));
+    const auto x = bin_at(pose.x_m / bins.cell_m);
+    const auto y = bin_at(pose.y_m / bins.cell_m);
+    const auto sector = bin_at((pose.heading_rad + std::numbers::pi) * sectors_per_radian);
     const std::int32_t heading = std::clamp(sector, 0, bins.headings - 1);
     const auto [at, fresh] =
         index.try_emplace(key_of(x, y, heading), static_cast<std::uint32_t>(cells.size()));
