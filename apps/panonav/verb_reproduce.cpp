@@ -1,4 +1,6 @@
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
 #include <memory>
 #include <vector>
 
@@ -21,7 +23,15 @@ struct ReproduceArguments {
   std::optional<std::uint64_t> seed;
   std::optional<int> scenes;
   std::optional<int> queries;
+  std::optional<int> runs;
   std::optional<int> rows;
+  std::optional<std::string> data;
+};
+
+/// What the report says of a paper.
+struct PaperText {
+  std::string title;
+  std::string lead;
 };
 
 std::string shown(double value) {
@@ -41,20 +51,15 @@ std::string shown(const std::optional<std::pair<double, double>>& interval) {
   return low == high ? shown(low) : shown(low) + " .. " + shown(high);
 }
 
-void write_page(const ReproductionOptions& options, const Reproduction& result) {
+void write_page(const std::filesystem::path& out, const PaperText& text,
+                const Reproduction& result) {
   std::size_t judged = 0;
   std::size_t held = 0;
   for (const auto& row : result.rows) {
     judged += row.target ? 1 : 0;
     held += row.target && row.holds() ? 1 : 0;
   }
-  ReportPage page(
-      "The localisation experiments of [M04]",
-      "Menegatti, Maeda, Ishiguro 2004, run on " + std::to_string(options.scenes) +
-          " simulated offices with a 25 cm grid of reference views, " +
-          std::to_string(options.queries) +
-          " questions in each. Published figures beside ours. Few offices and questions "
-          "give wide intervals, and rows may then miss their target by chance.");
+  ReportPage page(text.title, text.lead);
   page.figures({{std::to_string(held) + " of " + std::to_string(judged), "targets hold"},
                 {std::to_string(result.rows.size() - judged), "more figures are reported"}});
   page.section("Published and measured");
@@ -75,33 +80,92 @@ void write_page(const ReproductionOptions& options, const Reproduction& result) 
     pictures.push_back({picture.file.string(), picture.caption});
   }
   page.pictures(pictures);
-  page.write(options.out);
+  page.write(out);
+}
+
+/// The folder with recordings and worlds: as asked for, else where the environment says.
+std::filesystem::path data_folder(const ReproduceArguments& wanted) {
+  if (wanted.data) {
+    if (!std::filesystem::is_directory(*wanted.data)) {
+      throw FileError(*wanted.data, "there is no such folder");
+    }
+    return *wanted.data;
+  }
+  const char* const folder = std::getenv("PANONAV_DATA");
+  return folder == nullptr ? "" : folder;
+}
+
+void refuse(bool given, const std::string& flag, const ReproduceArguments& wanted) {
+  if (given) throw OptionError(flag + " has no meaning for " + wanted.paper);
+}
+
+std::pair<PaperText, Reproduction> run_m04(const ReproduceArguments& wanted, Session& session,
+                                           const ReproductionProgress& progress) {
+  refuse(wanted.runs.has_value(), "--runs", wanted);
+  refuse(wanted.data.has_value(), "--data", wanted);
+  ReproductionOptions options{.out = wanted.out, .seed = wanted.seed.value_or(1)};
+  if (wanted.quick) options = quick_run(options);
+  if (wanted.scenes) {
+    options.scenes = *wanted.scenes;
+    if (options.scenes < 2) {
+      throw OptionError("--scenes is '" + std::to_string(options.scenes) +
+                        "'; allowed for m04: from 2");
+    }
+  }
+  if (wanted.queries) options.queries = *wanted.queries;
+  if (wanted.rows) options.rows = *wanted.rows;
+  const PaperText text{
+      "The localisation experiments of [M04]",
+      "Menegatti, Maeda, Ishiguro 2004, run on " + std::to_string(options.scenes) +
+          " simulated offices with a 25 cm grid of reference views, " +
+          std::to_string(options.queries) +
+          " questions in each. Published figures beside ours. Few offices and questions "
+          "give wide intervals, and rows may then miss their target by chance."};
+  return {text, reproduce_m04(options, session.executor(), progress)};
+}
+
+std::pair<PaperText, Reproduction> run_m03(const ReproduceArguments& wanted, Session& session,
+                                           const ReproductionProgress& progress) {
+  refuse(wanted.queries.has_value(), "--queries", wanted);
+  TrackingReproductionOptions options{.out = wanted.out, .data = data_folder(wanted)};
+  if (wanted.quick) options = quick_run(options);
+  if (wanted.seed) options.seed = *wanted.seed;
+  if (wanted.scenes) options.scenes = *wanted.scenes;
+  if (wanted.runs) options.runs = *wanted.runs;
+  if (wanted.rows) options.rows = *wanted.rows;
+  const PaperText text{
+      "Monte-Carlo localisation: the experiments of [M03]",
+      "Menegatti, Zoccarato, Pagello, Ishiguro 2003, run in " + std::to_string(options.scenes) +
+          " simulated offices with a 25 cm grid of reference views, " +
+          std::to_string(options.variants * options.runs) +
+          " runs in each, and what its authors announced: a corridor of identical doors and "
+          "the open air; Gazebo worlds and recordings where they are at hand. Published figures "
+          "beside ours. Few runs give wide intervals, and rows may then miss their target by "
+          "chance."};
+  return {text, reproduce_m03(options, session.executor(), progress)};
 }
 
 ExitCode reproduce(const ReproduceArguments& wanted, Session& session) {
-  if (wanted.paper != "m04") {
+  if (wanted.paper != "m03" && wanted.paper != "m04") {
     throw OptionError("PAPER is '" + wanted.paper +
-                      "'; allowed: m04 (localisation; m03 f11 s06 y03 are to come)");
+                      "'; allowed: m03 (Monte-Carlo localisation), m04 (localisation); f11 s06 "
+                      "y03 are to come");
   }
   Progress progress("reproduce " + wanted.paper, 100);
   std::size_t shown_percent = 0;
-  ReproductionOptions options{.out = wanted.out, .seed = wanted.seed.value_or(1)};
-  if (wanted.quick) options = quick_run(options);
-  if (wanted.scenes) options.scenes = *wanted.scenes;
-  if (wanted.queries) options.queries = *wanted.queries;
-  if (wanted.rows) options.rows = *wanted.rows;
-  const Reproduction result =
-      reproduce_m04(options, session.executor(), [&](std::string_view, double fraction) {
-        const auto percent = static_cast<std::size_t>(100.0 * fraction);
-        if (percent > shown_percent) progress.advance(percent - shown_percent);
-        shown_percent = std::max(shown_percent, percent);
-      });
+  const ReproductionProgress report = [&](std::string_view, double fraction) {
+    const auto percent = static_cast<std::size_t>(100.0 * fraction);
+    if (percent > shown_percent) progress.advance(percent - shown_percent);
+    shown_percent = std::max(shown_percent, percent);
+  };
+  const auto [text, result] =
+      wanted.paper == "m04" ? run_m04(wanted, session, report) : run_m03(wanted, session, report);
   progress.clear();
   const std::string json = to_json(result.rows);
   const std::filesystem::path out(wanted.out);
   write_file(out / "results.json", json);
   write_file(out / "results.md", to_markdown(result.rows));
-  write_page(options, result);
+  write_page(out, text, result);
   if (session.json()) {
     session.print(json.substr(0, json.size() - 1));
     return ExitCode::done;
@@ -123,18 +187,29 @@ ExitCode reproduce(const ReproduceArguments& wanted, Session& session) {
 
 Run declare(Arguments& arguments) {
   auto wanted = std::make_shared<ReproduceArguments>();
-  arguments.positional("PAPER", wanted->paper, "m04");
+  arguments.positional("PAPER", wanted->paper, "m03 or m04");
   arguments.option("-o,--out", wanted->out, "Folder for the report (default: reproduction)");
-  arguments.flag("--quick", wanted->quick, "A smoke run: two scenes, few queries");
-  arguments.option("--seed", wanted->seed, "First of the scene seeds (default: 1)");
-  const ReproductionOptions full;
-  const auto in_full = [](int value) { return " (default: " + std::to_string(value); };
-  arguments.option("--scenes", wanted->scenes, 2,
-                   "Variants of the scene" + in_full(full.scenes) + "; from 2)");
+  arguments.flag("--quick", wanted->quick, "A smoke run: few scenes, few questions or runs");
+  const ReproductionOptions m04;
+  const TrackingReproductionOptions m03;
+  const auto defaults = [](auto m03_value, auto m04_value) {
+    return " (default: " + std::to_string(m03_value) + " for m03, " + std::to_string(m04_value) +
+           " for m04";
+  };
+  const auto fallback = [](int value) { return " (default: " + std::to_string(value); };
+  arguments.option("--seed", wanted->seed,
+                   "First of the scene seeds" + defaults(m03.seed, m04.seed) + ")");
+  arguments.option("--scenes", wanted->scenes, 1,
+                   "Variants of the office" + defaults(m03.scenes, m04.scenes) + ")");
   arguments.option("--queries", wanted->queries, 1,
-                   "Questions in each" + in_full(full.queries) + "; from 1)");
+                   "m04: questions in each" + fallback(m04.queries) + "; from 1)");
+  arguments.option("--runs", wanted->runs, 2,
+                   "m03: runs in each variant of an office" + fallback(m03.runs) + "; from 2)");
   arguments.option("--rows", wanted->rows, 1,
-                   "Rows of the views" + in_full(full.rows) + "; from 1)");
+                   "Rows of the views" + fallback(m03.rows) + "; from 1)");
+  arguments.option("--data", wanted->data,
+                   "m03: folder with the recordings and Gazebo worlds (default: the environment's "
+                   "PANONAV_DATA; without it they are left out)");
   return [wanted](Session& session) { return reproduce(*wanted, session); };
 }
 
@@ -144,7 +219,7 @@ Verb reproduce_verb() {
   return {"reproduce", "Run the experiments of a paper: published figures beside ours",
           "Writes pictures, results.json, results.md and index.html into the folder. The full run "
           "takes some minutes.",
-          "  panonav reproduce m04\n  panonav reproduce m04 --quick --json -o smoke", declare};
+          "  panonav reproduce m03\n  panonav reproduce m04 --quick --json -o smoke", declare};
 }
 
 }  // namespace panonav::command

@@ -115,7 +115,7 @@ TEST(Reproduce, WritesTheTableThreeTimesAndAllPictures) {
 
 TEST(Reproduce, RefusesBadInput) {
   const TemporaryFolder folder;
-  EXPECT_NE(refusal({"reproduce", "m99", "-o", folder / "x"}).find("PAPER is 'm99'; allowed: m04"),
+  EXPECT_NE(refusal({"reproduce", "m99", "-o", folder / "x"}).find("PAPER is 'm99'; allowed: m03"),
             std::string::npos);
   EXPECT_FALSE(fs::exists(folder / "x"));
   std::ofstream(folder.path() / "file") << "mine";

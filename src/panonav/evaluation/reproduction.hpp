@@ -42,4 +42,29 @@ using ReproductionProgress = std::function<void(std::string_view stage, double f
 [[nodiscard]] Reproduction reproduce_m04(const ReproductionOptions& options, Executor& executor,
                                          const ReproductionProgress& progress = {});
 
+struct TrackingReproductionOptions {
+  std::filesystem::path out;  ///< folder for pictures; made when it is not there
+  int scenes = 10;            ///< variants of the office, >= 1; fewer of the other scenes
+  int variants = 3;           ///< of light and of moved objects in each, >= 1
+  int runs = 4;               ///< in each of those, >= 2
+  int rows = 80;              ///< of the views
+  int columns = 512;          ///< in the office; half as many elsewhere
+  std::uint64_t seed = 601;   ///< of the first scene; the others follow it
+  /// Folder of the recordings and Gazebo worlds (docs/formats.md); empty: these are left out.
+  std::filesystem::path data;
+};
+
+/// The same as a smoke run: one office, few runs.
+[[nodiscard]] TrackingReproductionOptions quick_run(TrackingReproductionOptions options);
+
+/// Monte-Carlo localisation as in [M03] section 4.1 and what its authors only announced: global
+/// localisation, tracking without images, the kidnapped robot, with numbers of particles and
+/// odometry of several kinds; a corridor of identical doors, changing light outdoors, a robot that
+/// leaves the memorised area; Gazebo worlds and real recordings where `data` holds them. Same
+/// options: same rows and pictures on any number of threads. Throws OptionError, ContractError,
+/// FileError.
+[[nodiscard]] Reproduction reproduce_m03(const TrackingReproductionOptions& options,
+                                         Executor& executor,
+                                         const ReproductionProgress& progress = {});
+
 }  // namespace panonav

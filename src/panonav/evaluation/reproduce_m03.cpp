@@ -1,0 +1,59 @@
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+#include "panonav/evaluation/m03_experiments.hpp"
+
+namespace panonav {
+
+TrackingReproductionOptions quick_run(TrackingReproductionOptions options) {
+  options.scenes = 1;
+  options.variants = 2;
+  options.runs = 3;
+  return options;
+}
+
+Reproduction reproduce_m03(const TrackingReproductionOptions& options, Executor& executor,
+                           const ReproductionProgress& progress) {
+  require(options.scenes >= 1, "scenes", options.scenes, ">= 1");
+  require(options.variants >= 1, "variants", options.variants, ">= 1");
+  require(options.runs >= 2, "runs", options.runs, ">= 2");
+  std::error_code error;
+  std::filesystem::create_directories(options.out, error);
+  if (error) throw FileError(options.out.string(), "cannot be made: " + error.message());
+
+  struct Stage {
+    std::string name;
+    double cost;  // relative, for the progress
+    std::function<void()> run;
+  };
+  Reproduction result;
+  std::vector<OfficeRuns> offices;
+  std::vector<Stage> stages;
+  for (int s = 0; s < options.scenes; ++s) {
+    stages.push_back({"office " + std::to_string(s + 1) + " of " + std::to_string(options.scenes),
+                      20.0, [&, s] { offices.push_back(record_office(options, s, executor)); }});
+  }
+  const auto over_offices = [&](const std::string& name, double cost, auto experiment) {
+    stages.push_back({name, cost * options.scenes,
+                      [&, experiment] { experiment(options, offices, executor, result); }});
+  };
+  over_offices("global localisation", 3.0, reproduce_global_localisation);
+  over_offices("position tracking", 1.0, reproduce_position_tracking);
+  over_offices("kidnapped robot", 1.0, reproduce_kidnapping);
+  over_offices("particles and odometry", 10.0, reproduce_tracking_sweeps);
+
+  double all = 0.0;
+  for (const Stage& stage : stages) all += stage.cost;
+  double done = 0.0;
+  for (const Stage& stage : stages) {
+    if (progress) progress(stage.name, done / all);
+    stage.run();
+    done += stage.cost;
+  }
+  if (progress) progress("done", 1.0);
+  return result;
+}
+
+}  // namespace panonav
