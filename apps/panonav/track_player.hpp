@@ -103,6 +103,7 @@ function pointer(pose, length, colour) {
 }
 function scaleBar() {
   const length = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500].find(l => l * scale >= 60) || 1000;
+  context.fillStyle = '#ffffffd0'; context.fillRect(6, shownHeight - 34, length * scale + 12, 30);
   context.strokeStyle = context.fillStyle = '#333'; context.lineWidth = 2; context.beginPath();
   context.moveTo(12, shownHeight - 12); context.lineTo(12 + length * scale, shownHeight - 12); context.stroke();
   context.font = '13px sans-serif'; context.fillText(length + ' m', 14, shownHeight - 18);
