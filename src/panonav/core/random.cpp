@@ -56,9 +56,15 @@ std::uint64_t Random::index(std::uint64_t count) {
 }
 
 double Random::normal() {
-  // Box-Muller without its second value: no state beyond the generator's own.
+  // Without the second value: no state beyond the generator's own.
+  return normal_pair().first;
+}
+
+std::pair<double, double> Random::normal_pair() {
+  // Box and Muller 1958.
   const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform()));
-  return radius * std::cos(2.0 * std::numbers::pi * uniform());
+  const double angle = 2.0 * std::numbers::pi * uniform();
+  return {radius * std::cos(angle), radius * std::sin(angle)};
 }
 
 double Random::normal(double mean, double standard_deviation) {

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <utility>
 
 namespace panonav {
 
@@ -23,6 +24,8 @@ class Random {
   std::uint64_t index(std::uint64_t count);
   /// Normal distribution of mean 0 and standard deviation 1.
   double normal();
+  /// Two independent ones for little more than the price of one; the first is what `normal` gives.
+  std::pair<double, double> normal_pair();
   double normal(double mean, double standard_deviation);
 
  private:

@@ -1,12 +1,18 @@
 #pragma once
 
+#include <numbers>
 #include <optional>
 #include <span>
 
 namespace panonav {
 
 /// The same angle in [-pi, pi). NaN and infinities give NaN.
-[[nodiscard]] double wrap_angle(double angle_rad);
+[[nodiscard]] double wrap_angle_far(double angle_rad);
+[[nodiscard]] inline double wrap_angle(double angle_rad) {
+  // Most angles are already there, and the remainder is slow.
+  if (angle_rad >= -std::numbers::pi && angle_rad < std::numbers::pi) return angle_rad;
+  return wrap_angle_far(angle_rad);
+}
 
 /// The smallest turn from `from_rad` to `to_rad`, in [-pi, pi).
 [[nodiscard]] double angle_difference(double to_rad, double from_rad);

@@ -26,8 +26,9 @@ struct MonteCarloLocaliser::Implementation {
   Random random;
   std::vector<Particle> particles;
   std::vector<double> log_ratios;
-  double outside = 0.5;
-  bool was_localised = false;
+  double travelled_m = 0.0;  // since the last image
+  bool knows_nothing = true;
+  double inside = 0.5;  // belief that the robot is in the memorised area
   MonteCarloEstimate latest;
 
   Implementation(std::shared_ptr<const ColumnRanking> ranking_, const ObservationModel& model_,
@@ -58,7 +59,7 @@ struct MonteCarloLocaliser::Implementation {
   // The heading that a new particle has when no compass tells it: somebody else's.
   double borrowed_heading() { return particles[random.index(particles.size())].pose.heading_rad; }
 
-  void compare_views(const PackedSignature& view);
+  void compare_views(const PackedSignature& view, bool was_localised);
   // At a site, as far as the compass tells the heading, else with somebody's heading.
   Pose2 pose_told_by(std::uint32_t site, double heading_deviation_rad) {
     const auto& s = likelihood.sites()[site];
@@ -80,9 +81,24 @@ struct MonteCarloLocaliser::Implementation {
 namespace {
 
 constexpr int searched_views = 16;
+constexpr int searched_when_localised = 8;
+constexpr std::size_t followed_sites = 256;
+constexpr double least_followed = 1e-3;  // share of the weight near a site
+constexpr std::size_t followed_when_localised = 16;
 constexpr int most_stages = 6;
-constexpr double most_against = 9.0;  // about 1 : 10 000
-constexpr double hazard = 0.01;
+constexpr double least_share = 0.2;
+constexpr double enough_effective = 200.0;  // stand for a mode in three dimensions
+constexpr double most_against = 9.0;        // about 1 : 10 000
+// Chances from one image to the next.
+constexpr double carried_away = 0.01;
+constexpr double leaving = 0.02;
+constexpr double coming_back = 0.1;
+// Log-likelihood ratio that a view of another place reaches by chance; one in a hundred reaches it
+// (docs/decisions.md).
+constexpr double by_chance = 1.0;
+constexpr double most_for = 5.0;
+constexpr double most_for_alike = 2.0;
+constexpr double localised_weight = 0.9;
 constexpr double least_redrawn_mass = 1e-4;
 
 }  // namespace
@@ -139,7 +155,8 @@ std::string_view name_of(LocalisationState state) {
 
 // What is compared column by column: the views that the search finds, those around the best of
 // them, and those around the particles.
-void MonteCarloLocaliser::Implementation::compare_views(const PackedSignature& view) {
+void MonteCarloLocaliser::Implementation::compare_views(const PackedSignature& view,
+                                                        bool was_localised) {
   likelihood.begin(view);
   const auto sites = likelihood.sites();
   const auto compare_found = [&](int count) {
@@ -149,23 +166,10 @@ void MonteCarloLocaliser::Implementation::compare_views(const PackedSignature& v
       if (const auto site = likelihood.site_of(match.view)) likelihood.compare(*site);
     }
   };
-  compare_found(searched_views);
+  compare_found(was_localised ? searched_when_localised : searched_views);
 
-  std::vector<float> mass(sites.size());
-  std::vector<std::uint32_t> carried;
-  for (const Particle& particle : particles) {
-    const auto near = likelihood.sites_near(particle.pose.position());
-    for (const std::uint32_t site : near.first(std::min<std::size_t>(4, near.size()))) {
-      if (mass[site] == 0.0F) carried.push_back(site);
-      mass[site] += static_cast<float>(particle.weight);
-    }
-  }
-  const std::size_t count = std::min<std::size_t>(16, carried.size());
-  std::partial_sort(carried.begin(), carried.begin() + static_cast<std::ptrdiff_t>(count),
-                    carried.end(), [&](std::uint32_t a, std::uint32_t b) {
-                      return mass[a] != mass[b] ? mass[a] > mass[b] : a < b;
-                    });
-  carried.resize(count);
+  const auto carried = likelihood.sites_near_most(
+      particles, was_localised ? followed_when_localised : followed_sites, least_followed);
   for (const std::uint32_t site : carried) likelihood.compare(site);
 
   const auto best_of = [&](std::span<const std::uint32_t> of) {
@@ -180,7 +184,8 @@ void MonteCarloLocaliser::Implementation::compare_views(const PackedSignature& v
   const auto here = likelihood.least_difference(carried);
   const auto anywhere_least = likelihood.least_difference(likelihood.compared_sites());
   const bool held = was_localised && here && anywhere_least && *here <= *anywhere_least;
-  if (!held && anywhere_least && *anywhere_least > model.neighbouring_difference) {
+  if (knows_nothing ||
+      (!held && anywhere_least && *anywhere_least > model.neighbouring_difference)) {
     if (sites.size() <= static_cast<std::size_t>(options.compared_views)) {
       for (std::uint32_t s = 0; s < sites.size(); ++s) likelihood.compare(s);
     } else if (options.compared_views > searched_views) {
@@ -235,11 +240,9 @@ int MonteCarloLocaliser::Implementation::redraw_fixed(const PackedSignature& vie
   return static_cast<int>(count);
 }
 
-// The share of the log-likelihood, at most `most`, after which the particles' effective number is
-// still a third of them.
+// The share of the log-likelihood, at most `most`, after which enough particles still count.
 double bearable_share(std::span<const Particle> particles, std::span<const double> log_weights,
                       double most) {
-  constexpr double least_effective = 1.0 / 3.0;
   const auto effective = [&](double share) {
     double sum = 0.0;
     double squares = 0.0;
@@ -250,7 +253,7 @@ double bearable_share(std::span<const Particle> particles, std::span<const doubl
     }
     return sum * sum / squares;
   };
-  const double wanted = least_effective * static_cast<double>(particles.size());
+  const double wanted = std::min(enough_effective, static_cast<double>(particles.size()) / 3.0);
   if (effective(most) >= wanted) return most;
   double low = 0.0;
   double high = most;
@@ -266,15 +269,16 @@ double bearable_share(std::span<const Particle> particles, std::span<const doubl
 // (progressive correction of a regularised particle filter; Musso, Oudjane and Le Gland 2001).
 // Returns the logarithm of the mean likelihood.
 double MonteCarloLocaliser::Implementation::weigh() {
+  // Views from nearly the same place are alike, also in what misleads: they count for less, as far
+  // as views at that distance resemble each other.
+  const double whole =
+      knows_nothing ? 1.0 : std::max(least_share, 1.0 - std::exp(-travelled_m / model.range_m));
   double evidence = 0.0;
-  double left = 1.0;
+  double left = whole;
   for (int stage = 0; stage < most_stages; ++stage) {
     log_ratios.resize(particles.size());
-    double most = 0.0;
-    for (std::size_t i = 0; i < particles.size(); ++i) {
-      log_ratios[i] = likelihood.log_ratio(particles[i].pose);
-      most = std::max(most, log_ratios[i]);
-    }
+    likelihood.log_ratios(particles, log_ratios);
+    const double most = *std::ranges::max_element(log_ratios);
     for (double& ratio : log_ratios) ratio = ratio - most;
     const double share =
         stage + 1 == most_stages ? left : bearable_share(particles, log_ratios, left);
@@ -289,7 +293,7 @@ double MonteCarloLocaliser::Implementation::weigh() {
     if (!(left > 1e-9)) break;
     resample(particles.size(), true);
   }
-  return evidence;
+  return evidence / whole;
 }
 
 void MonteCarloLocaliser::Implementation::resample(std::size_t count, bool spread) {
@@ -340,15 +344,19 @@ int MonteCarloLocaliser::Implementation::redraw_explained(double log_here) {
     most = std::max(most, values.back());
   }
   if (places.empty()) return 0;
+  // Anywhere else, and in any other heading, nothing explains the view.
+  const double share = (options.compass ? model.heading_width_rad / std::numbers::pi : 1.0) /
+                       static_cast<double>(sites.size());
   double sum = 0.0;
   for (double& value : values) {
     value = std::exp(value - most);
     sum += value;
   }
-  const double log_there =
-      most + std::log(sum / static_cast<double>(sites.size())) +
-      (options.compass ? std::log(model.heading_width_rad / std::numbers::pi) : 0.0);
+  const auto unexplained = 1.0 - share * static_cast<double>(values.size());
+  const double log_there = most + std::log(share * sum + unexplained * std::exp(-most));
   latest.log_there = log_there;
+  // A robot that was outside may come back anywhere.
+  const double hazard = knows_nothing ? 0.9 : carried_away + (1.0 - inside) * coming_back;
   const double odds =
       hazard / (1.0 - hazard) * std::exp(std::clamp(log_there - log_here, -50.0, 50.0));
   const double mass = odds / (1.0 + odds);
@@ -356,7 +364,7 @@ int MonteCarloLocaliser::Implementation::redraw_explained(double log_here) {
 
   const auto size = static_cast<double>(particles.size());
   const auto count =
-      static_cast<std::size_t>(std::max(1L, std::lround(std::max(0.05, 0.5 * mass) * size)));
+      static_cast<std::size_t>(std::max(1L, std::lround(std::max(0.05, 0.9 * mass) * size)));
   std::vector<Particle> fresh;
   double fresh_sum = 0.0;
   for (const std::size_t d : low_variance_resample(values, count, random)) {
@@ -389,13 +397,29 @@ int MonteCarloLocaliser::Implementation::redraw_explained(double log_here) {
 }
 
 MonteCarloEstimate MonteCarloLocaliser::Implementation::observe(const PackedSignature& view) {
+  const bool was_localised = latest.state == LocalisationState::localised;
   latest = {};
-  compare_views(view);
+  compare_views(view, was_localised);
   if (options.redraw == Redraw::uniform || options.redraw == Redraw::topological) {
     latest.redrawn = redraw_fixed(view);
   }
   latest.log_here = weigh();
-  if (options.redraw == Redraw::explained) latest.redrawn = redraw_explained(latest.log_here);
+  double evidence = latest.log_here;
+  if (options.redraw == Redraw::explained) {
+    latest.redrawn = redraw_explained(latest.log_here);
+    evidence = std::max(evidence, latest.log_there + std::log(carried_away));
+  }
+  // Where nothing is known yet, a view like one of the memory's speaks for being inside.
+  if (latest.difference_anywhere) {
+    const double margin = (model.explained_difference - *latest.difference_anywhere) /
+                          std::max(0.05, model.far_difference - model.explained_difference);
+    evidence = std::max(evidence, std::min(most_for_alike, 4.0 * margin) + by_chance);
+  }
+  knows_nothing = false;
+  travelled_m = 0.0;
+  inside = inside * (1.0 - leaving) + (1.0 - inside) * coming_back;
+  const double ratio = std::exp(std::clamp(evidence - by_chance, -by_chance, most_for));
+  inside = inside * ratio / (inside * ratio + 1.0 - inside);
 
   const ParticleModes found = find_modes(particles, bins());
   latest.particles = static_cast<int>(particles.size());
@@ -416,8 +440,17 @@ MonteCarloEstimate MonteCarloLocaliser::Implementation::observe(const PackedSign
 void MonteCarloLocaliser::Implementation::describe(MonteCarloEstimate& estimate,
                                                    const ParticleModes& found) const {
   estimate.modes = found.modes;
-  estimate.whole = summarise(particles);
-  if (!estimate.modes.empty()) estimate.pose = estimate.modes.front().mean;
+  estimate.inside = inside;
+  estimate.state = LocalisationState::lost;
+  if (inside < 0.5) return;
+  estimate.state = LocalisationState::ambiguous;
+  if (found.modes.empty()) return;
+  const PoseMode& first = found.modes.front();
+  estimate.pose = first.mean;
+  const double widest_m = std::max(model.spacing_m, model.range_m);
+  if (first.weight >= localised_weight && first.spread_m <= widest_m) {
+    estimate.state = LocalisationState::localised;
+  }
 }
 
 MonteCarloLocaliser::MonteCarloLocaliser(const VisualMemory& memory,
@@ -450,7 +483,9 @@ void MonteCarloLocaliser::start_anywhere(std::optional<double> heading_rad) {
   for (std::size_t i = 0; i < count; ++i) {
     own.particles.push_back({own.anywhere(heading_rad), 1.0 / static_cast<double>(count)});
   }
-  own.was_localised = false;
+  own.inside = 0.5;
+  own.knows_nothing = true;
+  own.latest = {};
 }
 
 void MonteCarloLocaliser::start_at(const Pose2& pose, double deviation_m,
@@ -464,13 +499,17 @@ void MonteCarloLocaliser::start_at(const Pose2& pose, double deviation_m,
     const double heading = own.random.normal(pose.heading_rad, heading_deviation_rad);
     own.particles.push_back({{x, y, wrap_angle(heading)}, 1.0 / static_cast<double>(count)});
   }
-  own.was_localised = false;
+  own.inside = 1.0 - leaving;
+  own.knows_nothing = false;
+  own.latest = {};
 }
 
 void MonteCarloLocaliser::move(const Pose2& step) {
   auto& own = *implementation_;
+  own.travelled_m += std::hypot(step.x_m, step.y_m);
+  const StepSampler sampler(step, own.odometry);
   for (Particle& particle : own.particles) {
-    particle.pose = particle.pose * sample_step(step, own.odometry, own.random);
+    particle.pose = sampler.move(particle.pose, own.random);
   }
 }
 

@@ -54,7 +54,6 @@ struct MonteCarloEstimate {
   std::vector<PoseMode> modes;
   /// Mean of the heaviest mode; empty when lost.
   std::optional<Pose2> pose;
-  PoseMode whole;  ///< all particles taken together
   int particles = 0;
   double effective_particles = 0.0;  ///< before resampling
   bool resampled = false;
@@ -63,7 +62,12 @@ struct MonteCarloEstimate {
   /// the least difference (`ColumnMatch`) there; empty when none was compared.
   std::optional<double> difference_here;
   std::optional<double> difference_anywhere;
-  double log_here = 0.0, log_there = 0.0;
+  /// Log-likelihood of the view, over that of a view that nothing explains: where the particles
+  /// were, and anywhere in the memory (only with `Redraw::explained`).
+  double log_here = 0.0;
+  double log_there = 0.0;
+  /// Belief that the robot is in the memorised area, 0 .. 1; lost below one half.
+  double inside = 0.0;
   std::uint64_t views_compared = 0;  ///< column by column
 };
 

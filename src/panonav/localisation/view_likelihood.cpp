@@ -14,7 +14,6 @@ namespace panonav {
 
 namespace {
 
-constexpr std::size_t most_near = 12;  // a grid's square and the ring around it
 constexpr double near_spacings = 2.0;  // beyond the border of the references too, twelve are near
 
 // Mean distance of a place in a square of a grid from the nearest corner.
@@ -27,27 +26,9 @@ std::uint32_t hash_of(std::int32_t x, std::int32_t y) {
   return static_cast<std::uint32_t>(h >> 32U);
 }
 
-// exp(-u) for u >= 0.
-float decay(float u) {
-  constexpr std::size_t steps = 512;
-  constexpr float reach = 8.0F;
-  static const auto table = [] {
-    std::array<float, steps + 1> values{};
-    for (std::size_t i = 0; i <= steps; ++i) {
-      values[i] = std::exp(-reach * static_cast<float>(i) / steps);
-    }
-    return values;
-  }();
-  const float at = u * (steps / reach);
-  if (!(at < steps)) return 0.0F;
-  const auto i = static_cast<std::size_t>(at);
-  return table[i] + (at - static_cast<float>(i)) * (table[i + 1] - table[i]);
-}
-
-float wrapped(float angle) {
-  constexpr float turn = 2.0F * std::numbers::pi_v<float>;
-  return angle - turn * std::nearbyint(angle * (1.0F / turn));
-}
+constexpr std::size_t most_near = 12;  // a grid's square and the ring around it
+constexpr auto lanes_of_all = static_cast<std::size_t>(kernels::likeness_lanes);
+static_assert(most_near <= lanes_of_all);
 
 }  // namespace
 
@@ -59,7 +40,7 @@ ViewLikelihood::ViewLikelihood(const ColumnRanking& ranking, const ObservationMo
     const auto& pose = memory.info(view).pose;
     if (!pose) continue;
     sites_.push_back({view, static_cast<float>(pose->x_m), static_cast<float>(pose->y_m),
-                      std::numeric_limits<float>::quiet_NaN(), 0.0F, 0});
+                      std::numeric_limits<float>::quiet_NaN(), 0.0F, 0.0F, 0.0F, 0});
     views_.push_back(view);
     profiles_.push_back(ranking.profiles(view));
   }
@@ -67,6 +48,7 @@ ViewLikelihood::ViewLikelihood(const ColumnRanking& ranking, const ObservationMo
   require(!sites_.empty(), "views with a pose", 0.0, ">= 1");
   require(model.spacing_m > 0.0, "spacing of the references", model.spacing_m, "> 0 m");
   require(model.range_m > 0.0, "range of likeness", model.range_m, "> 0 m");
+  fall_.per_metre = static_cast<float>(1.0 / model.range_m);
   index_sites();
 }
 
@@ -93,7 +75,7 @@ void ViewLikelihood::index_sites() {
   std::vector<Cell> cells;
   for (std::size_t i = 0; i < entries.size();) {
     const auto [x, y, d, s] = entries[i];
-    Cell cell{x, y, static_cast<std::uint32_t>(near_.size()), 0};
+    Cell cell{x, y, static_cast<std::uint32_t>(near_.size()), 0, 0, 0};
     std::size_t taken = 0;
     for (; i < entries.size() && std::get<0>(entries[i]) == x && std::get<1>(entries[i]) == y;
          ++i) {
@@ -102,7 +84,7 @@ void ViewLikelihood::index_sites() {
     cell.end = static_cast<std::uint32_t>(near_.size());
     cells.push_back(cell);
   }
-  table_.assign(std::bit_ceil(2 * cells.size() + 1), Cell{0, 0, 0, 0});
+  table_.assign(std::bit_ceil(2 * cells.size() + 1), Cell{0, 0, 0, 0, 0, 0});
   const auto last = static_cast<std::uint32_t>(table_.size() - 1);
   for (const Cell& cell : cells) {
     std::uint32_t at = hash_of(cell.x, cell.y) & last;
@@ -111,18 +93,22 @@ void ViewLikelihood::index_sites() {
   }
 }
 
-const ViewLikelihood::Cell* ViewLikelihood::cell_at(Point2 position) const noexcept {
-  const double x = std::floor(position.x_m / cell_m_);
-  const double y = std::floor(position.y_m / cell_m_);
-  constexpr double limit = 2e9;
-  if (!(std::abs(x) < limit && std::abs(y) < limit)) return nullptr;
-  const auto cx = static_cast<std::int32_t>(x);
-  const auto cy = static_cast<std::int32_t>(y);
+std::optional<std::uint32_t> ViewLikelihood::cell_at(std::int32_t x,
+                                                     std::int32_t y) const noexcept {
   const auto last = static_cast<std::uint32_t>(table_.size() - 1);
-  for (std::uint32_t at = hash_of(cx, cy) & last; table_[at].end != 0; at = (at + 1) & last) {
-    if (table_[at].x == cx && table_[at].y == cy) return &table_[at];
+  for (std::uint32_t at = hash_of(x, y) & last; table_[at].end != 0; at = (at + 1) & last) {
+    if (table_[at].x == x && table_[at].y == y) return at;
   }
-  return nullptr;
+  return std::nullopt;
+}
+
+std::pair<std::int32_t, std::int32_t> ViewLikelihood::cell_of(Point2 position) const noexcept {
+  // Farther than any memory reaches all places are alike.
+  constexpr double limit = 2e9;
+  const auto index = [&](double value) {
+    return static_cast<std::int32_t>(std::clamp(std::floor(value / cell_m_), -limit, limit));
+  };
+  return {index(position.x_m), index(position.y_m)};
 }
 
 void ViewLikelihood::begin(const PackedSignature& view) {
@@ -132,28 +118,40 @@ void ViewLikelihood::begin(const PackedSignature& view) {
   asked_.emplace(view, ranking_->components());
   compared_sites_.clear();
   most_likeness_ = 0.0;
-  blur_square_m2_ = 0.0F;
+  fall_.blur_square_m2 = 0.0F;
+  lanes_.clear();
+  ++revision_;
   ++number_;
 }
 
 double ViewLikelihood::compare(std::uint32_t site) {
   Site& s = sites_[site];
   if (s.compared_at == number_) return static_cast<double>(differences_[site]);
-  const ColumnMatch match = match_columns(*asked_, profiles_[site]);
+  const ColumnMatches matches = match_columns_twice(*asked_, profiles_[site]);
+  const ColumnMatch& match = matches.best;
   const double far = model_.far_difference;
   s.compared_at = number_;
-  s.likeness = static_cast<float>(std::max(0.0, far * far - match.difference * match.difference));
+  const auto likeness_of = [far](const ColumnMatch& m) {
+    return static_cast<float>(std::max(0.0, far * far - m.difference * m.difference));
+  };
+  s.likeness = likeness_of(match);
+  s.other_likeness = likeness_of(matches.other);
   if (static_cast<double>(s.likeness) > most_likeness_) {
     most_likeness_ = static_cast<double>(s.likeness);
     const double apart_m = model_.range_m * std::log(far * far / most_likeness_);
     const double nearest_m = nearest_spacings * model_.spacing_m;
-    blur_square_m2_ = static_cast<float>(std::max(0.0, apart_m * apart_m - nearest_m * nearest_m));
+    fall_.blur_square_m2 =
+        static_cast<float>(std::max(0.0, apart_m * apart_m - nearest_m * nearest_m));
   }
   const auto& heading = ranking_->memory().info(s.view).pose->heading_rad;
   s.heading_rad = heading ? static_cast<float>(*heading + match.heading_rad)
                           : std::numeric_limits<float>::quiet_NaN();
+  s.other_heading_rad =
+      s.heading_rad + static_cast<float>(matches.other.heading_rad - match.heading_rad);
   differences_[site] = static_cast<float>(match.difference);
   compared_sites_.push_back(site);
+  lanes_.clear();
+  ++revision_;
   return match.difference;
 }
 
@@ -167,38 +165,109 @@ std::optional<double> ViewLikelihood::least_difference(std::span<const std::uint
   return least;
 }
 
-double ViewLikelihood::log_ratio(const Pose2& pose) const noexcept {
-  const Cell* const cell = cell_at(pose.position());
-  if (cell == nullptr) return 0.0;
-  const auto x = static_cast<float>(pose.x_m);
-  const auto y = static_cast<float>(pose.y_m);
-  const auto heading = static_cast<float>(pose.heading_rad);
-  const auto per_metre = static_cast<float>(1.0 / model_.range_m);
-  const auto per_square =
-      static_cast<float>(0.5 / (model_.heading_width_rad * model_.heading_width_rad));
-  float product = 0.0F;
-  float square = 0.0F;
-  for (std::uint32_t i = cell->begin; i < cell->end; ++i) {
-    const Site& s = sites_[near_[i]];
-    const float dx = s.x_m - x;
-    const float dy = s.y_m - y;
-    const float expected = decay(std::sqrt(dx * dx + dy * dy + blur_square_m2_) * per_metre);
-    square += expected * expected;
-    if (s.compared_at != number_ || !(s.likeness > 0.0F)) continue;
-    float likeness = s.likeness;
-    if (compass_ && !std::isnan(s.heading_rad)) {
-      const float turn = wrapped(heading - s.heading_rad);
-      likeness *= decay(turn * turn * per_square);
-    }
-    product += likeness * expected;
+const kernels::LikenessLanes& ViewLikelihood::lanes_of(Cell& cell) {
+  if (cell.lanes_revision == revision_) return lanes_[cell.lanes];
+  cell.lanes_revision = revision_;
+  cell.lanes = static_cast<std::uint32_t>(lanes_.size());
+  kernels::LikenessLanes& lanes = lanes_.emplace_back();
+  for (std::size_t i = 0; i < lanes_of_all; ++i) {
+    lanes.x_m[i] = 1e6F / fall_.per_metre;
+    lanes.y_m[i] = lanes.likeness[i] = lanes.heading_rad[i] = lanes.per_square_turn[i] = 0.0F;
+    lanes.other_likeness[i] = lanes.other_heading_rad[i] = 0.0F;
   }
-  return square > 0.0F ? model_.sharpness * static_cast<double>(product * product / square) : 0.0;
+  const auto per_square_turn =
+      static_cast<float>(-0.5 / (model_.heading_width_rad * model_.heading_width_rad));
+  for (std::size_t i = 0; i < cell.end - cell.begin; ++i) {
+    const Site& s = sites_[near_[cell.begin + i]];
+    lanes.x_m[i] = s.x_m;
+    lanes.y_m[i] = s.y_m;
+    if (s.compared_at != number_) continue;
+    lanes.likeness[i] = s.likeness;
+    if (!compass_ || std::isnan(s.heading_rad)) continue;
+    lanes.heading_rad[i] = s.heading_rad;
+    lanes.other_heading_rad[i] = s.other_heading_rad;
+    lanes.other_likeness[i] = s.other_likeness;
+    lanes.per_square_turn[i] = per_square_turn;
+  }
+  return lanes;
+}
+
+void ViewLikelihood::log_ratios(std::span<const Particle> particles, std::span<double> ratios) {
+  // Particles of one cell follow each other mostly: they are handed on together.
+  constexpr std::size_t most = 64;
+  std::array<float, most> x_m, y_m, heading_rad, explained;
+  std::size_t begin = 0;
+  while (begin < particles.size()) {
+    const auto place = cell_of(particles[begin].pose.position());
+    std::size_t count = 0;
+    do {
+      const Pose2& pose = particles[begin + count].pose;
+      x_m[count] = static_cast<float>(pose.x_m);
+      y_m[count] = static_cast<float>(pose.y_m);
+      heading_rad[count] = static_cast<float>(pose.heading_rad);
+      ++count;
+    } while (count < most && begin + count < particles.size() &&
+             cell_of(particles[begin + count].pose.position()) == place);
+    if (const auto cell = cell_at(place.first, place.second)) {
+      kernels::explain_likeness(lanes_of(table_[*cell]), fall_, std::span(x_m).first(count),
+                                std::span(y_m).first(count), std::span(heading_rad).first(count),
+                                std::span(explained).first(count), kernels::chosen_instructions());
+    } else {
+      explained.fill(0.0F);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      ratios[begin + i] = model_.sharpness * static_cast<double>(explained[i]);
+    }
+    begin += count;
+  }
+}
+
+double ViewLikelihood::log_ratio(const Pose2& pose) {
+  const Particle particle{pose, 1.0};
+  double ratio = 0.0;
+  log_ratios({&particle, 1}, {&ratio, 1});
+  return ratio;
 }
 
 std::span<const std::uint32_t> ViewLikelihood::sites_near(Point2 position) const noexcept {
-  const Cell* const cell = cell_at(position);
-  if (cell == nullptr) return {};
-  return std::span(near_).subspan(cell->begin, cell->end - cell->begin);
+  const auto [x, y] = cell_of(position);
+  const auto cell = cell_at(x, y);
+  if (!cell) return {};
+  return std::span(near_).subspan(table_[*cell].begin, table_[*cell].end - table_[*cell].begin);
+}
+
+std::vector<std::uint32_t> ViewLikelihood::sites_near_most(std::span<const Particle> particles,
+                                                           std::size_t most, double least) const {
+  std::vector<double> by_cell(table_.size());
+  std::vector<std::uint32_t> cells;
+  std::optional<std::pair<std::int32_t, std::int32_t>> last;
+  std::optional<std::uint32_t> cell;
+  for (const Particle& particle : particles) {
+    const auto place = cell_of(particle.pose.position());
+    if (place != last) {
+      last = place;
+      cell = cell_at(place.first, place.second);
+    }
+    if (!cell) continue;
+    if (by_cell[*cell] == 0.0) cells.push_back(*cell);
+    by_cell[*cell] += particle.weight;
+  }
+  std::vector<double> mass(sites_.size());
+  std::vector<std::uint32_t> found;
+  for (const std::uint32_t c : cells) {
+    for (std::uint32_t i = table_[c].begin; i < table_[c].end; ++i) {
+      if (mass[near_[i]] == 0.0) found.push_back(near_[i]);
+      mass[near_[i]] += by_cell[c];
+    }
+  }
+  std::erase_if(found, [&](std::uint32_t site) { return mass[site] < least; });
+  most = std::min(most, found.size());
+  std::partial_sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(most), found.end(),
+                    [&](std::uint32_t a, std::uint32_t b) {
+                      return mass[a] != mass[b] ? mass[a] > mass[b] : a < b;
+                    });
+  found.resize(most);
+  return found;
 }
 
 std::optional<std::uint32_t> ViewLikelihood::site_of(ViewId view) const noexcept {

@@ -44,29 +44,47 @@ void visit_options(OdometryNoise& options, OptionVisitor& visitor) {
             options.rotation_scale_error);
 }
 
-Pose2 sample_step(const Pose2& step, const OdometryNoise& noise, Random& random) {
+StepSampler::StepSampler(const Pose2& step, const OdometryNoise& noise)
+    : step_(step),
+      holonomic_(noise.drive == DriveKind::holonomic),
+      cos_middle_(std::cos(0.5 * step.heading_rad)),
+      sin_middle_(std::sin(0.5 * step.heading_rad)) {
   const double travel = std::hypot(step.x_m, step.y_m);
   const double turn = std::abs(step.heading_rad);
   const auto deviation = [travel, turn](double per_metre, double per_radian) {
     return std::sqrt(per_metre * per_metre * travel + per_radian * per_radian * turn);
   };
-  const double translation_sd =
+  translation_deviation_m_ =
       deviation(noise.translation_from_translation, noise.translation_from_rotation);
-  const double rotation_sd =
+  rotation_deviation_rad_ =
       deviation(noise.rotation_from_translation, noise.rotation_from_rotation);
-  const double first = random.normal(0.0, translation_sd);
-  const double second = random.normal(0.0, translation_sd);
-  const double turn_error = random.normal(0.0, rotation_sd);
-  const double heading = wrap_angle(step.heading_rad + turn_error);
-  if (noise.drive == DriveKind::holonomic) {
-    return {step.x_m + first, step.y_m + second, heading};
+}
+
+Pose2 StepSampler::move(const Pose2& world_from_robot, Random& random) const {
+  auto [first, second] = random.normal_pair();
+  double x = step_.x_m;
+  double y = step_.y_m;
+  double turn_error = 0.0;
+  double direction = world_from_robot.heading_rad;
+  first *= translation_deviation_m_;
+  if (holonomic_) {
+    x += first;
+    y += second * translation_deviation_m_;
+    turn_error = rotation_deviation_rad_ * random.normal();
+  } else {
+    x += first * cos_middle_;
+    y += first * sin_middle_;
+    turn_error = rotation_deviation_rad_ * second;
+    direction += 0.5 * turn_error;
   }
-  const double middle = 0.5 * step.heading_rad;
-  const double x = step.x_m + first * std::cos(middle);
-  const double y = step.y_m + first * std::sin(middle);
-  const double c = std::cos(0.5 * turn_error);
-  const double s = std::sin(0.5 * turn_error);
-  return {c * x - s * y, s * x + c * y, heading};
+  const double c = std::cos(direction);
+  const double s = std::sin(direction);
+  return {world_from_robot.x_m + c * x - s * y, world_from_robot.y_m + s * x + c * y,
+          wrap_angle(world_from_robot.heading_rad + step_.heading_rad + turn_error)};
+}
+
+Pose2 sample_step(const Pose2& step, const OdometryNoise& noise, Random& random) {
+  return StepSampler(step, noise).move({}, random);
 }
 
 SimulatedOdometry::SimulatedOdometry(const OdometryNoise& noise, std::uint64_t seed)

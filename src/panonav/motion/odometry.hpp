@@ -47,10 +47,28 @@ struct OdometryNoise {
 };
 void visit_options(OdometryNoise& options, OptionVisitor& visitor);
 
-/// One draw of what truly happened when odometry says `step`, or of what odometry says when `step`
+/// Draws of what truly happened when odometry says `step`, or of what odometry says when `step`
 /// truly happened (the random part only; zero mean in travel and turn). Differential drive: the
 /// chord of the step keeps its angle to the heading at the middle of the step, as wheels without
-/// slip demand. Three normal draws from `random`, whatever the parameters. `noise` must be valid.
+/// slip demand.
+class StepSampler {
+ public:
+  /// `noise` must be valid.
+  StepSampler(const Pose2& step, const OdometryNoise& noise);
+
+  /// Where a robot is after the step that was at `world_from_robot` before. Two normal draws from
+  /// `random` for a differential drive, four for a holonomic one. Cost: 0.1 microseconds.
+  [[nodiscard]] Pose2 move(const Pose2& world_from_robot, Random& random) const;
+
+ private:
+  Pose2 step_;
+  bool holonomic_;
+  double translation_deviation_m_;
+  double rotation_deviation_rad_;
+  double cos_middle_, sin_middle_;  ///< of half the turn
+};
+
+/// One draw: the step itself.
 [[nodiscard]] Pose2 sample_step(const Pose2& step, const OdometryNoise& noise, Random& random);
 
 /// What the odometry of one run shows: an absolute pose in the odometry frame, which is the robot's

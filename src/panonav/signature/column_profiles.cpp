@@ -125,6 +125,29 @@ void check_bands(const ColumnProfiles& query, const ColumnProfiles& reference) {
           to_text(reference.used_bands()) + ", as of the reference");
 }
 
+using Costs = std::array<std::uint16_t, columns>;
+
+Costs costs_of_turns(const ColumnProfiles& query, const ColumnProfiles& reference) {
+  check_bands(query, reference);
+  std::array<std::uint8_t, query_columns * bands> asked{};
+  for (std::size_t c = 0; c < query_columns; ++c) {
+    for (std::size_t b = 0; b < bands; ++b) {
+      asked[c * bands + b] = query.values()[b * columns + c * (columns / query_columns)];
+    }
+  }
+  Costs costs{};
+  kernels::match_columns(asked, reference.values(), costs, kernels::chosen_instructions());
+  return costs;
+}
+
+ColumnMatch match_at(const ColumnProfiles& query, const Costs& costs, std::size_t turn) {
+  // The kernel counts 16 roots of bytes.
+  const double whole =
+      16.0 * query_columns * std::sqrt(static_cast<double>(unit) * std::max(1, query.used_bands()));
+  return {static_cast<double>(costs[turn]) / whole,
+          wrap_angle(2.0 * std::numbers::pi * static_cast<double>(turn) / columns)};
+}
+
 }  // namespace
 
 ColumnProfiles::ColumnProfiles(const PackedSignature& signature, int components,
@@ -170,21 +193,21 @@ ColumnProfiles::ColumnProfiles(const PackedSignature& signature, int components,
 }
 
 ColumnMatch match_columns(const ColumnProfiles& query, const ColumnProfiles& reference) {
-  check_bands(query, reference);
-  std::array<std::uint8_t, query_columns * bands> asked{};
-  for (std::size_t c = 0; c < query_columns; ++c) {
-    for (std::size_t b = 0; b < bands; ++b) {
-      asked[c * bands + b] = query.values()[b * columns + c * (columns / query_columns)];
-    }
-  }
-  std::array<std::uint16_t, columns> costs{};
-  kernels::match_columns(asked, reference.values(), costs, kernels::chosen_instructions());
+  const auto costs = costs_of_turns(query, reference);
   const auto best = std::ranges::min_element(costs) - costs.begin();
-  // The kernel counts 16 roots of bytes.
-  const double whole =
-      16.0 * query_columns * std::sqrt(static_cast<double>(unit) * std::max(1, query.used_bands()));
-  return {static_cast<double>(costs[static_cast<std::size_t>(best)]) / whole,
-          wrap_angle(2.0 * std::numbers::pi * static_cast<double>(best) / columns)};
+  return match_at(query, costs, static_cast<std::size_t>(best));
+}
+
+ColumnMatches match_columns_twice(const ColumnProfiles& query, const ColumnProfiles& reference) {
+  constexpr std::size_t apart = (columns + 5) / 6;
+  const auto costs = costs_of_turns(query, reference);
+  const auto best = static_cast<std::size_t>(std::ranges::min_element(costs) - costs.begin());
+  std::size_t other = (best + apart) % columns;
+  for (std::size_t turn = apart; turn <= columns - apart; ++turn) {
+    const std::size_t at = (best + turn) % columns;
+    if (costs[at] < costs[other]) other = at;
+  }
+  return {match_at(query, costs, best), match_at(query, costs, other)};
 }
 
 std::array<double, ColumnProfiles::compared_columns> column_distances_near(

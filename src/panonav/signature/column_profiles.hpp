@@ -48,11 +48,21 @@ struct ColumnMatch {
   double heading_rad = 0.0;
 };
 
+/// The same, and the best turn on the other side: a corridor looks much the same when turned round.
+struct ColumnMatches {
+  ColumnMatch best;
+  ColumnMatch other;  ///< the best turn at least 60 degrees from `best`
+};
+
 /// The turn at which the columns of two views differ least, among all 128 turns; every fourth
 /// column of the query is compared. Throws ContractError on profiles with other bands. Cost: 2.5
 /// microseconds with AVX2, 15 without vectors.
 [[nodiscard]] ColumnMatch match_columns(const ColumnProfiles& query,
                                         const ColumnProfiles& reference);
+
+/// The same with a second turn, for a little more.
+[[nodiscard]] ColumnMatches match_columns_twice(const ColumnProfiles& query,
+                                                const ColumnProfiles& reference);
 
 /// The mean absolute difference of each compared column in units of contrast, when the robot is
 /// turned by `heading_rad` relative to the reference: the least of the nearest turn and the two

@@ -1,0 +1,38 @@
+#include "panonav/kernels/likeness.hpp"
+
+#include <string>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav::kernels {
+
+void explain_likeness(const LikenessLanes& lanes, const LikenessFall& fall,
+                      std::span<const float> x_m, std::span<const float> y_m,
+                      std::span<const float> heading_rad, std::span<float> explained,
+                      Instructions instructions) {
+  require(y_m.size() == x_m.size() && heading_rad.size() == x_m.size() &&
+              explained.size() == x_m.size(),
+          "poses", static_cast<double>(explained.size()), to_text(static_cast<double>(x_m.size())));
+  const auto count = static_cast<int>(x_m.size());
+  const auto run = [&](auto body) {
+    body(lanes, fall, x_m.data(), y_m.data(), heading_rad.data(), explained.data(), count);
+  };
+  switch (instructions) {
+#ifdef PANONAV_HAS_AVX2
+    case Instructions::avx2:
+      return run(avx2::explain_likeness);
+#endif
+#ifdef PANONAV_HAS_AVX512
+    case Instructions::avx512:
+      return run(avx512::explain_likeness);
+#endif
+#ifdef PANONAV_HAS_NEON
+    case Instructions::neon:
+      return run(neon::explain_likeness);
+#endif
+    default:
+      return run(scalar::explain_likeness);
+  }
+}
+
+}  // namespace panonav::kernels

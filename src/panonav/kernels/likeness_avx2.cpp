@@ -1,0 +1,10 @@
+#include "panonav/kernels/likeness_vector.hpp"
+
+namespace panonav::kernels::avx2 {
+
+void explain_likeness(const LikenessLanes& lanes, const LikenessFall& fall, const float* x_m,
+                      const float* y_m, const float* heading_rad, float* explained, int count) {
+  explain_likeness_loop(lanes, fall, x_m, y_m, heading_rad, explained, count);
+}
+
+}  // namespace panonav::kernels::avx2
