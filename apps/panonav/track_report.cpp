@@ -135,10 +135,10 @@ void draw_errors(const std::vector<TrackedImage>& images, double spacing_m, cons
     const TrackedImage& image = images[i];
     const auto x = static_cast<double>(i + 1);
     spread.x.push_back(x);
-    spread.y.push_back(image.estimate.whole.spread_m);
+    spread.y.push_back(image.estimate.spread_m);
     if (image.estimate.state == LocalisationState::lost) {
       lost.x.push_back(x);
-      lost.y.push_back(image.estimate.whole.spread_m);
+      lost.y.push_back(image.estimate.spread_m);
     } else if (const auto error = position_error_m(image)) {
       Series& series = is_localised(image) ? localised : guessed;
       series.x.push_back(x);

@@ -41,6 +41,8 @@ struct MonteCarloLocaliser::Implementation {
         random(static_cast<std::uint64_t>(options.seed)) {
     validate(options);
     validate(odometry);
+    require(options.least_particles <= options.most_particles, "least_particles",
+            options.least_particles, "<= most_particles, " + to_text(options.most_particles));
     if (options.redraw == Redraw::topological) areas.emplace(ranking->memory());
   }
 
@@ -440,6 +442,7 @@ MonteCarloEstimate MonteCarloLocaliser::Implementation::observe(const PackedSign
 void MonteCarloLocaliser::Implementation::describe(MonteCarloEstimate& estimate,
                                                    const ParticleModes& found) const {
   estimate.modes = found.modes;
+  estimate.spread_m = spread_of(particles);
   estimate.inside = inside;
   estimate.state = LocalisationState::lost;
   if (inside < 0.5) return;

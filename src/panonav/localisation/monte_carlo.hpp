@@ -54,6 +54,7 @@ struct MonteCarloEstimate {
   std::vector<PoseMode> modes;
   /// Mean of the heaviest mode; empty when lost.
   std::optional<Pose2> pose;
+  double spread_m = 0.0;  ///< root mean square distance of all particles from their mean
   int particles = 0;
   double effective_particles = 0.0;  ///< before resampling
   bool resampled = false;

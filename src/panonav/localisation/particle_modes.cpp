@@ -171,23 +171,10 @@ ParticleModes find_modes(std::span<const Particle> particles, const PoseBins& bi
   return result;
 }
 
-PoseMode summarise(std::span<const Particle> particles) {
-  // Headings are measured from their circular mean: an anchor far from it would cut the circle in
-  // the wrong place.
-  double c = 0.0;
-  double s = 0.0;
-  for (const Particle& particle : particles) {
-    c += particle.weight * std::cos(particle.pose.heading_rad);
-    s += particle.weight * std::sin(particle.pose.heading_rad);
-  }
+double spread_of(std::span<const Particle> particles) {
   Moments moments;
-  if (!particles.empty()) {
-    moments.anchored = true;
-    moments.anchor = particles.front().pose;
-    moments.anchor.heading_rad = std::atan2(s, c);
-  }
   for (const Particle& particle : particles) moments.add(particle);
-  return moments.mode();
+  return moments.mode().spread_m;
 }
 
 }  // namespace panonav

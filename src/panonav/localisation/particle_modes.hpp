@@ -44,7 +44,7 @@ struct ParticleModes {
 [[nodiscard]] ParticleModes find_modes(std::span<const Particle> particles, const PoseBins& bins,
                                        double least_weight = 0.01);
 
-/// All particles as one mode; means of headings are circular. Weight 0 for none.
-[[nodiscard]] PoseMode summarise(std::span<const Particle> particles);
+/// Root mean square distance of the particles from their mean; 0 for none.
+[[nodiscard]] double spread_of(std::span<const Particle> particles);
 
 }  // namespace panonav
