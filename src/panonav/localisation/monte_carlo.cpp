@@ -16,6 +16,36 @@
 
 namespace panonav {
 
+namespace {
+
+constexpr int searched_views = 16;
+constexpr int searched_when_localised = 8;
+constexpr std::size_t followed_sites = 256;
+constexpr double least_followed = 1e-3;  // share of the weight near a site
+constexpr std::size_t followed_when_localised = 16;
+constexpr int most_stages = 6;
+constexpr double least_share = 0.05;
+constexpr double enough_effective = 200.0;  // stand for a mode in three dimensions
+constexpr double most_against = 9.0;        // about 1 : 10 000
+// Chances from one image to the next.
+constexpr double carried_away = 0.01;
+constexpr double leaving = 0.02;
+constexpr double coming_back = 0.1;
+// Log-likelihood ratio that a view of another place reaches by chance; one in a hundred reaches it
+// (docs/decisions.md).
+constexpr double by_chance = 1.0;
+constexpr double most_for = 5.0;
+constexpr double most_for_alike = 2.0;
+constexpr double localised_weight = 0.9;
+constexpr double least_redrawn_mass = 1e-4;
+constexpr double nothing_known = 0.9;  // chance of being elsewhere than where particles were strewn
+// Deviations of new particles from the reference that tells them: within its square of the grid,
+// and within the turns that explain a view.
+constexpr double drawn_spacings = 0.4;
+constexpr double drawn_heading_widths = 0.25;
+
+}  // namespace
+
 struct MonteCarloLocaliser::Implementation {
   std::shared_ptr<const ColumnRanking> ranking;
   ObservationModel model;
@@ -62,15 +92,31 @@ struct MonteCarloLocaliser::Implementation {
   double borrowed_heading() { return particles[random.index(particles.size())].pose.heading_rad; }
 
   void compare_views(const PackedSignature& view, bool was_localised);
+  // A site, and which of the two headings that fit there.
+  struct Candidate {
+    std::uint32_t site;
+    bool other;
+  };
+  [[nodiscard]] bool tells_heading(std::uint32_t site) const {
+    return options.compass && !std::isnan(likelihood.sites()[site].heading_rad);
+  }
   // At a site, as far as the compass tells the heading, else with somebody's heading.
-  Pose2 pose_told_by(std::uint32_t site, double heading_deviation_rad) {
-    const auto& s = likelihood.sites()[site];
-    const double heading =
-        options.compass && !std::isnan(s.heading_rad)
-            ? static_cast<double>(s.heading_rad) +
-                  (heading_deviation_rad > 0.0 ? random.normal(0.0, heading_deviation_rad) : 0.0)
-            : borrowed_heading();
-    return {static_cast<double>(s.x_m), static_cast<double>(s.y_m), wrap_angle(heading)};
+  Pose2 pose_told_by(Candidate candidate) {
+    const auto& s = likelihood.sites()[candidate.site];
+    const double told = static_cast<double>(candidate.other ? s.other_heading_rad : s.heading_rad);
+    return {static_cast<double>(s.x_m), static_cast<double>(s.y_m),
+            wrap_angle(tells_heading(candidate.site) ? told : borrowed_heading())};
+  }
+  // As far around it as the truth may be.
+  Pose2 drawn_around(Candidate candidate) {
+    Pose2 pose = pose_told_by(candidate);
+    pose.x_m += random.normal(0.0, drawn_spacings * model.spacing_m);
+    pose.y_m += random.normal(0.0, drawn_spacings * model.spacing_m);
+    if (tells_heading(candidate.site)) {
+      pose.heading_rad = wrap_angle(
+          pose.heading_rad + random.normal(0.0, drawn_heading_widths * model.heading_width_rad));
+    }
+    return pose;
   }
   double weigh();
   void resample(std::size_t count, bool spread);
@@ -79,31 +125,6 @@ struct MonteCarloLocaliser::Implementation {
   MonteCarloEstimate observe(const PackedSignature& view);
   void describe(MonteCarloEstimate& estimate, const ParticleModes& found) const;
 };
-
-namespace {
-
-constexpr int searched_views = 16;
-constexpr int searched_when_localised = 8;
-constexpr std::size_t followed_sites = 256;
-constexpr double least_followed = 1e-3;  // share of the weight near a site
-constexpr std::size_t followed_when_localised = 16;
-constexpr int most_stages = 6;
-constexpr double least_share = 0.2;
-constexpr double enough_effective = 200.0;  // stand for a mode in three dimensions
-constexpr double most_against = 9.0;        // about 1 : 10 000
-// Chances from one image to the next.
-constexpr double carried_away = 0.01;
-constexpr double leaving = 0.02;
-constexpr double coming_back = 0.1;
-// Log-likelihood ratio that a view of another place reaches by chance; one in a hundred reaches it
-// (docs/decisions.md).
-constexpr double by_chance = 1.0;
-constexpr double most_for = 5.0;
-constexpr double most_for_alike = 2.0;
-constexpr double localised_weight = 0.9;
-constexpr double least_redrawn_mass = 1e-4;
-
-}  // namespace
 
 void visit_options(MonteCarloOptions& options, OptionVisitor& visitor) {
   visitor.visit({.name = "least_particles", .help = "fewest particles", .low = 1, .high = 1e7},
@@ -229,10 +250,7 @@ int MonteCarloLocaliser::Implementation::redraw_fixed(const PackedSignature& vie
     } else {
       const auto site = *likelihood.site_of(candidates[random.index(candidates.size())].view);
       likelihood.compare(site);
-      const double half = 0.5 * model.spacing_m;
-      particle.pose = pose_told_by(site, 0.25 * model.heading_width_rad);
-      particle.pose.x_m += random.uniform(-half, half);
-      particle.pose.y_m += random.uniform(-half, half);
+      particle.pose = drawn_around({site, false});
     }
     particle.weight = 1.0 / static_cast<double>(size);
   }
@@ -276,12 +294,20 @@ double MonteCarloLocaliser::Implementation::weigh() {
   const double whole =
       knows_nothing ? 1.0 : std::max(least_share, 1.0 - std::exp(-travelled_m / model.range_m));
   double evidence = 0.0;
+  double evidence_in_full = 0.0;
   double left = whole;
   for (int stage = 0; stage < most_stages; ++stage) {
     log_ratios.resize(particles.size());
     likelihood.log_ratios(particles, log_ratios);
     const double most = *std::ranges::max_element(log_ratios);
     for (double& ratio : log_ratios) ratio = ratio - most;
+    if (stage == 0) {
+      double sum = 0.0;
+      for (std::size_t i = 0; i < particles.size(); ++i) {
+        sum += particles[i].weight * std::exp(log_ratios[i]);
+      }
+      evidence_in_full = most + std::log(sum);
+    }
     const double share =
         stage + 1 == most_stages ? left : bearable_share(particles, log_ratios, left);
     double sum = 0.0;
@@ -289,13 +315,21 @@ double MonteCarloLocaliser::Implementation::weigh() {
       particles[i].weight *= std::exp(share * log_ratios[i]);
       sum += particles[i].weight;
     }
+    if (!(sum > 0.0)) {  // what explains the view had lost all its weight
+      for (Particle& particle : particles) {
+        particle.weight = 1.0 / static_cast<double>(particles.size());
+      }
+      return evidence_in_full;
+    }
     for (Particle& particle : particles) particle.weight /= sum;
     evidence += share * most + std::log(sum);
     left -= share;
     if (!(left > 1e-9)) break;
     resample(particles.size(), true);
   }
-  return evidence / whole;
+  // Few particles may all miss a narrow maximum that the stages find; a small share of the view
+  // says little of the whole.
+  return whole >= 0.2 ? std::max(evidence_in_full, evidence / whole) : evidence_in_full;
 }
 
 void MonteCarloLocaliser::Implementation::resample(std::size_t count, bool spread) {
@@ -336,29 +370,32 @@ void MonteCarloLocaliser::Implementation::resample(std::size_t count, bool sprea
 // New particles where the view is explained, with the share of the weight that their evidence
 // earns them.
 int MonteCarloLocaliser::Implementation::redraw_explained(double log_here) {
-  const auto sites = likelihood.sites();
-  std::vector<std::uint32_t> places;
+  std::vector<Candidate> places;
   std::vector<double> values;
   double most = 0.0;
-  for (const std::uint32_t s : likelihood.compared_sites()) {
-    places.push_back(s);
-    values.push_back(likelihood.log_ratio(pose_told_by(s, 0.0)));
+  const auto add = [&](Candidate candidate) {
+    places.push_back(candidate);
+    values.push_back(likelihood.log_ratio(pose_told_by(candidate)));
     most = std::max(most, values.back());
+  };
+  for (const std::uint32_t site : likelihood.compared_sites()) {
+    add({site, false});
+    if (tells_heading(site) && likelihood.sites()[site].other_likeness > 0.0F) add({site, true});
   }
   if (places.empty()) return 0;
   // Anywhere else, and in any other heading, nothing explains the view.
   const double share = (options.compass ? model.heading_width_rad / std::numbers::pi : 1.0) /
-                       static_cast<double>(sites.size());
+                       static_cast<double>(likelihood.sites().size());
   double sum = 0.0;
   for (double& value : values) {
     value = std::exp(value - most);
     sum += value;
   }
-  const auto unexplained = 1.0 - share * static_cast<double>(values.size());
+  const double unexplained = std::max(0.0, 1.0 - share * static_cast<double>(values.size()));
   const double log_there = most + std::log(share * sum + unexplained * std::exp(-most));
   latest.log_there = log_there;
   // A robot that was outside may come back anywhere.
-  const double hazard = knows_nothing ? 0.9 : carried_away + (1.0 - inside) * coming_back;
+  const double hazard = knows_nothing ? nothing_known : carried_away + (1.0 - inside) * coming_back;
   const double odds =
       hazard / (1.0 - hazard) * std::exp(std::clamp(log_there - log_here, -50.0, 50.0));
   const double mass = odds / (1.0 + odds);
@@ -370,9 +407,7 @@ int MonteCarloLocaliser::Implementation::redraw_explained(double log_here) {
   std::vector<Particle> fresh;
   double fresh_sum = 0.0;
   for (const std::size_t d : low_variance_resample(values, count, random)) {
-    Pose2 pose = pose_told_by(places[d], 0.25 * model.heading_width_rad);
-    pose.x_m += random.normal(0.0, 0.4 * model.spacing_m);
-    pose.y_m += random.normal(0.0, 0.4 * model.spacing_m);
+    const Pose2 pose = drawn_around(places[d]);
     const double weight =
         std::exp(std::max(likelihood.log_ratio(pose) - most, -most_against)) / values[d];
     fresh.push_back({pose, weight});
@@ -391,9 +426,9 @@ int MonteCarloLocaliser::Implementation::redraw_explained(double log_here) {
   }
   double kept = 0.0;
   for (const Particle& p : particles) kept += p.weight;
-  for (Particle& p : particles) p.weight *= (1.0 - mass) / kept;
+  for (Particle& p : particles) p.weight *= kept > 0.0 ? (1.0 - mass) / kept : 0.0;
   for (std::size_t n = 0; n < fresh.size(); ++n) {
-    particles[order[n]].weight = mass * fresh[n].weight / fresh_sum;
+    particles[order[n]].weight = (kept > 0.0 ? mass : 1.0) * fresh[n].weight / fresh_sum;
   }
   return static_cast<int>(fresh.size());
 }
