@@ -1,0 +1,42 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "panonav/evaluation/place_recording.hpp"
+#include "panonav/evaluation/tracking_run.hpp"
+
+namespace panonav::bench {
+
+/// Ranges in metres to what stands around, from the robot's heading once around counter-clockwise;
+/// infinite where there is nothing.
+using RangeScan = std::vector<float>;
+
+/// A robot that drives through the `corridor` scene.
+struct Walk {
+  TrackingRun run;
+  std::vector<Pose2> odometry;  ///< robot_old_from_robot_new of each step as odometry tells it; the
+                                ///< first one is unused
+  std::vector<RangeScan> scans;  ///< what a laser would have measured beside each view
+};
+
+/// The `corridor` scene with its references on a 25 cm grid, 80 x 512 pixels a view.
+struct Corridor {
+  PlaceRecording place;
+  std::shared_ptr<const TrackingPlace> remembered;
+  std::vector<Walk> clean;         ///< as memorised
+  std::vector<Walk> hard;          ///< light, objects and sensor changed (`hard_condition`)
+  std::vector<Pose2> mapped_from;  ///< where the scans for a rival's map were taken
+  std::vector<RangeScan> map_scans;
+};
+
+/// About 950 references; renders for some seconds. 4 walks of 21 images, 25 cm apart, of each kind.
+[[nodiscard]] Corridor make_corridor();
+
+/// A memory of `count` references: those of the corridor that are nearest to the walks; when it has
+/// fewer, those of as many corridors with other furniture and textures besides as it takes, 100 m
+/// apart.
+[[nodiscard]] std::shared_ptr<const TrackingPlace> corridors_with(const Corridor& corridor,
+                                                                  std::size_t count);
+
+}  // namespace panonav::bench
