@@ -112,5 +112,24 @@ TEST(Random, IndexIsUnbiased) {
   EXPECT_NEAR(low_half, 10'000, 5.0 * std::sqrt(5'000.0));
 }
 
+TEST(Random, ThePairHasTwoIndependentNormals) {
+  Random pairs(11);
+  Random singles(11);
+  EXPECT_EQ(pairs.normal_pair().first, singles.normal());
+  double sum = 0.0;
+  double square = 0.0;
+  double product = 0.0;
+  constexpr int count = 40000;
+  for (int i = 0; i < count; ++i) {
+    const auto [first, second] = pairs.normal_pair();
+    sum += second;
+    square += second * second;
+    product += first * second;
+  }
+  EXPECT_NEAR(sum / count, 0.0, 0.025);
+  EXPECT_NEAR(square / count, 1.0, 0.035);
+  EXPECT_NEAR(product / count, 0.0, 0.025);
+}
+
 }  // namespace
 }  // namespace panonav

@@ -97,6 +97,22 @@ TEST(Odometry, WithoutNoiseAStepStaysAsItIs) {
   }
 }
 
+TEST(Odometry, ASamplerMovesAPoseByADrawnStep) {
+  for (const DriveKind drive : {DriveKind::differential, DriveKind::holonomic}) {
+    Random random(7);
+    for (int i = 0; i < 100; ++i) {
+      const Pose2 pose = random_pose(random);
+      const Pose2 step = random_pose(random);
+      const OdometryNoise noise{.drive = drive};
+      const auto seed = static_cast<std::uint64_t>(i);
+      Random first(seed);
+      Random second(seed);
+      expect_same(StepSampler(step, noise).move(pose, first),
+                  pose * sample_step(step, noise, second));
+    }
+  }
+}
+
 TEST(Odometry, HolonomicNoiseHasTheStatedMomentsInAllDirections) {
   Random random(4);
   const OdometryNoise noise{.drive = DriveKind::holonomic};

@@ -281,5 +281,31 @@ TEST(ColumnProfiles, RefuseBadInput) {
                ContractError);
 }
 
+TEST(MatchColumnsTwice, FindsTheSecondTurnOnTheOtherSide) {
+  // A view that is nearly the same when turned round, as in a corridor.
+  Panorama view = smooth_view(5);
+  const int half = view.columns() / 2;
+  for (int y = 0; y < view.rows(); ++y) {
+    for (int c = 0; c < half; ++c) {
+      view.at(y, c + half) = 0.95F * view.at(y, c) + 0.05F * view.at(y, c + half);
+    }
+  }
+  const ColumnProfiles profiles(packed(view));
+  const ColumnMatches matches = match_columns_twice(profiles, profiles);
+  const ColumnMatch best = match_columns(profiles, profiles);
+  EXPECT_EQ(matches.best.difference, best.difference);
+  EXPECT_EQ(matches.best.heading_rad, best.heading_rad);
+  EXPECT_NEAR(std::abs(matches.other.heading_rad), std::numbers::pi, 1e-9);
+  EXPECT_GT(matches.other.difference, matches.best.difference);
+
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const ColumnMatches found = match_columns_twice(ColumnProfiles(packed(smooth_view(seed))),
+                                                    ColumnProfiles(packed(smooth_view(seed + 50))));
+    EXPECT_GE(found.other.difference, found.best.difference);
+    EXPECT_GE(std::abs(angle_difference(found.other.heading_rad, found.best.heading_rad)),
+              std::numbers::pi / 3 - 1e-9);
+  }
+}
+
 }  // namespace
 }  // namespace panonav

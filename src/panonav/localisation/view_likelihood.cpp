@@ -126,7 +126,7 @@ void ViewLikelihood::begin(const PackedSignature& view) {
 
 double ViewLikelihood::compare(std::uint32_t site) {
   Site& s = sites_[site];
-  if (s.compared_at == number_) return static_cast<double>(differences_[site]);
+  if (s.compared_at == number_) return differences_[site];
   const ColumnMatches matches = match_columns_twice(*asked_, profiles_[site]);
   const ColumnMatch& match = matches.best;
   const double far = model_.far_difference;
@@ -148,7 +148,7 @@ double ViewLikelihood::compare(std::uint32_t site) {
                           : std::numeric_limits<float>::quiet_NaN();
   s.other_heading_rad =
       s.heading_rad + static_cast<float>(matches.other.heading_rad - match.heading_rad);
-  differences_[site] = static_cast<float>(match.difference);
+  differences_[site] = match.difference;
   compared_sites_.push_back(site);
   lanes_.clear();
   ++revision_;
@@ -159,7 +159,7 @@ std::optional<double> ViewLikelihood::least_difference(std::span<const std::uint
   std::optional<double> least;
   for (const std::uint32_t site : sites) {
     if (!compared(site)) continue;
-    const auto difference = static_cast<double>(differences_[site]);
+    const double difference = differences_[site];
     if (!least || difference < *least) least = difference;
   }
   return least;

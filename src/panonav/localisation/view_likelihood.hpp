@@ -84,7 +84,7 @@ class ViewLikelihood {
   ObservationModel model_;
   bool compass_;
   std::vector<Site> sites_;
-  std::vector<float> differences_;
+  std::vector<double> differences_;
   std::vector<ColumnProfiles> profiles_;
   std::vector<ViewId> views_;  ///< of the sites, ascending
   std::vector<Cell> table_;    ///< open addressing, a power of two

@@ -1,0 +1,320 @@
+#include "panonav/localisation/monte_carlo.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numbers>
+#include <vector>
+
+#include "localisation/ray_cast_room.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/motion/path.hpp"
+#include "support/sanitizers.hpp"
+
+namespace panonav::testing {
+namespace {
+
+struct Walk {
+  std::vector<Pose2> poses;
+  std::vector<PackedSignature> views;
+  std::vector<Pose2> odometry;  ///< one reading for each pose
+
+  [[nodiscard]] Pose2 step(std::size_t to) const {
+    return inverse(odometry[to - 1]) * odometry[to];
+  }
+};
+
+Walk walk(const RememberedRoom& place, int images, std::uint64_t seed,
+          const OdometryNoise& noise = {}, double noise_deviation = 0.01) {
+  Random random(seed);
+  Walk run;
+  const FreePredicate is_free = [&](Point2 p) { return place.room.is_free(p); };
+  run.poses = random_walk(place.room.between(place.grid, place.step_m, random), is_free,
+                          {.poses = images, .step_m = 0.2}, random);
+  for (const Pose2& pose : run.poses) {
+    run.views.push_back(
+        pack(compute_signature(place.room.see(pose, 16, 96, {1.0, noise_deviation}, random.next())),
+             place.memory.full_scale()));
+  }
+  run.odometry = simulate_odometry(run.poses, noise, seed);
+  return run;
+}
+
+double error_m(const MonteCarloEstimate& estimate, const Pose2& truth) {
+  return estimate.pose ? distance(estimate.pose->position(), truth.position()) : 1e9;
+}
+
+TEST(MonteCarlo, FindsItselfFromNothingAndStaysThere) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  const RememberedRoom place(71, {}, 0.3);
+  const auto ranking = std::make_shared<const ColumnRanking>(place.memory);
+  const ObservationModel model = learn_observation_model(*ranking);
+  int localised = 0;
+  int right = 0;
+  int headed = 0;
+  int images = 0;
+  for (int seed = 1; seed <= 10; ++seed) {
+    const Walk run = walk(place, 15, 100 + static_cast<std::uint64_t>(seed));
+    MonteCarloLocaliser filter(ranking, model, {.seed = seed});
+    for (std::size_t k = 0; k < run.poses.size(); ++k) {
+      if (k > 0) filter.move(run.step(k));
+      const MonteCarloEstimate found = filter.observe(run.views[k]);
+      if (k < 5) continue;
+      ++images;
+      localised += found.state == LocalisationState::localised ? 1 : 0;
+      right += error_m(found, run.poses[k]) < place.step_m ? 1 : 0;
+      headed += found.pose && std::abs(angle_difference(found.pose->heading_rad,
+                                                        run.poses[k].heading_rad)) < radians(6.0)
+                    ? 1
+                    : 0;
+    }
+  }
+  EXPECT_GE(images, 80);
+  EXPECT_GE(localised, images * 95 / 100);
+  EXPECT_GE(right, images * 95 / 100);
+  EXPECT_GE(headed, images * 95 / 100);
+}
+
+TEST(MonteCarlo, WeightsSumToOneAndNumbersStayWithinTheirBounds) {
+  const RememberedRoom place(72, {}, 0.4);
+  MonteCarloLocaliser filter(place.memory, {.least_particles = 50, .most_particles = 700});
+  EXPECT_EQ(filter.particles().size(), 700U);
+  const Walk run = walk(place, 12, 5);
+  bool fewer = false;
+  for (std::size_t k = 0; k < run.poses.size(); ++k) {
+    if (k > 0) filter.move(run.step(k));
+    const MonteCarloEstimate found = filter.observe(run.views[k]);
+    double sum = 0.0;
+    for (const Particle& particle : filter.particles()) {
+      EXPECT_GE(particle.weight, 0.0);
+      EXPECT_GE(particle.pose.heading_rad, -std::numbers::pi);
+      EXPECT_LT(particle.pose.heading_rad, std::numbers::pi);
+      sum += particle.weight;
+    }
+    EXPECT_NEAR(sum, 1.0, 1e-9);
+    EXPECT_GE(filter.particles().size(), 50U);
+    EXPECT_LE(filter.particles().size(), 700U);
+    EXPECT_GE(found.effective_particles, 1.0 - 1e-9);
+    EXPECT_LE(found.effective_particles, found.particles + 1e-6);
+    double modes = 0.0;
+    for (std::size_t m = 0; m < found.modes.size(); ++m) {
+      if (m > 0) {
+        EXPECT_LE(found.modes[m].weight, found.modes[m - 1].weight + 1e-12);
+      }
+      modes += found.modes[m].weight;
+    }
+    EXPECT_LE(modes, 1.0 + 1e-9);
+    fewer |= filter.particles().size() < 200;
+  }
+  EXPECT_TRUE(fewer);  // a robot that knows where it is needs few
+}
+
+TEST(MonteCarlo, SameSeedSameBits) {
+  const RememberedRoom place(73, {}, 0.4);
+  const Walk run = walk(place, 6, 6);
+  const auto bits = [&](int seed) {
+    MonteCarloLocaliser filter(place.memory, {.seed = seed});
+    for (std::size_t k = 0; k < run.poses.size(); ++k) {
+      if (k > 0) filter.move(run.step(k));
+      filter.observe(run.views[k]);
+    }
+    std::vector<double> values;
+    for (const Particle& p : filter.particles()) {
+      values.insert(values.end(), {p.pose.x_m, p.pose.y_m, p.pose.heading_rad, p.weight});
+    }
+    return values;
+  };
+  EXPECT_EQ(bits(3), bits(3));
+  EXPECT_NE(bits(3), bits(4));
+}
+
+TEST(MonteCarlo, IsFoundAgainAfterItWasCarriedAway) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  const RememberedRoom place(74, {}, 0.3);
+  const auto ranking = std::make_shared<const ColumnRanking>(place.memory);
+  const ObservationModel model = learn_observation_model(*ranking);
+  const auto images_needed = [&](Redraw redraw) {
+    std::vector<int> needed;
+    for (int seed = 1; seed <= 10; ++seed) {
+      const Walk before = walk(place, 6, 200 + static_cast<std::uint64_t>(seed));
+      const Walk after = walk(place, 12, 300 + static_cast<std::uint64_t>(seed));
+      MonteCarloLocaliser filter(ranking, model, {.redraw = redraw, .seed = seed});
+      for (std::size_t k = 0; k < before.poses.size(); ++k) {
+        if (k > 0) filter.move(before.step(k));
+        filter.observe(before.views[k]);
+      }
+      int last_wrong = -1;
+      for (std::size_t k = 0; k < after.poses.size(); ++k) {
+        if (k > 0) filter.move(after.step(k));  // nobody tells it of the first one
+        if (!(error_m(filter.observe(after.views[k]), after.poses[k]) < place.step_m)) {
+          last_wrong = static_cast<int>(k);
+        }
+      }
+      needed.push_back(last_wrong + 2);
+    }
+    std::ranges::sort(needed);
+    return needed;
+  };
+  const auto explained = images_needed(Redraw::explained);
+  const auto topological = images_needed(Redraw::topological);
+  EXPECT_LE(explained[explained.size() / 2], 2);
+  EXPECT_LE(explained[explained.size() * 9 / 10 - 1], 8);
+  EXPECT_LE(topological[topological.size() / 2], 3);
+}
+
+TEST(MonteCarlo, IsLostOutsideAndFoundAgain) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  const RememberedRoom place(75, {}, 0.3);
+  const RememberedRoom elsewhere(76, {}, 0.5);
+  int lost = 0;
+  int found_again = 0;
+  constexpr int runs = 8;
+  for (int seed = 1; seed <= runs; ++seed) {
+    const Walk run = walk(place, 20, 400 + static_cast<std::uint64_t>(seed));
+    const Walk outside = walk(elsewhere, 10, 500 + static_cast<std::uint64_t>(seed));
+    MonteCarloLocaliser filter(place.memory, {.seed = seed});
+    for (std::size_t k = 0; k < 8; ++k) {
+      if (k > 0) filter.move(run.step(k));
+      filter.observe(run.views[k]);
+    }
+    EXPECT_EQ(filter.estimate().state, LocalisationState::localised);
+    MonteCarloEstimate estimate;
+    for (std::size_t k = 1; k < outside.poses.size(); ++k) {
+      filter.move(outside.step(k));
+      // Packed as this memory's views are.
+      estimate = filter.observe(
+          pack(compute_signature(elsewhere.room.see(outside.poses[k])), place.memory.full_scale()));
+    }
+    lost += estimate.state == LocalisationState::lost && !estimate.pose ? 1 : 0;
+    for (std::size_t k = 8; k < run.poses.size(); ++k) {
+      filter.move(run.step(k));
+      estimate = filter.observe(run.views[k]);
+    }
+    found_again += estimate.state == LocalisationState::localised &&
+                           error_m(estimate, run.poses.back()) < place.step_m
+                       ? 1
+                       : 0;
+  }
+  EXPECT_GE(lost, runs - 1);
+  EXPECT_GE(found_again, runs - 1);
+}
+
+TEST(MonteCarlo, KnowsItsHeadingAndPlaceWhenTheyAreTold) {
+  const RememberedRoom place(77, {}, 0.4);
+  const Walk run = walk(place, 2, 7);
+  MonteCarloLocaliser filter(place.memory, {.least_particles = 300, .most_particles = 300});
+  filter.start_anywhere(0.7);
+  for (const Particle& particle : filter.particles()) {
+    EXPECT_EQ(particle.pose.heading_rad, 0.7);
+  }
+  filter.start_at(run.poses[0], 0.05, 0.02);
+  EXPECT_EQ(filter.particles().size(), 300U);
+  const MonteCarloEstimate before = filter.estimate();
+  ASSERT_TRUE(before.pose);
+  EXPECT_LT(error_m(before, run.poses[0]), 0.02);
+  EXPECT_NEAR(before.modes[0].spread_m, 0.05 * std::numbers::sqrt2, 0.01);
+  EXPECT_EQ(before.state, LocalisationState::localised);
+}
+
+TEST(MonteCarlo, BlindStretchesWidenTheCloudAndTheNextImageNarrowsIt) {
+  const RememberedRoom place(78, {}, 0.3);
+  const Walk run = walk(place, 14, 8, {.translation_from_translation = 0.1});
+  MonteCarloLocaliser filter(
+      place.memory, {}, {.translation_from_translation = 0.1, .rotation_from_translation = 0.1});
+  filter.start_at(run.poses[0], 0.05, 0.05);
+  filter.observe(run.views[0]);
+  const double before = filter.estimate().spread_m;
+  for (std::size_t k = 1; k < 13; ++k) filter.move(run.step(k));
+  EXPECT_GT(filter.estimate().spread_m, 2.0 * before);
+  filter.move(run.step(13));
+  const MonteCarloEstimate after = filter.observe(run.views[13]);
+  EXPECT_LT(after.modes.at(0).spread_m, 0.5 * filter.model().spacing_m);
+  EXPECT_LT(error_m(after, run.poses[13]), place.step_m);
+}
+
+TEST(MonteCarlo, ARobotThatStandsStillDoesNotBecomeSurer) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  // Two rooms that look exactly alike: both stay possible however often the robot looks.
+  const Room room(79, {});
+  std::vector<FourierSignature> signatures;
+  std::vector<std::optional<ReferencePose>> poses;
+  std::uint64_t noise = 1;
+  for (const double offset : {0.0, 20.0}) {
+    for (const Point2 p : room.grid(0.4)) {
+      signatures.push_back(
+          compute_signature(room.see({p.x_m, p.y_m, 0.0}, 16, 96, {1.0, 0.01}, ++noise)));
+      poses.push_back(ReferencePose{p.x_m + offset, p.y_m, 0.0});
+    }
+  }
+  const VisualMemory memory = make_memory(signatures, poses);
+  const auto ranking = std::make_shared<const ColumnRanking>(memory);
+  const ObservationModel model = learn_observation_model(*ranking);
+  const Point2 here = room.grid(0.4)[7];
+  int kept = 0;
+  constexpr int runs = 10;
+  for (int seed = 1; seed <= runs; ++seed) {
+    MonteCarloLocaliser filter(ranking, model, {.seed = seed});
+    MonteCarloEstimate found;
+    for (int image = 0; image < 20; ++image) {
+      if (image > 0) filter.move({});
+      found = filter.observe(pack(compute_signature(room.see({here.x_m + 0.1, here.y_m, 0.3}, 16,
+                                                             96, {1.0, 0.01}, ++noise)),
+                                  memory.full_scale()));
+    }
+    EXPECT_NE(found.state, LocalisationState::localised);
+    bool first = false;
+    bool second = false;
+    for (const PoseMode& mode : found.modes) {
+      first |= distance(mode.mean.position(), {here.x_m + 0.1, here.y_m}) < 0.4;
+      second |= distance(mode.mean.position(), {here.x_m + 20.1, here.y_m}) < 0.4;
+    }
+    kept += first && second ? 1 : 0;
+  }
+  EXPECT_GE(kept, runs - 1);
+}
+
+TEST(MonteCarlo, WorksWithoutHeadingsInTheMemory) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  const RememberedRoom posed(80, {}, 0.3);
+  std::vector<FourierSignature> signatures;
+  std::vector<std::optional<ReferencePose>> poses;
+  for (const ViewId view : posed.memory.views()) {
+    signatures.push_back(posed.memory.signature(view));
+    const auto pose = *posed.memory.info(view).pose;
+    poses.push_back(ReferencePose{pose.x_m, pose.y_m, std::nullopt});
+  }
+  const VisualMemory memory = make_memory(signatures, poses);
+  int right = 0;
+  constexpr int runs = 6;
+  for (int seed = 1; seed <= runs; ++seed) {
+    const Walk run = walk(posed, 15, 600 + static_cast<std::uint64_t>(seed));
+    MonteCarloLocaliser filter(memory, {.seed = seed});
+    MonteCarloEstimate found;
+    for (std::size_t k = 0; k < run.poses.size(); ++k) {
+      if (k > 0) filter.move(run.step(k));
+      found = filter.observe(
+          pack(compute_signature(posed.room.see(run.poses[k])), memory.full_scale()));
+    }
+    right += error_m(found, run.poses.back()) < posed.step_m ? 1 : 0;
+  }
+  EXPECT_GE(right, runs - 1);
+}
+
+TEST(MonteCarlo, RefusesWhatMakesNoSense) {
+  const RememberedRoom place(81, {}, 0.5);
+  EXPECT_THROW(MonteCarloLocaliser(place.memory, {.least_particles = 10, .most_particles = 5}),
+               ContractError);
+  EXPECT_THROW(MonteCarloLocaliser(place.memory, {.least_particles = 0}), OptionError);
+  EXPECT_THROW(MonteCarloLocaliser(place.memory, {}, {.translation_from_translation = -1.0}),
+               OptionError);
+  MonteCarloLocaliser filter(place.memory);
+  EXPECT_THROW(filter.observe(pack(compute_signature(place.room.see({1.0, 1.0, 0.0}, 12)), 1.0F)),
+               ContractError);
+  EXPECT_THROW(filter.move({std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0}), ContractError);
+}
+
+}  // namespace
+}  // namespace panonav::testing

@@ -1,0 +1,192 @@
+#include "panonav/localisation/view_likelihood.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <set>
+#include <vector>
+
+#include "localisation/ray_cast_room.hpp"
+#include "panonav/core/error.hpp"
+#include "support/sanitizers.hpp"
+
+namespace panonav::testing {
+namespace {
+
+PackedSignature seen(const RememberedRoom& place, const Pose2& pose) {
+  return pack(compute_signature(place.room.see(pose)), place.memory.full_scale());
+}
+
+TEST(ObservationModel, LearnsHowLikenessFallsWithDistance) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  const RememberedRoom fine(61, {}, 0.25);
+  const RememberedRoom coarse(61, {}, 0.5);
+  const ObservationModel of_fine = learn_observation_model(ColumnRanking(fine.memory));
+  const ObservationModel of_coarse = learn_observation_model(ColumnRanking(coarse.memory));
+  EXPECT_NEAR(of_fine.spacing_m, 0.25, 1e-9);
+  EXPECT_NEAR(of_coarse.spacing_m, 0.5, 1e-9);
+  // The room is the same, so is the range, whatever the grid.
+  EXPECT_NEAR(of_coarse.range_m / of_fine.range_m, 1.0, 0.35);
+  EXPECT_GT(of_fine.sharpness, 0.0);
+  EXPECT_GT(of_fine.far_difference, of_fine.neighbouring_difference);
+  EXPECT_GT(of_fine.heading_width_rad, 0.0);
+  EXPECT_LE(of_fine.heading_width_rad, 3.0 * std::numbers::pi / 4);
+
+  // Views between the references, which it has not seen, follow the curve on average.
+  Random random(9);
+  const ColumnRanking ranking(fine.memory);
+  double found = 0.0;
+  double expected = 0.0;
+  const double far = of_fine.far_difference * of_fine.far_difference;
+  for (int i = 0; i < 40; ++i) {
+    const Pose2 pose = fine.room.between(fine.grid, fine.step_m, random);
+    const ColumnProfiles view(seen(fine, pose));
+    for (const ViewId reference : fine.memory.views()) {
+      const double distance_m =
+          distance(fine.memory.info(reference).pose->position(), pose.position());
+      if (distance_m > 0.5) continue;
+      found += far - std::pow(match_columns(view, ranking.profiles(reference)).difference, 2);
+      expected += far * std::exp(-distance_m / of_fine.range_m);
+    }
+  }
+  EXPECT_NEAR(found / expected, 1.0, 0.2);
+}
+
+TEST(ObservationModel, NeedsPlacesToLearnFrom) {
+  const Room room(62, {});
+  std::vector<FourierSignature> signatures;
+  std::vector<std::optional<ReferencePose>> poses;
+  for (int i = 0; i < 9; ++i) {
+    signatures.push_back(compute_signature(room.see({1.0, 1.0, 0.1 * i})));
+    poses.push_back(ReferencePose{1.0, 1.0, 0.1 * i});
+  }
+  // All in one place.
+  EXPECT_THROW((void)learn_observation_model(ColumnRanking(make_memory(signatures, poses))),
+               ContractError);
+  for (std::size_t i = 0; i < 9; ++i) poses[i].reset();
+  EXPECT_THROW((void)learn_observation_model(ColumnRanking(make_memory(signatures, poses))),
+               ContractError);
+}
+
+TEST(ViewLikelihood, IsGreatestNearTheTruthAndInItsHeading) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  const RememberedRoom place(63, {}, 0.3);
+  const ColumnRanking ranking(place.memory);
+  const ObservationModel model = learn_observation_model(ranking);
+  ViewLikelihood likelihood(ranking, model, true);
+  Random random(1);
+  int near = 0;
+  constexpr int asked = 40;
+  for (int i = 0; i < asked; ++i) {
+    const Pose2 truth = place.room.between(place.grid, place.step_m, random);
+    likelihood.begin(seen(place, truth));
+    for (std::uint32_t s = 0; s < likelihood.sites().size(); ++s) likelihood.compare(s);
+    const double there = likelihood.log_ratio(truth);
+    EXPECT_GT(there,
+              likelihood.log_ratio({truth.x_m, truth.y_m, wrap_angle(truth.heading_rad + 1.0)}));
+    double best = 0.0;
+    Pose2 found;
+    for (const Point2 corner : place.grid) {
+      for (double dx = -0.15; dx < 0.15; dx += 0.05) {
+        for (double dy = -0.15; dy < 0.15; dy += 0.05) {
+          const Pose2 pose{corner.x_m + dx, corner.y_m + dy, truth.heading_rad};
+          const double value = likelihood.log_ratio(pose);
+          if (value > best) {
+            best = value;
+            found = pose;
+          }
+        }
+      }
+    }
+    near += distance(found.position(), truth.position()) < place.step_m ? 1 : 0;
+  }
+  EXPECT_GE(near, asked * 9 / 10);
+}
+
+TEST(ViewLikelihood, ManyParticlesGetWhatEachGetsAlone) {
+  const RememberedRoom place(64, {}, 0.4);
+  const ColumnRanking ranking(place.memory);
+  ViewLikelihood likelihood(ranking, learn_observation_model(ranking), true);
+  Random random(2);
+  likelihood.begin(seen(place, place.room.between(place.grid, place.step_m, random)));
+  for (std::uint32_t s = 0; s < likelihood.sites().size(); s += 2) likelihood.compare(s);
+  std::vector<Particle> particles;
+  for (int i = 0; i < 500; ++i) {
+    particles.push_back({{random.uniform(-3.0, 9.0), random.uniform(-3.0, 9.0),
+                          random.uniform(-std::numbers::pi, std::numbers::pi)},
+                         1.0});
+  }
+  particles.push_back({{1e300, -1e300, 0.0}, 1.0});
+  std::vector<double> ratios(particles.size());
+  likelihood.log_ratios(particles, ratios);
+  double most = 0.0;
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    EXPECT_EQ(ratios[i], likelihood.log_ratio(particles[i].pose));
+    EXPECT_GE(ratios[i], 0.0);
+    most = std::max(most, ratios[i]);
+  }
+  EXPECT_GT(most, 0.0);
+  EXPECT_EQ(ratios.back(), 0.0);
+}
+
+TEST(ViewLikelihood, WithoutTheCompassHeadingsDoNotCount) {
+  const RememberedRoom place(65, {}, 0.4);
+  const ColumnRanking ranking(place.memory);
+  ViewLikelihood likelihood(ranking, learn_observation_model(ranking), false);
+  Random random(3);
+  const Pose2 truth = place.room.between(place.grid, place.step_m, random);
+  likelihood.begin(seen(place, truth));
+  for (std::uint32_t s = 0; s < likelihood.sites().size(); ++s) likelihood.compare(s);
+  const double ahead = likelihood.log_ratio(truth);
+  EXPECT_GT(ahead, 0.0);
+  EXPECT_NEAR(likelihood.log_ratio({truth.x_m, truth.y_m, wrap_angle(truth.heading_rad + 2.0)}),
+              ahead, 1e-6 * ahead);
+}
+
+TEST(ViewLikelihood, ANewViewForgetsTheLast) {
+  const RememberedRoom place(66, {}, 0.4);
+  const ColumnRanking ranking(place.memory);
+  ViewLikelihood likelihood(ranking, learn_observation_model(ranking), true);
+  Random random(4);
+  const Pose2 truth = place.room.between(place.grid, place.step_m, random);
+  likelihood.begin(seen(place, truth));
+  const double first = likelihood.compare(0);
+  EXPECT_EQ(likelihood.compare(0), first);  // once is enough
+  EXPECT_EQ(likelihood.compared_sites().size(), 1U);
+  EXPECT_EQ(*likelihood.least_difference(likelihood.compared_sites()), first);
+  likelihood.begin(seen(place, truth));
+  EXPECT_FALSE(likelihood.compared(0));
+  EXPECT_FALSE(likelihood.least_difference(std::vector<std::uint32_t>{0}));
+  EXPECT_EQ(likelihood.log_ratio(truth), 0.0);  // nothing compared, nothing explained
+}
+
+TEST(ViewLikelihood, FindsTheSitesThatParticlesAreNear) {
+  const RememberedRoom place(67, {}, 0.4);
+  const ColumnRanking ranking(place.memory);
+  ViewLikelihood likelihood(ranking, learn_observation_model(ranking), true);
+  const Point2 here = place.grid[place.grid.size() / 2];
+  const std::vector<Particle> particles{{{here.x_m, here.y_m, 0.0}, 0.9},
+                                        {{here.x_m, here.y_m, 1.0}, 0.1}};
+  const auto near = likelihood.sites_near_most(particles, 5, 0.0);
+  ASSERT_EQ(near.size(), 5U);
+  EXPECT_EQ(std::set<std::uint32_t>(near.begin(), near.end()).size(), 5U);
+  const auto around = likelihood.sites_near(here);
+  for (const std::uint32_t site : near) EXPECT_NE(std::ranges::find(around, site), around.end());
+  EXPECT_LE(around.size(), 12U);
+  EXPECT_TRUE(likelihood.sites_near({1e3, 1e3}).empty());
+  EXPECT_TRUE(likelihood.sites_near_most({}, 5, 0.0).empty());
+  EXPECT_EQ(likelihood.site_of(place.memory.views()[3]), 3U);
+}
+
+TEST(ViewLikelihood, RefusesAViewOfAnotherShape) {
+  const RememberedRoom place(68, {}, 0.5);
+  const ColumnRanking ranking(place.memory);
+  ViewLikelihood likelihood(ranking, learn_observation_model(ranking), true);
+  const auto other = pack(compute_signature(place.room.see({1.0, 1.0, 0.0}, 12)), 1.0F);
+  EXPECT_THROW(likelihood.begin(other), ContractError);
+}
+
+}  // namespace
+}  // namespace panonav::testing
