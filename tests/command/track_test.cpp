@@ -105,14 +105,15 @@ TEST_F(Track, JsonLinesHaveExactlyTheDocumentedFields) {
   ASSERT_EQ(all.size(), truth.size());
   for (std::size_t i = 0; i < all.size(); ++i) {
     const json& image = all[i];
-    EXPECT_EQ(keys_of(image),
-              (std::set<std::string>{"file", "stamp_s", "state", "pose", "modes", "particles",
-                                     "effective_particles", "resampled", "redrawn",
-                                     "difference_here", "difference_anywhere", "truth"}));
+    EXPECT_EQ(keys_of(image), (std::set<std::string>{
+                                  "file", "stamp_s", "state", "pose", "inside", "modes", "spread_m",
+                                  "particles", "effective_particles", "resampled", "redrawn",
+                                  "difference_here", "difference_anywhere", "truth"}));
     EXPECT_EQ(image["file"], view_name(i));
     EXPECT_EQ(image["stamp_s"], 0.5 * static_cast<double>(i));
     const std::string state = image["state"];
     EXPECT_TRUE(state == "localised" || state == "ambiguous" || state == "lost") << state;
+    EXPECT_EQ(image["pose"].is_null(), state == "lost");
     if (!image["pose"].is_null()) {
       EXPECT_EQ(keys_of(image["pose"]), (std::set<std::string>{"x_m", "y_m", "heading_rad"}));
     }
@@ -120,6 +121,9 @@ TEST_F(Track, JsonLinesHaveExactlyTheDocumentedFields) {
     EXPECT_NEAR(image["truth"]["heading_rad"], truth[i].heading_rad, 1e-12);
     EXPECT_GE(image["particles"].get<int>(), 1);
     EXPECT_LE(image["effective_particles"].get<double>(), image["particles"].get<double>() + 1e-6);
+    EXPECT_GE(image["inside"].get<double>(), 0.0);
+    EXPECT_LE(image["inside"].get<double>(), 1.0);
+    EXPECT_EQ(image["inside"].get<double>() < 0.5, state == "lost");
     EXPECT_GE(image["redrawn"].get<int>(), 0);
     EXPECT_TRUE(image["resampled"].is_boolean());
     double weight = 0.0;

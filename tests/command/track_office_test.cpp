@@ -1,0 +1,186 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <regex>
+
+#include "command_runner.hpp"
+#include "panonav/evaluation/statistics.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/io/image_file.hpp"
+
+namespace panonav::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+std::string bytes_of(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+std::vector<std::string> with_small_pictures(std::vector<std::string> arguments) {
+  for (const char* more : {"--kind", "panorama", "--rows", "20", "--columns", "128"}) {
+    arguments.emplace_back(more);
+  }
+  return arguments;
+}
+
+/// A simulated office on a 25 cm grid and a walk through it, made once for all tests of this file.
+class TrackOffice : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new TemporaryFolder;
+    simulate({"office", *folder_ / "grid", "--grid", "0.25"});
+    simulate(
+        {"office", run(), "--path", "walk", "--poses", "40", "--spacing-m", "0.2", "--seed", "5"});
+    const auto made = run_panonav({"memorise", *folder_ / "grid", memory()});
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+  }
+  static void TearDownTestSuite() { delete folder_; }
+  static void simulate(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "simulate");
+    const auto result = run_panonav(with_small_pictures(arguments));
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+  }
+  static constexpr double spacing_m = 0.25;
+  static std::string memory() { return *folder_ / "office.panonav"; }
+  static std::string run() { return *folder_ / "walk"; }
+
+  static TemporaryFolder* folder_;
+};
+TemporaryFolder* TrackOffice::folder_ = nullptr;
+
+struct Followed {
+  int exit_code = 0;
+  std::vector<json> images;
+};
+
+Followed follow(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), "track");
+  arguments.emplace_back("--json");
+  const auto result = run_panonav(arguments);
+  EXPECT_TRUE(result.err.empty()) << result.err;
+  Followed followed{result.exit_code, {}};
+  for (const auto& line : lines(result.out)) followed.images.push_back(json::parse(line));
+  return followed;
+}
+
+double error_m(const json& image) {
+  const double x = image["pose"]["x_m"].get<double>() - image["truth"]["x_m"].get<double>();
+  const double y = image["pose"]["y_m"].get<double>() - image["truth"]["y_m"].get<double>();
+  return std::hypot(x, y);
+}
+
+TEST_F(TrackOffice, IsFoundSoonAndFollowedToTheEnd) {
+  const auto [exit_code, images] = follow({memory(), run()});
+  EXPECT_EQ(exit_code, 0);
+  ASSERT_EQ(images.size(), 40U);
+  const auto first =
+      std::ranges::find(images, "localised", [](const json& i) { return i["state"]; });
+  ASSERT_LE(first - images.begin(), 9);
+  std::vector<double> errors;
+  for (auto image = first; image != images.end(); ++image) {
+    EXPECT_EQ((*image)["state"], "localised") << (*image)["file"];
+    if ((*image)["pose"].is_null()) continue;
+    errors.push_back(error_m(*image));
+    EXPECT_LT(errors.back(), spacing_m) << (*image)["file"];
+    EXPECT_LT(std::abs(angle_difference((*image)["pose"]["heading_rad"],
+                                        (*image)["truth"]["heading_rad"])),
+              radians(15.0))
+        << (*image)["file"];
+  }
+  EXPECT_LT(median(errors), 0.5 * spacing_m);
+}
+
+TEST_F(TrackOffice, OdometryCarriesItThroughAStretchWithoutPictures) {
+  // Two metres between pictures.
+  const auto [exit_code, images] = follow({memory(), run(), "--every", "10"});
+  EXPECT_EQ(exit_code, 0);
+  ASSERT_EQ(images.size(), 4U);
+  for (const auto& image : images) {
+    if (image["state"] != "localised") continue;
+    EXPECT_LT(error_m(image), spacing_m) << image["file"];
+  }
+  EXPECT_EQ(images.back()["state"], "localised");
+}
+
+TEST_F(TrackOffice, AnotherRoomIsNoAnswer) {
+  simulate({"lab", *folder_ / "lab", "--path", "walk", "--poses", "12", "--spacing-m", "0.2"});
+  const auto [exit_code, images] = follow({memory(), *folder_ / "lab"});
+  ASSERT_EQ(images.size(), 12U);
+  EXPECT_EQ(exit_code, 1);
+  for (const auto& image : images) EXPECT_NE(image["state"], "localised") << image["file"];
+  EXPECT_EQ(images.back()["state"], "lost");
+}
+
+TEST_F(TrackOffice, EvaluateReadsTheTrajectoryAndFindsTheSameErrors) {
+  const auto tum = *folder_ / "estimate.tum";
+  const auto followed = follow({memory(), run(), "--tum", tum});
+  std::vector<double> errors;
+  for (const auto& image : followed.images) {
+    if (image["state"] == "localised") errors.push_back(error_m(image));
+  }
+  ASSERT_GE(errors.size(), 20U);
+  const auto result =
+      run_panonav({"evaluate", tum, run() + "/poses.csv", "--align", "false", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto said = json::parse(result.out);
+  EXPECT_EQ(said["pairs"], errors.size());
+  EXPECT_NEAR(said["position_m"]["median"], median(errors), 1e-6);
+}
+
+TEST_F(TrackOffice, TheReportHoldsPicturesAndARunToPlay) {
+  const auto out = *folder_ / "report";
+  const auto result = run_panonav({"track", memory(), run(), "--report", out});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.out.find(out + "/index.html"), std::string::npos);
+  const std::string page = bytes_of(fs::path(out) / "index.html");
+  EXPECT_NE(page.find("href=\"track.html\""), std::string::npos);
+  EXPECT_EQ(page.find("http"), std::string::npos) << "the page needs the network";
+  EXPECT_EQ(page.find("nan"), std::string::npos);
+  const std::regex source("<img src=\"([^\"]+)\"");
+  int pictures = 0;
+  for (std::sregex_iterator i(page.begin(), page.end(), source), end; i != end; ++i) {
+    EXPECT_GE(read_image(fs::path(out) / (*i)[1].str()).width(), 500);
+    ++pictures;
+  }
+  EXPECT_EQ(pictures, 4);
+
+  const std::string played = bytes_of(fs::path(out) / "track.html");
+  EXPECT_EQ(played.find("http"), std::string::npos) << "the animation needs the network";
+  EXPECT_EQ(played.find(" src="), std::string::npos) << "the animation needs other files";
+  const std::string begin = "const run = ";
+  const auto at = played.find(begin);
+  ASSERT_NE(at, std::string::npos);
+  const auto data =
+      json::parse(played.substr(at + begin.size(), played.find(";\n", at) - at - begin.size()));
+  const auto images = follow({memory(), run()}).images;
+  ASSERT_EQ(data["images"].size(), images.size());
+  const auto info = json::parse(run_panonav({"info", memory(), "--json"}).out);
+  EXPECT_EQ(data["references"].size(), info["views"].get<std::size_t>());
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const json& shown = data["images"][i];
+    EXPECT_EQ(shown["file"], images[i]["file"]);
+    EXPECT_EQ(shown["state"], images[i]["state"]);
+    EXPECT_NEAR(shown["truth"][0], images[i]["truth"]["x_m"], 0.001);
+    EXPECT_GE(shown["particles"].size(), 2U * 100U);
+    EXPECT_LE(shown["particles"].size(), 2U * 300U);
+  }
+
+  // Again into the same folder, and never into somebody else's.
+  EXPECT_EQ(run_panonav({"track", memory(), run(), "--report", out}).exit_code, 0);
+  const auto foreign = folder_->path() / "mine";
+  fs::create_directory(foreign);
+  std::ofstream(foreign / "index.html") << "mine";
+  const auto line = refusal({"track", memory(), run(), "--report", foreign});
+  EXPECT_NE(line.find("not made by panonav track"), std::string::npos) << line;
+  EXPECT_EQ(bytes_of(foreign / "index.html"), "mine");
+}
+
+}  // namespace
+}  // namespace panonav::testing
