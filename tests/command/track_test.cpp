@@ -12,6 +12,7 @@
 #include "landmark_world.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/io/image_file.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -221,6 +222,16 @@ TEST_F(Track, TextSaysTheSameAsJson) {
             0U)
       << said[all.size()];
   EXPECT_EQ(result.exit_code, localised > 0 ? 0 : 1);
+}
+
+TEST_F(Track, PicturesThatShowNothingAreNoAnswer) {
+  write_run(folder_->path() / "dark", *world_, circle_poses(6));
+  const Image black(96, 12);
+  for (std::size_t i = 0; i < 6; ++i)
+    write_png(folder_->path() / "dark" / view_name(i), black.view());
+  const auto result = run_panonav({"track", memory(), *folder_ / "dark"});
+  EXPECT_EQ(result.exit_code, 1) << result.out;
+  EXPECT_NE(result.out.find("never localised"), std::string::npos) << result.out;
 }
 
 TEST_F(Track, ATrajectoryOfTheLocalisedImages) {
