@@ -1,6 +1,7 @@
 #pragma once
 
 #include <span>
+#include <string>
 
 #include "panonav/core/executor.hpp"
 #include "panonav/evaluation/m03_support.hpp"
@@ -26,5 +27,24 @@ void reproduce_kidnapping(const TrackingReproductionOptions& options,
 void reproduce_tracking_sweeps(const TrackingReproductionOptions& options,
                                std::span<const OfficeRuns> offices, Executor& executor,
                                Reproduction& result);
+
+/// "A long indoor corridor with a loop where we face many false hypothesis": never surely wrong.
+void reproduce_corridor(const TrackingReproductionOptions& options, Executor& executor,
+                        Reproduction& result);
+/// "A large outdoor environment where we are investigating the different nature of brightness
+/// variations".
+void reproduce_garden(const TrackingReproductionOptions& options, Executor& executor,
+                      Reproduction& result);
+/// A robot that leaves the memorised half of the scene `name` and returns.
+void reproduce_leaving(const TrackingReproductionOptions& options, const std::string& name,
+                       Executor& executor, Reproduction& result);
+/// Global localisation in the world `name` of `options.data`. Throws FileError.
+void reproduce_gazebo_world(const TrackingReproductionOptions& options, const std::string& name,
+                            Executor& executor, Reproduction& result);
+/// The recordings of `options.data`: sussex_route, gantry_plants. Throw FileError.
+void reproduce_recorded_route(const TrackingReproductionOptions& options, Executor& executor,
+                              Reproduction& result);
+void reproduce_gantry(const TrackingReproductionOptions& options, Executor& executor,
+                      Reproduction& result);
 
 }  // namespace panonav

@@ -43,6 +43,28 @@ Reproduction reproduce_m03(const TrackingReproductionOptions& options, Executor&
   over_offices("position tracking", 1.0, reproduce_position_tracking);
   over_offices("kidnapped robot", 1.0, reproduce_kidnapping);
   over_offices("particles and odometry", 10.0, reproduce_tracking_sweeps);
+  stages.push_back(
+      {"corridor", 10.0 * options.scenes, [&] { reproduce_corridor(options, executor, result); }});
+  stages.push_back(
+      {"garden", 10.0 * options.scenes, [&] { reproduce_garden(options, executor, result); }});
+  for (const std::string scene : {"hall", "loop"}) {
+    stages.push_back({"leaving the " + scene, 5.0 * options.scenes,
+                      [&, scene] { reproduce_leaving(options, scene, executor, result); }});
+  }
+  // What is not there is left out, so that any part of the data will do.
+  for (const std::string world : {"small_warehouse", "small_house"}) {
+    if (options.data.empty() || !std::filesystem::is_directory(options.data / "scenes" / world)) {
+      continue;
+    }
+    stages.push_back(
+        {world, 50.0, [&, world] { reproduce_gazebo_world(options, world, executor, result); }});
+  }
+  const auto recording = [&](const std::string& name, auto experiment) {
+    if (options.data.empty() || !std::filesystem::is_directory(options.data / name)) return;
+    stages.push_back({name, 10.0, [&, experiment] { experiment(options, executor, result); }});
+  };
+  recording("sussex_route", reproduce_recorded_route);
+  recording("gantry_plants", reproduce_gantry);
 
   double all = 0.0;
   for (const Stage& stage : stages) all += stage.cost;

@@ -45,16 +45,14 @@ std::vector<Point2> TrackingPlace::reference_positions() const {
   return positions;
 }
 
-std::shared_ptr<const TrackingPlace> remember_for_tracking(
-    const PlaceRecording& place, Executor& executor, const std::function<bool(Point2)>& kept) {
-  std::vector<const PlacedView*> views;
-  for (const PlacedView& view : place.references) {
-    if (!kept || kept(view.pose.position())) views.push_back(&view);
-  }
-  require(!views.empty(), "reference views", 0.0, ">= 1");
+std::shared_ptr<const TrackingPlace> remember_views(std::span<const ReferencePose> poses,
+                                                    std::span<const Panorama* const> views,
+                                                    double spacing_m, Executor& executor) {
+  require(!views.empty() && views.size() == poses.size(), "reference views",
+          static_cast<double>(views.size()), ">= 1, as many as poses");
   std::vector<std::optional<FourierSignature>> signatures(views.size());
   executor.for_chunks(views.size(), 8, [&](std::size_t begin, std::size_t end, std::size_t) {
-    for (std::size_t i = begin; i < end; ++i) signatures[i] = signature_of(views[i]->panorama);
+    for (std::size_t i = begin; i < end; ++i) signatures[i] = signature_of(*views[i]);
   });
   // As the command does: of the first views, without component 0, which says how bright they are.
   float full_scale = 0.0F;
@@ -65,11 +63,21 @@ std::shared_ptr<const TrackingPlace> remember_for_tracking(
   }
   VisualMemory memory(signatures[0]->shape(), full_scale, signatures[0]->elevations());
   for (std::size_t i = 0; i < signatures.size(); ++i) {
-    const Pose2& pose = views[i]->pose;
-    memory.append(*signatures[i],
-                  {std::to_string(i), ReferencePose{pose.x_m, pose.y_m, pose.heading_rad}, {}});
+    memory.append(*signatures[i], {std::to_string(i), poses[i], {}});
   }
-  return std::make_shared<const TrackingPlace>(std::move(memory), place.spacing_m);
+  return std::make_shared<const TrackingPlace>(std::move(memory), spacing_m);
+}
+
+std::shared_ptr<const TrackingPlace> remember_for_tracking(
+    const PlaceRecording& place, Executor& executor, const std::function<bool(Point2)>& kept) {
+  std::vector<ReferencePose> poses;
+  std::vector<const Panorama*> views;
+  for (const PlacedView& view : place.references) {
+    if (kept && !kept(view.pose.position())) continue;
+    poses.push_back({view.pose.x_m, view.pose.y_m, view.pose.heading_rad});
+    views.push_back(&view.panorama);
+  }
+  return remember_views(poses, views, place.spacing_m, executor);
 }
 
 PackedSignature signature_for(const Panorama& panorama, const VisualMemory& memory) {

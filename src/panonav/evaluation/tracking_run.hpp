@@ -48,7 +48,13 @@ class TrackingPlace {
   Localiser localiser_;
 };
 
-/// The references of a recorded place as a memory, as the command's defaults have it.
+/// Views as a memory, as the command's defaults have it. `spacing_m` as TrackingPlace. Throws
+/// ContractError on numbers of poses and views that differ, or no view.
+[[nodiscard]] std::shared_ptr<const TrackingPlace> remember_views(
+    std::span<const ReferencePose> poses, std::span<const Panorama* const> views, double spacing_m,
+    Executor& executor);
+
+/// The same of the references of a recorded place.
 /// `kept` chooses which of them; empty: all.
 [[nodiscard]] std::shared_ptr<const TrackingPlace> remember_for_tracking(
     const PlaceRecording& place, Executor& executor,
