@@ -24,7 +24,7 @@ const std::array<Rule, 4>& rules() {
   static const std::array<Rule, 4> all{
       Rule{"none", "nothing redrawn", Redraw::none},
       Rule{"uniform", "50 redrawn anywhere", Redraw::uniform},
-      Rule{"topological", "10 % redrawn around the best matches", Redraw::topological},
+      Rule{"topological", "the paper's redraw", Redraw::topological},
       Rule{"explained", "our rule of redrawing", Redraw::explained}};
   return all;
 }
@@ -138,14 +138,14 @@ void reproduce_global_localisation(const TrackingReproductionOptions& options,
                              "position and heading, for four rules of redrawing."});
   const std::array<std::size_t, 3> steps{0, 2, 8};
   const OfficeRuns& shown = offices.front();
-  write_plot(options.out / "fig07_global_localisation.png",
-             particle_maps(*shown.constant_heading.place, shown.furniture,
-                           shown.constant_heading.runs.front(), paper_setting(), seed_of_clean,
-                           steps, "Global localisation"),
-             3);
+  write_plot(
+      options.out / "fig07_global_localisation.png",
+      particle_maps(*shown.hard.place, shown.furniture, shown.hard.runs.front(),
+                    compass_setting(Redraw::none), seed_of_hard, steps, "Global localisation"),
+      3);
   result.pictures.push_back({"fig07_global_localisation.png",
-                             "Global localisation with as many particles as references ([M03] "
-                             "figure 7, 1 to 3)."});
+                             "Global localisation with as many particles as references and "
+                             "nothing redrawn, heading unknown, hard ([M03] figure 7, 1 to 3)."});
 }
 
 }  // namespace panonav

@@ -84,8 +84,9 @@ std::string single_images_text(std::span<const RunSet> sets) {
         std::lround(100.0 * static_cast<double>(count) / static_cast<double>(sum.asked)));
   };
   const auto spacing = std::lround(100.0 * sets.front().place->spacing_m());
-  return "one image alone: right " + percent(sum.right) + " %, within " + std::to_string(spacing) +
-         " cm " + percent(sum.near) + " %";
+  return "one image alone: right " + percent(sum.right) + " % (by dissimilarity only " +
+         percent(sum.right_by_dissimilarity) + " %), within " + std::to_string(spacing) + " cm " +
+         percent(sum.near) + " %";
 }
 
 std::vector<double> capped_images(std::span<const TrackedRun> runs, double radius_m,

@@ -206,6 +206,7 @@ void SingleImages::add(const SingleImages& other) {
   asked += other.asked;
   right += other.right;
   near += other.near;
+  right_by_dissimilarity += other.right_by_dissimilarity;
 }
 
 SingleImages localise_single_images(const TrackingPlace& place, std::span<const TrackingRun> runs,
@@ -220,10 +221,13 @@ SingleImages localise_single_images(const TrackingPlace& place, std::span<const 
       for (const Point2 position : positions) {
         nearest = std::min(nearest, distance(position, truth));
       }
-      const auto answer = place.localiser().localise(*step.view);
-      const double best =
-          distance(place.memory().info(answer.matches.at(0).view).pose->position(), truth);
+      const auto way_to = [&](ViewId view) {
+        return distance(place.memory().info(view).pose->position(), truth);
+      };
+      const double best = way_to(place.localiser().localise(*step.view).matches.at(0).view);
+      const auto found = place.memory().search(*step.view, {.top = 1});
       ++parts[r].asked;
+      parts[r].right_by_dissimilarity += way_to(found.matches.at(0).view) <= nearest + 1e-9 ? 1 : 0;
       parts[r].right += best <= nearest + 1e-9 ? 1 : 0;
       parts[r].near += best <= place.spacing_m() ? 1 : 0;
     }

@@ -139,6 +139,8 @@ struct SingleImages {
   std::size_t asked = 0;
   std::size_t right = 0;  ///< the best match is the reference nearest to the truth
   std::size_t near = 0;   ///< the best match is within one spacing of the truth
+  /// The reference of least dissimilarity is the one nearest to the truth: the paper's way.
+  std::size_t right_by_dissimilarity = 0;
   void add(const SingleImages& other);
 };
 [[nodiscard]] SingleImages localise_single_images(const TrackingPlace& place,
