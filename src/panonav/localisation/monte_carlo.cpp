@@ -19,7 +19,7 @@ namespace panonav {
 namespace {
 
 constexpr int searched_views = 16;
-constexpr int searched_when_localised = 8;
+constexpr int searched_when_localised = 4;
 constexpr std::size_t followed_sites = 256;
 constexpr double least_followed = 1e-3;  // share of the weight near a site
 constexpr std::size_t followed_when_localised = 16;
@@ -82,8 +82,8 @@ struct MonteCarloLocaliser::Implementation {
     const auto sites = likelihood.sites();
     const auto& site = sites[random.index(sites.size())];
     const double half = 0.5 * model.spacing_m;
-    const double x = static_cast<double>(site.x_m) + random.uniform(-half, half);
-    const double y = static_cast<double>(site.y_m) + random.uniform(-half, half);
+    const double x = site.position.x_m + random.uniform(-half, half);
+    const double y = site.position.y_m + random.uniform(-half, half);
     const double turn = random.uniform(-std::numbers::pi, std::numbers::pi);
     return {x, y, heading_rad.value_or(turn)};
   }
@@ -104,7 +104,7 @@ struct MonteCarloLocaliser::Implementation {
   Pose2 pose_told_by(Candidate candidate) {
     const auto& s = likelihood.sites()[candidate.site];
     const double told = static_cast<double>(candidate.other ? s.other_heading_rad : s.heading_rad);
-    return {static_cast<double>(s.x_m), static_cast<double>(s.y_m),
+    return {s.position.x_m, s.position.y_m,
             wrap_angle(tells_heading(candidate.site) ? told : borrowed_heading())};
   }
   // As far around it as the truth may be.
@@ -216,8 +216,7 @@ void MonteCarloLocaliser::Implementation::compare_views(const PackedSignature& v
     }
   }
   if (const auto best = best_of(likelihood.compared_sites())) {
-    const Point2 place{static_cast<double>(sites[*best].x_m),
-                       static_cast<double>(sites[*best].y_m)};
+    const Point2 place = sites[*best].position;
     for (const std::uint32_t site : likelihood.sites_near(place)) likelihood.compare(site);
   }
   latest.difference_here = likelihood.least_difference(carried);
@@ -260,6 +259,11 @@ int MonteCarloLocaliser::Implementation::redraw_fixed(const PackedSignature& vie
   return static_cast<int>(count);
 }
 
+// Weights need no more digits.
+double exp_of(double x) {
+  return static_cast<double>(std::exp(static_cast<float>(x)));
+}
+
 // The share of the log-likelihood, at most `most`, after which enough particles still count.
 double bearable_share(std::span<const Particle> particles, std::span<const double> log_weights,
                       double most) {
@@ -267,7 +271,7 @@ double bearable_share(std::span<const Particle> particles, std::span<const doubl
     double sum = 0.0;
     double squares = 0.0;
     for (std::size_t i = 0; i < particles.size(); ++i) {
-      const double weight = particles[i].weight * std::exp(share * log_weights[i]);
+      const double weight = particles[i].weight * exp_of(share * log_weights[i]);
       sum += weight;
       squares += weight * weight;
     }
@@ -304,7 +308,7 @@ double MonteCarloLocaliser::Implementation::weigh() {
     if (stage == 0) {
       double sum = 0.0;
       for (std::size_t i = 0; i < particles.size(); ++i) {
-        sum += particles[i].weight * std::exp(log_ratios[i]);
+        sum += particles[i].weight * exp_of(log_ratios[i]);
       }
       evidence_in_full = most + std::log(sum);
     }
@@ -312,7 +316,7 @@ double MonteCarloLocaliser::Implementation::weigh() {
         stage + 1 == most_stages ? left : bearable_share(particles, log_ratios, left);
     double sum = 0.0;
     for (std::size_t i = 0; i < particles.size(); ++i) {
-      particles[i].weight *= std::exp(share * log_ratios[i]);
+      particles[i].weight *= exp_of(share * log_ratios[i]);
       sum += particles[i].weight;
     }
     if (!(sum > 0.0)) {  // what explains the view had lost all its weight

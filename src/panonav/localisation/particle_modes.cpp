@@ -1,10 +1,11 @@
 #include "panonav/localisation/particle_modes.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
-#include <unordered_map>
+#include <optional>
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
@@ -71,15 +72,50 @@ struct Moments {
   }
 };
 
-std::uint64_t key_of(std::int32_t x, std::int32_t y, std::int32_t heading) {
-  return (static_cast<std::uint64_t>(static_cast<std::uint32_t>(x) & 0xFFFFFFU) << 40U) |
-         (static_cast<std::uint64_t>(static_cast<std::uint32_t>(y) & 0xFFFFFFU) << 16U) |
-         static_cast<std::uint64_t>(static_cast<std::uint32_t>(heading) & 0xFFFFU);
-}
+/// Bins by their place; open addressing, because it is asked for each particle.
+class BinTable {
+ public:
+  explicit BinTable(std::size_t most)
+      : slots_(std::bit_ceil(2 * most + 2), none), last_(slots_.size() - 1) {}
+
+  [[nodiscard]] std::span<Bin> bins() { return bins_; }
+  [[nodiscard]] std::optional<std::uint32_t> find(std::int32_t x, std::int32_t y,
+                                                  std::int32_t heading) const {
+    const std::uint32_t found = slots_[slot_of(x, y, heading)];
+    return found == none ? std::nullopt : std::optional(found);
+  }
+  std::uint32_t find_or_add(std::int32_t x, std::int32_t y, std::int32_t heading) {
+    std::uint32_t& slot = slots_[slot_of(x, y, heading)];
+    if (slot == none) {
+      slot = static_cast<std::uint32_t>(bins_.size());
+      bins_.push_back({x, y, heading, 0.0, -1});
+    }
+    return slot;
+  }
+
+ private:
+  static constexpr std::uint32_t none = 0xFFFFFFFF;
+  [[nodiscard]] std::size_t slot_of(std::int32_t x, std::int32_t y, std::int32_t heading) const {
+    std::uint64_t hash = static_cast<std::uint32_t>(x) * 0x9E3779B97F4A7C15ULL;
+    hash = (hash ^ static_cast<std::uint32_t>(y)) * 0xBF58476D1CE4E5B9ULL;
+    hash = (hash ^ static_cast<std::uint32_t>(heading)) * 0x94D049BB133111EBULL;
+    std::size_t slot = (hash >> 32U) & last_;
+    while (slots_[slot] != none) {
+      const Bin& bin = bins_[slots_[slot]];
+      if (bin.x == x && bin.y == y && bin.heading == heading) break;
+      slot = (slot + 1) & last_;
+    }
+    return slot;
+  }
+
+  std::vector<std::uint32_t> slots_;
+  std::size_t last_;
+  std::vector<Bin> bins_;
+};
 
 // Particles beyond any map, or at no number, share the outermost bin.
 std::int32_t bin_at(double cells) {
-  constexpr double most = 8e6;  // key_of keeps 24 bits
+  constexpr double most = 1e9;
   const double cell = std::floor(cells);
   return static_cast<std::int32_t>(std::abs(cell) < most ? cell : std::copysign(most, cell));
 }
@@ -93,9 +129,7 @@ ParticleModes find_modes(std::span<const Particle> particles, const PoseBins& bi
   ParticleModes result;
   result.mode_of.assign(particles.size(), -1);
 
-  std::vector<Bin> cells;
-  std::unordered_map<std::uint64_t, std::uint32_t> index;
-  index.reserve(particles.size());
+  BinTable table(particles.size());
   std::vector<std::uint32_t> bin_of(particles.size());
   const double sectors_per_radian = bins.headings / (2.0 * std::numbers::pi);
   double sum = 0.0;
@@ -105,15 +139,13 @@ ParticleModes find_modes(std::span<const Particle> particles, const PoseBins& bi
     const auto y = bin_at(pose.y_m / bins.cell_m);
     const auto sector = bin_at((pose.heading_rad + std::numbers::pi) * sectors_per_radian);
     const std::int32_t heading = std::clamp(sector, 0, bins.headings - 1);
-    const auto [at, fresh] =
-        index.try_emplace(key_of(x, y, heading), static_cast<std::uint32_t>(cells.size()));
-    if (fresh) cells.push_back({x, y, heading, 0.0, -1});
-    cells[at->second].weight += particles[i].weight;
-    bin_of[i] = at->second;
+    bin_of[i] = table.find_or_add(x, y, heading);
+    table.bins()[bin_of[i]].weight += particles[i].weight;
     sum += particles[i].weight;
   }
   if (!(sum > 0.0)) return result;
 
+  const std::span<Bin> cells = table.bins();
   const double share = sum / static_cast<double>(particles.size());
   for (const Bin& bin : cells) result.occupied_bins += bin.weight >= 0.5 * share ? 1 : 0;
 
@@ -136,10 +168,10 @@ ParticleModes find_modes(std::span<const Particle> particles, const PoseBins& bi
       for (std::int32_t dy = -reach; dy <= reach; ++dy) {
         for (std::int32_t dh = -turn_reach; dh <= turn_reach; ++dh) {
           const std::int32_t heading = (cells[seed].heading + dh + bins.headings) % bins.headings;
-          const auto found = index.find(key_of(cells[seed].x + dx, cells[seed].y + dy, heading));
-          if (found == index.end() || cells[found->second].mode >= 0) continue;
-          cells[found->second].mode = modes;
-          weight += cells[found->second].weight;
+          const auto found = table.find(cells[seed].x + dx, cells[seed].y + dy, heading);
+          if (!found || cells[*found].mode >= 0) continue;
+          cells[*found].mode = modes;
+          weight += cells[*found].weight;
         }
       }
     }

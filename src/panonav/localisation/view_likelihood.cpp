@@ -39,8 +39,12 @@ ViewLikelihood::ViewLikelihood(const ColumnRanking& ranking, const ObservationMo
   for (const ViewId view : memory.views()) {
     const auto& pose = memory.info(view).pose;
     if (!pose) continue;
-    sites_.push_back({view, static_cast<float>(pose->x_m), static_cast<float>(pose->y_m),
-                      std::numeric_limits<float>::quiet_NaN(), 0.0F, 0.0F, 0.0F, 0});
+    Site& site = sites_.emplace_back();
+    site.view = view;
+    site.position = pose->position();
+    site.reference_heading_rad = pose->heading_rad ? static_cast<float>(*pose->heading_rad)
+                                                   : std::numeric_limits<float>::quiet_NaN();
+    site.heading_rad = site.reference_heading_rad;
     views_.push_back(view);
     profiles_.push_back(ranking.profiles(view));
   }
@@ -54,18 +58,17 @@ ViewLikelihood::ViewLikelihood(const ColumnRanking& ranking, const ObservationMo
 
 void ViewLikelihood::index_sites() {
   cell_m_ = model_.spacing_m;
+  cells_per_metre_ = 1.0 / cell_m_;
   const double reach_m =
       std::max(near_spacings * model_.spacing_m, std::min(model_.range_m, 4 * model_.spacing_m));
   const auto around = static_cast<std::int32_t>(std::ceil(reach_m / cell_m_));
   // (cell, distance from the cell's centre, site)
   std::vector<std::tuple<std::int32_t, std::int32_t, float, std::uint32_t>> entries;
   for (std::uint32_t s = 0; s < sites_.size(); ++s) {
-    const auto x = static_cast<std::int32_t>(std::floor(sites_[s].x_m / cell_m_));
-    const auto y = static_cast<std::int32_t>(std::floor(sites_[s].y_m / cell_m_));
+    const auto [x, y] = cell_of(sites_[s].position);
     for (std::int32_t cx = x - around; cx <= x + around; ++cx) {
       for (std::int32_t cy = y - around; cy <= y + around; ++cy) {
-        const double distance_m =
-            std::hypot((cx + 0.5) * cell_m_ - sites_[s].x_m, (cy + 0.5) * cell_m_ - sites_[s].y_m);
+        const double distance_m = distance(centre_of({cx, cy}), sites_[s].position);
         if (distance_m > reach_m + 0.5 * cell_m_) continue;
         entries.emplace_back(cx, cy, static_cast<float>(distance_m), s);
       }
@@ -106,9 +109,16 @@ std::pair<std::int32_t, std::int32_t> ViewLikelihood::cell_of(Point2 position) c
   // Farther than any memory reaches all places are alike.
   constexpr double limit = 2e9;
   const auto index = [&](double value) {
-    return static_cast<std::int32_t>(std::clamp(std::floor(value / cell_m_), -limit, limit));
+    const double far = value * cells_per_metre_;
+    const double cells = far < limit ? (far > -limit ? far : -limit) : limit;
+    const auto towards_zero = static_cast<std::int32_t>(cells);  // faster than floor
+    return towards_zero - (static_cast<double>(towards_zero) > cells ? 1 : 0);
   };
   return {index(position.x_m), index(position.y_m)};
+}
+
+Point2 ViewLikelihood::centre_of(std::pair<std::int32_t, std::int32_t> cell) const noexcept {
+  return {(cell.first + 0.5) * cell_m_, (cell.second + 0.5) * cell_m_};
 }
 
 void ViewLikelihood::begin(const PackedSignature& view) {
@@ -143,9 +153,7 @@ double ViewLikelihood::compare(std::uint32_t site) {
     fall_.blur_square_m2 =
         static_cast<float>(std::max(0.0, apart_m * apart_m - nearest_m * nearest_m));
   }
-  const auto& heading = ranking_->memory().info(s.view).pose->heading_rad;
-  s.heading_rad = heading ? static_cast<float>(*heading + match.heading_rad)
-                          : std::numeric_limits<float>::quiet_NaN();
+  s.heading_rad = s.reference_heading_rad + static_cast<float>(match.heading_rad);
   s.other_heading_rad =
       s.heading_rad + static_cast<float>(matches.other.heading_rad - match.heading_rad);
   differences_[site] = match.difference;
@@ -175,12 +183,14 @@ const kernels::LikenessLanes& ViewLikelihood::lanes_of(Cell& cell) {
     lanes.y_m[i] = lanes.likeness[i] = lanes.heading_rad[i] = lanes.per_square_turn[i] = 0.0F;
     lanes.other_likeness[i] = lanes.other_heading_rad[i] = 0.0F;
   }
+  // Small numbers, wherever on Earth the origin is.
+  const Point2 centre = centre_of({cell.x, cell.y});
   const auto per_square_turn =
       static_cast<float>(-0.5 / (model_.heading_width_rad * model_.heading_width_rad));
   for (std::size_t i = 0; i < cell.end - cell.begin; ++i) {
     const Site& s = sites_[near_[cell.begin + i]];
-    lanes.x_m[i] = s.x_m;
-    lanes.y_m[i] = s.y_m;
+    lanes.x_m[i] = static_cast<float>(s.position.x_m - centre.x_m);
+    lanes.y_m[i] = static_cast<float>(s.position.y_m - centre.y_m);
     if (s.compared_at != number_) continue;
     lanes.likeness[i] = s.likeness;
     if (!compass_ || std::isnan(s.heading_rad)) continue;
@@ -199,11 +209,12 @@ void ViewLikelihood::log_ratios(std::span<const Particle> particles, std::span<d
   std::size_t begin = 0;
   while (begin < particles.size()) {
     const auto place = cell_of(particles[begin].pose.position());
+    const Point2 centre = centre_of(place);
     std::size_t count = 0;
     do {
       const Pose2& pose = particles[begin + count].pose;
-      x_m[count] = static_cast<float>(pose.x_m);
-      y_m[count] = static_cast<float>(pose.y_m);
+      x_m[count] = static_cast<float>(pose.x_m - centre.x_m);
+      y_m[count] = static_cast<float>(pose.y_m - centre.y_m);
       heading_rad[count] = static_cast<float>(pose.heading_rad);
       ++count;
     } while (count < most && begin + count < particles.size() &&

@@ -30,7 +30,8 @@ class ViewLikelihood {
   /// The position of a posed view.
   struct Site {
     ViewId view;
-    float x_m, y_m;
+    Point2 position;
+    float reference_heading_rad;  ///< NaN: not known
     float heading_rad;  ///< absolute, of the robot that took the view compared; NaN: not known
     float likeness;     ///< 0: unlike, or not compared
     float other_heading_rad;    ///< the second heading that fits (`ColumnMatches`), and
@@ -78,6 +79,7 @@ class ViewLikelihood {
   /// Index in `table_`; empty where no reference is near.
   [[nodiscard]] std::optional<std::uint32_t> cell_at(std::int32_t x, std::int32_t y) const noexcept;
   [[nodiscard]] std::pair<std::int32_t, std::int32_t> cell_of(Point2 position) const noexcept;
+  [[nodiscard]] Point2 centre_of(std::pair<std::int32_t, std::int32_t> cell) const noexcept;
   [[nodiscard]] const kernels::LikenessLanes& lanes_of(Cell& cell);
 
   const ColumnRanking* ranking_;
@@ -97,6 +99,7 @@ class ViewLikelihood {
   kernels::LikenessFall fall_{1.0F, 0.0F};
   std::uint32_t number_ = 0;
   double cell_m_ = 1.0;
+  double cells_per_metre_ = 1.0;
 };
 
 }  // namespace panonav
