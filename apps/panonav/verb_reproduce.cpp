@@ -26,6 +26,7 @@ struct ReproduceArguments {
   std::optional<int> runs;
   std::optional<int> rows;
   std::optional<std::string> data;
+  std::optional<std::string> only;
 };
 
 /// What the report says of a paper.
@@ -103,6 +104,7 @@ std::pair<PaperText, Reproduction> run_m04(const ReproduceArguments& wanted, Ses
                                            const ReproductionProgress& progress) {
   refuse(wanted.runs.has_value(), "--runs", wanted);
   refuse(wanted.data.has_value(), "--data", wanted);
+  refuse(wanted.only.has_value(), "--only", wanted);
   ReproductionOptions options{.out = wanted.out, .seed = wanted.seed.value_or(1)};
   if (wanted.quick) options = quick_run(options);
   if (wanted.scenes) {
@@ -132,6 +134,7 @@ std::pair<PaperText, Reproduction> run_m03(const ReproduceArguments& wanted, Ses
   if (wanted.seed) options.seed = *wanted.seed;
   if (wanted.scenes) options.scenes = *wanted.scenes;
   if (wanted.runs) options.runs = *wanted.runs;
+  if (wanted.only) options.only = *wanted.only;
   if (wanted.rows) options.rows = *wanted.rows;
   const PaperText text{
       "Monte-Carlo localisation: the experiments of [M03]",
@@ -210,6 +213,9 @@ Run declare(Arguments& arguments) {
   arguments.option("--data", wanted->data,
                    "m03: folder with the recordings and Gazebo worlds (default: the environment's "
                    "PANONAV_DATA; without it they are left out)");
+  const auto parts = tracking_reproduction_parts();
+  arguments.choice("--only", wanted->only, {parts.begin(), parts.end()},
+                   "m03: this part of the experiments (default: all)");
   return [wanted](Session& session) { return reproduce(*wanted, session); };
 }
 

@@ -86,18 +86,20 @@ void reproduce_tracking_sweeps(const TrackingReproductionOptions& options,
   struct Kind {
     std::string id;
     std::string name;
+    std::string label;  ///< short, for the plots
     const std::vector<RunSet>* sets;
     FilterSetting setting;
   };
-  const std::vector<Kind> kinds{{"paper", "as the paper, clean", &constant, paper_setting()},
-                                {"topological", "compass and the paper's redraw, hard", &hard,
-                                 compass_setting(Redraw::topological)},
-                                {"explained", "compass and our rule of redrawing, hard", &hard,
-                                 compass_setting(Redraw::explained)}};
+  const std::vector<Kind> kinds{
+      {"paper", "as the paper, clean", "as the paper, clean", &constant, paper_setting()},
+      {"topological", "compass and the paper's redraw, hard", "paper's redraw, hard", &hard,
+       compass_setting(Redraw::topological)},
+      {"explained", "compass and our rule of redrawing, hard", "our rule, hard", &hard,
+       compass_setting(Redraw::explained)}};
   std::vector<Curve> particles;
   std::vector<Curve> odometry;
   for (const Kind& kind : kinds) {
-    Curve curve{{.label = kind.name}, {.label = kind.name}};
+    Curve curve{{.label = kind.label}, {.label = kind.label}};
     for (const double share : {0.1, 0.25, 0.5, 1.0, 2.0, 4.0}) {
       FilterSetting setting = kind.setting;
       setting.particles_per_reference = share;
@@ -107,7 +109,7 @@ void reproduce_tracking_sweeps(const TrackingReproductionOptions& options,
       add_point(curve, share, runs);
     }
     particles.push_back(std::move(curve));
-    Curve noisy{{.label = kind.name}, {.label = kind.name}};
+    Curve noisy{{.label = kind.label}, {.label = kind.label}};
     for (const double factor : {0.5, 1.0, 2.0, 4.0, 8.0}) {
       FilterSetting setting = kind.setting;
       for (OdometryNoise* noise : {&setting.odometry, &setting.told_odometry}) {

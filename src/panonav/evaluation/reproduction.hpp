@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -52,7 +53,11 @@ struct TrackingReproductionOptions {
   std::uint64_t seed = 601;   ///< of the first scene; the others follow it
   /// Folder of the recordings and Gazebo worlds (docs/formats.md); empty: these are left out.
   std::filesystem::path data;
+  std::string only;  ///< one of `tracking_reproduction_parts`; empty: all
 };
+
+/// office, corridor, garden, leaving, worlds, recordings.
+[[nodiscard]] std::span<const std::string_view> tracking_reproduction_parts();
 
 /// The same as a smoke run: one office, few runs.
 [[nodiscard]] TrackingReproductionOptions quick_run(TrackingReproductionOptions options);
