@@ -140,6 +140,7 @@ void reproduce_garden(const TrackingReproductionOptions& options, Executor& exec
                       .y_label = "share",
                       .series = {right, near, first, success},
                       .log_x = true,
+                      .x_range = std::pair{0.4, 2.5},
                       .y_range = std::pair{0.0, 1.02}});
   write_plot(options.out / "garden_images.png",
              LinePlot{.title = "Garden: mean number of images until localised",
@@ -147,6 +148,7 @@ void reproduce_garden(const TrackingReproductionOptions& options, Executor& exec
                       .y_label = "images",
                       .series = {needed},
                       .log_x = true,
+                      .x_range = std::pair{0.4, 2.5},
                       .y_range = std::pair{0.0, 15.0}});
   result.pictures.push_back(
       {"garden_success.png",
