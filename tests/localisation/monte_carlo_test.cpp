@@ -43,6 +43,14 @@ Walk walk(const RememberedRoom& place, int images, std::uint64_t seed,
   return run;
 }
 
+/// A filter whose model is learnt from few views: quick, also under a sanitizer.
+MonteCarloLocaliser quick_filter(const VisualMemory& memory, const MonteCarloOptions& options = {},
+                                 const OdometryNoise& odometry = {}) {
+  auto ranking = std::make_shared<const ColumnRanking>(memory);
+  const ObservationModel model = learn_observation_model(*ranking, {.sampled_views = 8});
+  return {std::move(ranking), model, options, odometry};
+}
+
 double error_m(const MonteCarloEstimate& estimate, const Pose2& truth) {
   return estimate.pose ? distance(estimate.pose->position(), truth.position()) : 1e9;
 }
@@ -80,7 +88,8 @@ TEST(MonteCarlo, FindsItselfFromNothingAndStaysThere) {
 
 TEST(MonteCarlo, WeightsSumToOneAndNumbersStayWithinTheirBounds) {
   const RememberedRoom place(72, {}, 0.4);
-  MonteCarloLocaliser filter(place.memory, {.least_particles = 50, .most_particles = 700});
+  MonteCarloLocaliser filter =
+      quick_filter(place.memory, {.least_particles = 50, .most_particles = 700});
   EXPECT_EQ(filter.particles().size(), 700U);
   const Walk run = walk(place, 12, 5);
   bool fewer = false;
@@ -116,7 +125,7 @@ TEST(MonteCarlo, SameSeedSameBits) {
   const RememberedRoom place(73, {}, 0.4);
   const Walk run = walk(place, 6, 6);
   const auto bits = [&](int seed) {
-    MonteCarloLocaliser filter(place.memory, {.seed = seed});
+    MonteCarloLocaliser filter = quick_filter(place.memory, {.seed = seed});
     for (std::size_t k = 0; k < run.poses.size(); ++k) {
       if (k > 0) filter.move(run.step(k));
       filter.observe(run.views[k]);
@@ -205,7 +214,8 @@ TEST(MonteCarlo, IsLostOutsideAndFoundAgain) {
 TEST(MonteCarlo, KnowsItsHeadingAndPlaceWhenTheyAreTold) {
   const RememberedRoom place(77, {}, 0.4);
   const Walk run = walk(place, 2, 7);
-  MonteCarloLocaliser filter(place.memory, {.least_particles = 300, .most_particles = 300});
+  MonteCarloLocaliser filter =
+      quick_filter(place.memory, {.least_particles = 300, .most_particles = 300});
   filter.start_anywhere(0.7);
   for (const Particle& particle : filter.particles()) {
     EXPECT_EQ(particle.pose.heading_rad, 0.7);
@@ -222,7 +232,7 @@ TEST(MonteCarlo, KnowsItsHeadingAndPlaceWhenTheyAreTold) {
 TEST(MonteCarlo, BlindStretchesWidenTheCloudAndTheNextImageNarrowsIt) {
   const RememberedRoom place(78, {}, 0.3);
   const Walk run = walk(place, 14, 8, {.translation_from_translation = 0.1});
-  MonteCarloLocaliser filter(
+  MonteCarloLocaliser filter = quick_filter(
       place.memory, {}, {.translation_from_translation = 0.1, .rotation_from_translation = 0.1});
   filter.start_at(run.poses[0], 0.05, 0.05);
   filter.observe(run.views[0]);
@@ -305,12 +315,11 @@ TEST(MonteCarlo, WorksWithoutHeadingsInTheMemory) {
 
 TEST(MonteCarlo, RefusesWhatMakesNoSense) {
   const RememberedRoom place(81, {}, 0.5);
-  EXPECT_THROW(MonteCarloLocaliser(place.memory, {.least_particles = 10, .most_particles = 5}),
+  EXPECT_THROW(quick_filter(place.memory, {.least_particles = 10, .most_particles = 5}),
                ContractError);
-  EXPECT_THROW(MonteCarloLocaliser(place.memory, {.least_particles = 0}), OptionError);
-  EXPECT_THROW(MonteCarloLocaliser(place.memory, {}, {.translation_from_translation = -1.0}),
-               OptionError);
-  MonteCarloLocaliser filter(place.memory);
+  EXPECT_THROW(quick_filter(place.memory, {.least_particles = 0}), OptionError);
+  EXPECT_THROW(quick_filter(place.memory, {}, {.translation_from_translation = -1.0}), OptionError);
+  MonteCarloLocaliser filter = quick_filter(place.memory);
   EXPECT_THROW(filter.observe(pack(compute_signature(place.room.see({1.0, 1.0, 0.0}, 12)), 1.0F)),
                ContractError);
   EXPECT_THROW(filter.move({std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0}), ContractError);

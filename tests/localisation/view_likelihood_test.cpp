@@ -108,7 +108,7 @@ TEST(ViewLikelihood, IsGreatestNearTheTruthAndInItsHeading) {
 TEST(ViewLikelihood, ManyParticlesGetWhatEachGetsAlone) {
   const RememberedRoom place(64, {}, 0.4);
   const ColumnRanking ranking(place.memory);
-  ViewLikelihood likelihood(ranking, learn_observation_model(ranking), true);
+  ViewLikelihood likelihood(ranking, learn_observation_model(ranking, {.sampled_views = 8}), true);
   Random random(2);
   likelihood.begin(seen(place, place.room.between(place.grid, place.step_m, random)));
   for (std::uint32_t s = 0; s < likelihood.sites().size(); s += 2) likelihood.compare(s);
@@ -134,7 +134,7 @@ TEST(ViewLikelihood, ManyParticlesGetWhatEachGetsAlone) {
 TEST(ViewLikelihood, WithoutTheCompassHeadingsDoNotCount) {
   const RememberedRoom place(65, {}, 0.4);
   const ColumnRanking ranking(place.memory);
-  ViewLikelihood likelihood(ranking, learn_observation_model(ranking), false);
+  ViewLikelihood likelihood(ranking, learn_observation_model(ranking, {.sampled_views = 8}), false);
   Random random(3);
   const Pose2 truth = place.room.between(place.grid, place.step_m, random);
   likelihood.begin(seen(place, truth));
@@ -148,7 +148,7 @@ TEST(ViewLikelihood, WithoutTheCompassHeadingsDoNotCount) {
 TEST(ViewLikelihood, ANewViewForgetsTheLast) {
   const RememberedRoom place(66, {}, 0.4);
   const ColumnRanking ranking(place.memory);
-  ViewLikelihood likelihood(ranking, learn_observation_model(ranking), true);
+  ViewLikelihood likelihood(ranking, learn_observation_model(ranking, {.sampled_views = 8}), true);
   Random random(4);
   const Pose2 truth = place.room.between(place.grid, place.step_m, random);
   likelihood.begin(seen(place, truth));
@@ -165,7 +165,7 @@ TEST(ViewLikelihood, ANewViewForgetsTheLast) {
 TEST(ViewLikelihood, FindsTheSitesThatParticlesAreNear) {
   const RememberedRoom place(67, {}, 0.4);
   const ColumnRanking ranking(place.memory);
-  ViewLikelihood likelihood(ranking, learn_observation_model(ranking), true);
+  ViewLikelihood likelihood(ranking, learn_observation_model(ranking, {.sampled_views = 8}), true);
   const Point2 here = place.grid[place.grid.size() / 2];
   const std::vector<Particle> particles{{{here.x_m, here.y_m, 0.0}, 0.9},
                                         {{here.x_m, here.y_m, 1.0}, 0.1}};
@@ -183,7 +183,7 @@ TEST(ViewLikelihood, FindsTheSitesThatParticlesAreNear) {
 TEST(ViewLikelihood, RefusesAViewOfAnotherShape) {
   const RememberedRoom place(68, {}, 0.5);
   const ColumnRanking ranking(place.memory);
-  ViewLikelihood likelihood(ranking, learn_observation_model(ranking), true);
+  ViewLikelihood likelihood(ranking, learn_observation_model(ranking, {.sampled_views = 8}), true);
   const auto other = pack(compute_signature(place.room.see({1.0, 1.0, 0.0}, 12)), 1.0F);
   EXPECT_THROW(likelihood.begin(other), ContractError);
 }

@@ -186,7 +186,9 @@ ObservationModel learn_observation_model(const ColumnRanking& ranking,
   model.spacing_m = VoronoiCells(positions).spacing_m();
   require(model.spacing_m > 0.0, "spacing of the memory's positions", model.spacing_m, "> 0 m");
   const auto seed = static_cast<std::uint64_t>(options.seed);
-  const PlaceModel place = learn_place_model(ranking, {.seed = options.seed});
+  const PlaceModel place = learn_place_model(
+      ranking, {.sampled_views = std::min(options.sampled_views, PlaceModelOptions{}.sampled_views),
+                .seed = options.seed});
   model.explained_difference = place.threshold;
 
   const std::vector<ViewId> sampled = sample_views(views, options.sampled_views, seed);
