@@ -76,6 +76,7 @@ void time_tracking(benchmark::State& state, const TrackingPlace& place,
   double compared = 0.0;
   double localised = 0.0;
   double resampled = 0.0;
+  double redrawn = 0.0;
   double error = 0.0;
   along_walks(
       state, walks,
@@ -92,12 +93,14 @@ void time_tracking(benchmark::State& state, const TrackingPlace& place,
         compared += static_cast<double>(estimate.views_compared);
         localised += estimate.state == LocalisationState::localised ? 1.0 : 0.0;
         resampled += estimate.resampled ? 1.0 : 0.0;
+        redrawn += static_cast<double>(estimate.redrawn);
         if (!estimate.modes.empty()) error += error_m(estimate.modes.front().mean, walk, step);
       });
   const auto runs = static_cast<double>(state.iterations());
   state.counters["compared"] = compared / runs;
   state.counters["localised"] = localised / runs;
   state.counters["resampled"] = resampled / runs;
+  state.counters["redrawn"] = redrawn / runs;
   state.counters["error_m"] = error / runs;
 }
 
