@@ -205,6 +205,8 @@ void reproduce_leaving(const TrackingReproductionOptions& options, const std::st
   add_rows(result, "m03.leaving." + name,
            name + ", one half memorised, the robot drives out of it and back", reports,
            single_images_text(outside.sets));
+  add_confidently_wrong(result, "m03.leaving." + name + ".wrong", name + ", leaving and returning",
+                        runs);
   Series lost_series{.label = "called lost"};
   Series sure_series{.label = "called localised"};
   for (std::size_t b = 0; b < bins; ++b) {
