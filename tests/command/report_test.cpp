@@ -123,6 +123,13 @@ TEST(Reproduce, RefusesBadInput) {
             std::string::npos);
   EXPECT_NE(refusal({"reproduce", "m04", "--scenes", "1"}).find("--scenes is '1'"),
             std::string::npos);
+  EXPECT_NE(refusal({"reproduce", "m04", "--only", "office"}).find("--only has no meaning for m04"),
+            std::string::npos);
+  EXPECT_NE(refusal({"reproduce", "m03", "--queries", "3"}).find("--queries has no meaning"),
+            std::string::npos);
+  EXPECT_NE(refusal({"reproduce", "m03", "--data", folder / "nowhere"}).find("no such folder"),
+            std::string::npos);
+  EXPECT_NE(refusal({"reproduce", "m03", "--only", "kitchen"}).find("--only"), std::string::npos);
   EXPECT_NE(refusal({"reproduce", "m04", "--sead", "3"}).find("--sead"), std::string::npos);
 }
 

@@ -116,7 +116,8 @@ void reproduce_global_localisation(const TrackingReproductionOptions& options,
                   .x_label = "images",
                   .y_label = "error [m]",
                   .series = {},
-                  .log_y = true};
+                  .log_y = true,
+                  .x_range = std::pair{0.5, 15.5}};
   std::vector<double> without;
   for (const Rule& rule : rules()) {
     const auto runs = track_sets(hard, compass_setting(rule.redraw), seed_of_hard, executor);

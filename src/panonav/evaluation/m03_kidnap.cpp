@@ -25,7 +25,8 @@ void reproduce_kidnapping(const TrackingReproductionOptions& options,
   LinePlot curves{.title = "Kidnapped robot, hard: error over images (bars: 5 to 95 %)",
                   .x_label = "images after it was carried away",
                   .y_label = "error [m]",
-                  .series = {}};
+                  .series = {},
+                  .x_range = std::pair{0.5, 15.5}};
   std::vector<MapPlot> maps;
   std::vector<double> topological;
   for (const auto& [redraw, id, name] :

@@ -45,7 +45,8 @@ void reproduce_position_tracking(const TrackingReproductionOptions& options,
   LinePlot curves{.title = "After 2 m without images (bars: 5 to 95 %)",
                   .x_label = "images after the blind stretch",
                   .y_label = "error [m]",
-                  .series = {}};
+                  .series = {},
+                  .x_range = std::pair{0.5, 5.5}};
   for (const auto& [redraw, id, name] :
        {std::tuple{Redraw::topological, "topological", "the paper's redraw"},
         {Redraw::explained, "explained", "our rule of redrawing"},
