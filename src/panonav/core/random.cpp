@@ -1,5 +1,6 @@
 #include "panonav/core/random.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <numbers>
@@ -56,15 +57,22 @@ std::uint64_t Random::index(std::uint64_t count) {
 }
 
 double Random::normal() {
-  // Without the second value: no state beyond the generator's own.
-  return normal_pair().first;
+  // Box-Muller without its second value: no state beyond the generator's own.
+  const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform()));
+  return radius * std::cos(2.0 * std::numbers::pi * uniform());
 }
 
 std::pair<double, double> Random::normal_pair() {
-  // Box and Muller 1958.
-  const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform()));
-  const double angle = 2.0 * std::numbers::pi * uniform();
-  return {radius * std::cos(angle), radius * std::sin(angle)};
+  // Box-Muller; the halves of one number are two uniform ones.
+  const std::uint64_t bits = next();
+  const auto half = [](std::uint32_t part) {
+    return (static_cast<float>(part) + 0.5F) * 0x1.0p-32F;
+  };
+  const float radius =
+      std::sqrt(-2.0F * std::log(std::min(half(static_cast<std::uint32_t>(bits >> 32U)), 1.0F)));
+  const float angle = 2.0F * std::numbers::pi_v<float> * half(static_cast<std::uint32_t>(bits));
+  return {static_cast<double>(radius * std::cos(angle)),
+          static_cast<double>(radius * std::sin(angle))};
 }
 
 double Random::normal(double mean, double standard_deviation) {

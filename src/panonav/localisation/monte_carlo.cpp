@@ -37,7 +37,8 @@ constexpr double by_chance = 1.0;
 constexpr double most_for = 5.0;
 constexpr double most_for_alike = 2.0;
 constexpr double localised_weight = 0.9;
-constexpr double least_redrawn_mass = 1e-4;
+constexpr double memorised_reach = 2.0;  // times the spacing or the range of likeness
+constexpr double least_redrawn = 0.5;    // particles' worth of weight
 constexpr double nothing_known = 0.9;  // chance of being elsewhere than where particles were strewn
 // Deviations of new particles from the reference that tells them: within its square of the grid,
 // and within the turns that explain a view.
@@ -92,6 +93,15 @@ struct MonteCarloLocaliser::Implementation {
   double borrowed_heading() { return particles[random.index(particles.size())].pose.heading_rad; }
 
   void compare_views(const PackedSignature& view, bool was_localised);
+  // Whether a reference stands near enough to tell anything of the place.
+  [[nodiscard]] bool is_memorised(Point2 place) const {
+    if (!likelihood.sites_near(place).empty()) return true;
+    const double reach_m = memorised_reach * std::max(model.spacing_m, model.range_m);
+    return std::ranges::any_of(likelihood.sites(), [&](const ViewLikelihood::Site& site) {
+      return distance(site.position, place) <= reach_m;
+    });
+  }
+
   // A site, and which of the two headings that fit there.
   struct Candidate {
     std::uint32_t site;
@@ -306,11 +316,11 @@ double MonteCarloLocaliser::Implementation::weigh() {
     const double most = *std::ranges::max_element(log_ratios);
     for (double& ratio : log_ratios) ratio = ratio - most;
     if (stage == 0) {
-      double sum = 0.0;
+      double in_full = 0.0;
       for (std::size_t i = 0; i < particles.size(); ++i) {
-        sum += particles[i].weight * exp_of(log_ratios[i]);
+        in_full += particles[i].weight * exp_of(log_ratios[i]);
       }
-      evidence_in_full = most + std::log(sum);
+      evidence_in_full = most + std::log(in_full);
     }
     const double share =
         stage + 1 == most_stages ? left : bearable_share(particles, log_ratios, left);
@@ -361,8 +371,9 @@ void MonteCarloLocaliser::Implementation::resample(std::size_t count, bool sprea
       const PoseMode& mode = found.modes[m];
       const double width =
           std::pow(0.8 / static_cast<double>(std::max<std::size_t>(1, members[m])), 1.0 / 7.0);
-      pose.x_m += random.normal(0.0, width * std::sqrt(mode.covariance[0]));
-      pose.y_m += random.normal(0.0, width * std::sqrt(mode.covariance[4]));
+      const auto [x, y] = random.normal_pair();
+      pose.x_m += x * width * std::sqrt(mode.covariance[0]);
+      pose.y_m += y * width * std::sqrt(mode.covariance[4]);
       pose.heading_rad =
           wrap_angle(pose.heading_rad + random.normal(0.0, width * std::sqrt(mode.covariance[8])));
     }
@@ -403,9 +414,9 @@ int MonteCarloLocaliser::Implementation::redraw_explained(double log_here) {
   const double odds =
       hazard / (1.0 - hazard) * std::exp(std::clamp(log_there - log_here, -50.0, 50.0));
   const double mass = odds / (1.0 + odds);
-  if (mass < least_redrawn_mass) return 0;
-
   const auto size = static_cast<double>(particles.size());
+  if (mass * size < least_redrawn) return 0;
+
   const auto count =
       static_cast<std::size_t>(std::max(1L, std::lround(std::max(0.05, 0.9 * mass) * size)));
   std::vector<Particle> fresh;
@@ -485,6 +496,7 @@ void MonteCarloLocaliser::Implementation::describe(MonteCarloEstimate& estimate,
   estimate.inside = inside;
   estimate.state = LocalisationState::lost;
   if (inside < 0.5) return;
+  if (!found.modes.empty() && !is_memorised(found.modes.front().mean.position())) return;
   estimate.state = LocalisationState::ambiguous;
   if (found.modes.empty()) return;
   const PoseMode& first = found.modes.front();

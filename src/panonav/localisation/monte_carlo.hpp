@@ -43,7 +43,8 @@ enum class LocalisationState {
   localised,  ///< one mode, no wider than the references' spacing can tell, and it explains the
               ///< views
   ambiguous,  ///< the views are of this memory, but several places or a large area explain them
-  lost,       ///< the views are not explained by this memory
+  lost,       ///< the views are not explained by this memory, or odometry has led out of the
+              ///< memorised area
 };
 /// "localised", "ambiguous", "lost".
 [[nodiscard]] std::string_view name_of(LocalisationState state);

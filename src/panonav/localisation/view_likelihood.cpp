@@ -123,8 +123,10 @@ Point2 ViewLikelihood::centre_of(std::pair<std::int32_t, std::int32_t> cell) con
 
 void ViewLikelihood::begin(const PackedSignature& view) {
   const SignatureShape shape = ranking_->memory().shape();
-  require(view.shape == shape, "rows of the view's signature", view.shape.rows,
-          to_text(shape.rows) + " with " + to_text(shape.components) + " components");
+  if (view.shape != shape) {
+    throw ContractError("rows of the view's signature", view.shape.rows,
+                        to_text(shape.rows) + " with " + to_text(shape.components) + " components");
+  }
   asked_.emplace(view, ranking_->components());
   compared_sites_.clear();
   most_likeness_ = 0.0;
