@@ -180,6 +180,7 @@ class TrackingReproduction : public ::testing::Test {
 };
 
 TEST_F(TrackingReproduction, SameSeedSameRowsOnOneAndTwoThreads) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   const Reproduction one = reproduce(1);
   const Reproduction two = reproduce(2);
   ASSERT_GT(one.rows.size(), 100U);
