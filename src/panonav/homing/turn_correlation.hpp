@@ -1,0 +1,30 @@
+#pragma once
+
+#include <array>
+#include <span>
+
+namespace panonav {
+
+/// C(sigma) = sum_{k=1..K} Re(real[k] + j imaginary[k]) exp(-j k sigma): the correlation of two
+/// views against the turn between them, all rows summed [S06 eq. 33]. Entry 0 does not count.
+struct TurnCorrelation {
+  static constexpr int most_frequencies = 62;
+  int highest = 0;  ///< K, 1 .. most_frequencies
+  std::array<float, most_frequencies + 1> real{};
+  std::array<float, most_frequencies + 1> imaginary{};
+
+  [[nodiscard]] float at(float turn_rad) const noexcept;
+};
+
+/// The heading of S06's sequential rule [S06 eq. 40-43, sign of eq. 41 corrected; with the second
+/// start at the opposite heading where the first weight is below a tenth of the mean]. In radians,
+/// not wrapped.
+[[nodiscard]] float sequential_turn(const TurnCorrelation& correlation) noexcept;
+
+/// Fills `turns` with the headings of the highest local maxima, highest first, and returns how many
+/// there are; 0 when the correlation is zero everywhere. Eight points per period of the highest
+/// frequency are evaluated and the best refined by Newton's rule.
+[[nodiscard]] int highest_turns(const TurnCorrelation& correlation,
+                                std::span<float> turns) noexcept;
+
+}  // namespace panonav
