@@ -32,15 +32,21 @@ using Rebuilt = std::array<std::array<float, columns>, bands>;
 // Finer components than this would need more columns.
 constexpr int most_components = columns / 2;
 
+// The columns of a quarter turn, both ends included; the others follow by symmetry. Filled up to
+// whole vectors.
+constexpr std::size_t quarter = columns / 4 + 1;
+constexpr std::size_t quarter_filled = (quarter + 3) / 4 * 4;
+using Quarter = std::array<float, quarter_filled>;
+
 struct Waves {
-  std::array<std::array<float, columns>, most_components> cosines, sines;
+  std::array<Quarter, most_components> cosines, sines;
 };
 
 const Waves& waves() {
   static const Waves made = [] {
     Waves waves{};
     for (std::size_t k = 0; k < most_components; ++k) {
-      for (std::size_t c = 0; c < columns; ++c) {
+      for (std::size_t c = 0; c < quarter; ++c) {
         const double angle =
             2.0 * std::numbers::pi * static_cast<double>(k * c % columns) / columns;
         waves.cosines[k][c] = static_cast<float>(std::cos(angle));
@@ -69,8 +75,9 @@ int rebuild(const PackedSignature& signature, int components,
     return table;
   }();
   for (std::size_t band = 0; band < used; ++band) {
-    auto& values = view[band];
-    values.fill(0.0F);
+    // Sums over even and over odd components.
+    std::array<Quarter, 2> cosine_sums{};
+    std::array<Quarter, 2> sine_sums{};
     const std::size_t first = band * counted.size() / used;
     const std::size_t end = (band + 1) * counted.size() / used;
     for (int k = 0; k < components; ++k) {
@@ -88,9 +95,24 @@ int rebuild(const PackedSignature& signature, int components,
       imaginary *= scale;
       const auto& cosine = waves().cosines[k];
       const auto& sine = waves().sines[k];
-      for (std::size_t c = 0; c < columns; ++c) {
-        values[c] += real * cosine[c] - imaginary * sine[c];
+      auto& cosine_sum = cosine_sums[k % 2];
+      auto& sine_sum = sine_sums[k % 2];
+      for (std::size_t c = 0; c < quarter_filled; ++c) {
+        cosine_sum[c] += real * cosine[c];
+        sine_sum[c] += imaginary * sine[c];
       }
+    }
+    // cos k(pi +- x) = +-cos kx and sin k(pi +- x) = +-sin kx, the sign also being that of (-1)^k.
+    auto& values = view[band];
+    for (std::size_t c = 0; c < quarter; ++c) {
+      const float cosines_ahead = cosine_sums[0][c] + cosine_sums[1][c];
+      const float cosines_behind = cosine_sums[0][c] - cosine_sums[1][c];
+      const float sines_ahead = sine_sums[0][c] + sine_sums[1][c];
+      const float sines_behind = sine_sums[0][c] - sine_sums[1][c];
+      values[c] = cosines_ahead - sines_ahead;
+      values[(columns - c) % columns] = cosines_ahead + sines_ahead;
+      values[columns / 2 - c] = cosines_behind + sines_behind;
+      values[columns / 2 + c] = cosines_behind - sines_behind;
     }
   }
   return static_cast<int>(used);
@@ -99,8 +121,9 @@ int rebuild(const PackedSignature& signature, int components,
 void free_columns_of_mean(Rebuilt& view, std::size_t used) {
   std::array<float, columns> means{};
   for (std::size_t b = 0; b < used; ++b) {
-    for (std::size_t c = 0; c < columns; ++c) means[c] += view[b][c] / static_cast<float>(used);
+    for (std::size_t c = 0; c < columns; ++c) means[c] += view[b][c];
   }
+  for (float& mean : means) mean /= static_cast<float>(used);
   for (std::size_t b = 0; b < used; ++b) {
     for (std::size_t c = 0; c < columns; ++c) view[b][c] -= means[c];
   }
@@ -121,22 +144,18 @@ constexpr int query_columns = ColumnProfiles::compared_columns;
 static_assert(query_columns == kernels::matched_query_columns);
 
 void check_bands(const ColumnProfiles& query, const ColumnProfiles& reference) {
-  require(query.used_bands() == reference.used_bands(), "bands of the query", query.used_bands(),
-          to_text(reference.used_bands()) + ", as of the reference");
+  if (query.used_bands() == reference.used_bands()) return;
+  throw ContractError("bands of the query", query.used_bands(),
+                      to_text(reference.used_bands()) + ", as of the reference");
 }
 
 using Costs = std::array<std::uint16_t, columns>;
 
 Costs costs_of_turns(const ColumnProfiles& query, const ColumnProfiles& reference) {
   check_bands(query, reference);
-  std::array<std::uint8_t, query_columns * bands> asked{};
-  for (std::size_t c = 0; c < query_columns; ++c) {
-    for (std::size_t b = 0; b < bands; ++b) {
-      asked[c * bands + b] = query.values()[b * columns + c * (columns / query_columns)];
-    }
-  }
   Costs costs{};
-  kernels::match_columns(asked, reference.values(), costs, kernels::chosen_instructions());
+  kernels::match_columns(query.compared_values(), reference.values(), costs,
+                         kernels::chosen_instructions());
   return costs;
 }
 
@@ -152,7 +171,8 @@ ColumnMatch match_at(const ColumnProfiles& query, const Costs& costs, std::size_
 
 ColumnProfiles::ColumnProfiles(const PackedSignature& signature, int components,
                                std::span<const std::uint8_t> allowed_rows)
-    : values_(static_cast<std::size_t>(columns * bands), middle) {
+    : values_(static_cast<std::size_t>(columns * bands), middle),
+      compared_values_(static_cast<std::size_t>(query_columns * bands), middle) {
   require(components >= 0 && components <= signature.shape.components, "components", components,
           "0 (all) or 1 .. " + to_text(signature.shape.components));
   require(
@@ -187,7 +207,11 @@ ColumnProfiles::ColumnProfiles(const PackedSignature& signature, int components,
   for (std::size_t b = 0; b < used; ++b) {
     for (std::size_t c = 0; c < columns; ++c) {
       const float value = std::clamp(unit * view[b][c] / contrasts[c], -127.0F, 127.0F);
-      values_[b * columns + c] = static_cast<std::uint8_t>(std::lround(value) + middle);
+      values_[b * columns + c] =
+          static_cast<std::uint8_t>(static_cast<int>(value + (middle + 0.5F)));
+    }
+    for (std::size_t c = 0; c < query_columns; ++c) {
+      compared_values_[c * bands + b] = values_[b * columns + c * (columns / query_columns)];
     }
   }
 }
@@ -201,12 +225,20 @@ ColumnMatch match_columns(const ColumnProfiles& query, const ColumnProfiles& ref
 ColumnMatches match_columns_twice(const ColumnProfiles& query, const ColumnProfiles& reference) {
   constexpr std::size_t apart = (columns + 5) / 6;
   const auto costs = costs_of_turns(query, reference);
-  const auto best = static_cast<std::size_t>(std::ranges::min_element(costs) - costs.begin());
-  std::size_t other = (best + apart) % columns;
-  for (std::size_t turn = apart; turn <= columns - apart; ++turn) {
-    const std::size_t at = (best + turn) % columns;
-    if (costs[at] < costs[other]) other = at;
+  // With its turn as the last bits a cost is found together with it, and the first of equal ones.
+  std::uint32_t least = ~0U;
+  for (std::uint32_t turn = 0; turn < columns; ++turn) {
+    least = std::min(least, static_cast<std::uint32_t>(costs[turn]) * columns + turn);
   }
+  const std::size_t best = least % columns;
+  std::array<std::uint16_t, 2 * columns> twice;
+  std::ranges::copy(costs, std::ranges::copy(costs, twice.begin()).out);
+  std::uint32_t least_apart = ~0U;
+  for (std::uint32_t turn = apart; turn <= columns - apart; ++turn) {
+    least_apart =
+        std::min(least_apart, static_cast<std::uint32_t>(twice[best + turn]) * columns + turn);
+  }
+  const std::size_t other = (best + least_apart % columns) % columns;
   return {match_at(query, costs, best), match_at(query, costs, other)};
 }
 
