@@ -11,6 +11,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/localisation/hierarchical.hpp"
+#include "panonav/localisation/particle_motion.hpp"
 #include "panonav/localisation/resampling.hpp"
 #include "panonav/localisation/view_likelihood.hpp"
 
@@ -573,10 +574,7 @@ void MonteCarloLocaliser::move(const Pose2& step) {
           "step of the odometry", step.x_m, "numbers");
   auto& own = *implementation_;
   own.travelled_m += std::hypot(step.x_m, step.y_m);
-  const StepSampler sampler(step, own.odometry);
-  for (Particle& particle : own.particles) {
-    particle.pose = sampler.move(particle.pose, own.random);
-  }
+  move_particles(own.particles, StepSampler(step, own.odometry), own.random);
 }
 
 MonteCarloEstimate MonteCarloLocaliser::observe(const PackedSignature& view) {

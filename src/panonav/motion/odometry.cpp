@@ -1,5 +1,6 @@
 #include "panonav/motion/odometry.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -56,31 +57,23 @@ StepSampler::StepSampler(const Pose2& step, const OdometryNoise& noise)
   };
   translation_deviation_m_ =
       deviation(noise.translation_from_translation, noise.translation_from_rotation);
-  rotation_deviation_rad_ =
-      deviation(noise.rotation_from_translation, noise.rotation_from_rotation);
+  // A heading is unknown long before this.
+  constexpr double most_deviation_rad = 1000.0;
+  rotation_deviation_rad_ = std::min(
+      most_deviation_rad, deviation(noise.rotation_from_translation, noise.rotation_from_rotation));
+  step_.heading_rad = wrap_angle(step.heading_rad);
 }
 
 Pose2 StepSampler::move(const Pose2& world_from_robot, Random& random) const {
-  auto [first, second] = random.normal_pair();
-  double x = step_.x_m;
-  double y = step_.y_m;
-  double turn_error = 0.0;
-  double direction = world_from_robot.heading_rad;
-  first *= translation_deviation_m_;
-  if (holonomic_) {
-    x += first;
-    y += second * translation_deviation_m_;
-    turn_error = rotation_deviation_rad_ * random.normal();
-  } else {
-    x += first * cos_middle_;
-    y += first * sin_middle_;
-    turn_error = rotation_deviation_rad_ * second;
-    direction += 0.5 * turn_error;
-  }
+  const auto [first, second] = random.normal_pair();
+  const Pose2 error = error_of(first, second, holonomic_ ? random.normal_pair().first : 0.0);
+  const double x = step_.x_m + error.x_m;
+  const double y = step_.y_m + error.y_m;
+  const double direction = world_from_robot.heading_rad + share_before() * error.heading_rad;
   const double c = std::cos(direction);
   const double s = std::sin(direction);
   return {world_from_robot.x_m + c * x - s * y, world_from_robot.y_m + s * x + c * y,
-          wrap_angle(world_from_robot.heading_rad + step_.heading_rad + turn_error)};
+          wrap_angle(world_from_robot.heading_rad + step_.heading_rad + error.heading_rad)};
 }
 
 Pose2 sample_step(const Pose2& step, const OdometryNoise& noise, Random& random) {

@@ -56,9 +56,26 @@ class StepSampler {
   /// `noise` must be valid.
   StepSampler(const Pose2& step, const OdometryNoise& noise);
 
-  /// Where a robot is after the step that was at `world_from_robot` before. Two normal draws from
-  /// `random` for a differential drive, four for a holonomic one. Cost: 0.1 microseconds.
+  /// Where a robot is after the step that was at `world_from_robot` before. Draws one
+  /// `Random::normal_pair` for a differential drive, two for a holonomic one. Cost: 0.1
+  /// microseconds.
   [[nodiscard]] Pose2 move(const Pose2& world_from_robot, Random& random) const;
+
+  /// The same in parts, for many poses at once: the step with its heading in [-pi, pi),
+  [[nodiscard]] const Pose2& step() const noexcept { return step_; }
+  [[nodiscard]] bool holonomic() const noexcept { return holonomic_; }
+  /// the error of travel and turn that normal deviates of mean 0 and deviation 1 stand for (the
+  /// third for a holonomic drive only), in the frame of the robot before the step, which the error
+  /// of the turn turns first by this share of itself.
+  [[nodiscard]] Pose2 error_of(double first, double second, double third) const noexcept {
+    if (holonomic_) {
+      return {first * translation_deviation_m_, second * translation_deviation_m_,
+              third * rotation_deviation_rad_};
+    }
+    const double travel_m = first * translation_deviation_m_;
+    return {travel_m * cos_middle_, travel_m * sin_middle_, second * rotation_deviation_rad_};
+  }
+  [[nodiscard]] double share_before() const noexcept { return holonomic_ ? 0.0 : 0.5; }
 
  private:
   Pose2 step_;

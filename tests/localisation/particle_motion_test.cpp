@@ -1,0 +1,57 @@
+#include "panonav/localisation/particle_motion.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "panonav/geometry/angles.hpp"
+
+namespace panonav {
+namespace {
+
+TEST(MoveParticles, MovesThemAsTheSamplerOneByOne) {
+  for (const DriveKind drive : {DriveKind::differential, DriveKind::holonomic}) {
+    const OdometryNoise noise{.drive = drive};
+    const StepSampler sampler({0.4, -0.1, 2.0}, noise);
+    Random random(1);
+    for (const std::size_t count : {0U, 1U, 127U, 128U, 1000U}) {
+      std::vector<Particle> particles;
+      for (std::size_t i = 0; i < count; ++i) {
+        particles.push_back({{random.uniform(-9.0, 9.0), random.uniform(-9.0, 9.0),
+                              random.uniform(-std::numbers::pi, std::numbers::pi)},
+                             0.5});
+      }
+      auto moved = particles;
+      // A holonomic drive takes its two numbers for one particle after the other, too.
+      Random first(count);
+      Random second(count);
+      move_particles(moved, sampler, first);
+      for (std::size_t i = 0; i < count; ++i) {
+        const Pose2 wanted = sampler.move(particles[i].pose, second);
+        ASSERT_NEAR(moved[i].pose.x_m, wanted.x_m, 1e-6);
+        ASSERT_NEAR(moved[i].pose.y_m, wanted.y_m, 1e-6);
+        ASSERT_NEAR(angle_difference(moved[i].pose.heading_rad, wanted.heading_rad), 0.0, 1e-6);
+        ASSERT_GE(moved[i].pose.heading_rad, -std::numbers::pi);
+        ASSERT_LT(moved[i].pose.heading_rad, std::numbers::pi);
+        ASSERT_EQ(moved[i].weight, 0.5);
+      }
+      EXPECT_EQ(first.next(), second.next());
+    }
+  }
+}
+
+TEST(MoveParticles, AStepOfNoUseLeavesNumbers) {
+  const OdometryNoise noise;
+  std::vector<Particle> particles(20);
+  Random random(1);
+  move_particles(particles, StepSampler({0.0, 0.0, 1e300}, noise), random);
+  for (const Particle& particle : particles) {
+    EXPECT_TRUE(std::isfinite(particle.pose.heading_rad));
+    EXPECT_LE(std::abs(particle.pose.heading_rad), std::numbers::pi);
+  }
+}
+
+}  // namespace
+}  // namespace panonav
