@@ -16,11 +16,12 @@ namespace {
 LikenessLanes random_lanes(Random& random) {
   LikenessLanes lanes{};
   for (int i = 0; i < likeness_lanes; ++i) {
-    const bool used = i < 12;
+    const bool used = i < 10;
     lanes.x_m[i] = used ? static_cast<float>(random.uniform(-1.0, 1.0)) : 1e6F;
     lanes.y_m[i] = static_cast<float>(random.uniform(-1.0, 1.0));
-    lanes.likeness[i] = used ? static_cast<float>(random.uniform(0.0, 0.5)) : 0.0F;
-    lanes.other_likeness[i] = used ? static_cast<float>(random.uniform(0.0, 0.3)) : 0.0F;
+    lanes.log_likeness[i] = std::log(used ? static_cast<float>(random.uniform(0.0, 0.5)) : 0.0F);
+    lanes.other_log_likeness[i] =
+        std::log(used ? static_cast<float>(random.uniform(0.0, 0.3)) : 0.0F);
     lanes.heading_rad[i] = static_cast<float>(random.uniform(-6.0, 6.0));
     lanes.other_heading_rad[i] = static_cast<float>(random.uniform(-6.0, 6.0));
     lanes.per_square_turn[i] = random.index(3) == 0 ? 0.0F : -4.0F;
@@ -40,10 +41,10 @@ double explained(const LikenessLanes& lanes, const LikenessFall& fall, double x,
       const double turn = std::remainder(heading - told, 2.0 * std::numbers::pi);
       return std::exp(turn * turn * static_cast<double>(lanes.per_square_turn[i]));
     };
-    const double likeness = std::max(
-        static_cast<double>(lanes.likeness[i]) * facing(static_cast<double>(lanes.heading_rad[i])),
-        static_cast<double>(lanes.other_likeness[i]) *
-            facing(static_cast<double>(lanes.other_heading_rad[i])));
+    const double likeness = std::max(std::exp(static_cast<double>(lanes.log_likeness[i])) *
+                                         facing(static_cast<double>(lanes.heading_rad[i])),
+                                     std::exp(static_cast<double>(lanes.other_log_likeness[i])) *
+                                         facing(static_cast<double>(lanes.other_heading_rad[i])));
     product += likeness * expected;
     square += expected * expected;
   }
@@ -63,8 +64,11 @@ TEST(ExplainLikeness, AgreesWithItsDefinitionOnEveryInstructionSet) {
       y.push_back(static_cast<float>(random.uniform(-1.5, 1.5)));
       heading.push_back(static_cast<float>(random.uniform(-3.1, 3.1)));
     }
+    std::vector<float> plain(found.size());
+    explain_likeness(lanes, fall, x, y, heading, plain, Instructions::scalar);
     for (const Instructions set : available_instructions()) {
       explain_likeness(lanes, fall, x, y, heading, found, set);
+      EXPECT_EQ(found, plain) << name(set);
       for (std::size_t p = 0; p < found.size(); ++p) {
         const double wanted = explained(lanes, fall, static_cast<double>(x[p]),
                                         static_cast<double>(y[p]), static_cast<double>(heading[p]));
@@ -86,6 +90,28 @@ TEST(ExplainLikeness, FarFromEveryReferenceNothingIsExplained) {
     EXPECT_GE(found[0], 0.0F);
     EXPECT_LT(found[0], 1e-3F);
   }
+}
+
+TEST(Exponentials, AgreeWithTheirDefinitionOnEveryInstructionSet) {
+  std::vector<float> logarithms;
+  for (int i = 0; i < 1001; ++i) logarithms.push_back(-0.1F * static_cast<float>(i));
+  std::vector<float> plain(logarithms.size());
+  exponentials(logarithms, 0.75F, plain, Instructions::scalar);
+  for (std::size_t i = 0; i < plain.size(); ++i) {
+    const double wanted = std::exp(0.75 * static_cast<double>(logarithms[i]));
+    EXPECT_NEAR(static_cast<double>(plain[i]), wanted, 1e-5 * wanted);
+  }
+  for (const Instructions set : available_instructions()) {
+    std::vector<float> found(logarithms.size());
+    exponentials(logarithms, 0.75F, found, set);
+    EXPECT_EQ(found, plain) << name(set);
+  }
+  exponentials(logarithms, 1e6F, plain, Instructions::scalar);
+  EXPECT_EQ(plain[0], 1.0F);
+  EXPECT_GT(plain.back(), 0.0F);
+  EXPECT_LT(plain.back(), 2e-38F);
+  std::vector<float> shorter(3);
+  EXPECT_THROW(exponentials(logarithms, 1.0F, shorter, Instructions::scalar), ContractError);
 }
 
 TEST(ExplainLikeness, RefusesSpansOfDifferentSizes) {

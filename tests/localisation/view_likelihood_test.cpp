@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 #include <set>
+#include <tuple>
 #include <vector>
 
 #include "localisation/ray_cast_room.hpp"
@@ -129,6 +130,31 @@ TEST(ViewLikelihood, ManyParticlesGetWhatEachGetsAlone) {
   }
   EXPECT_GT(most, 0.0);
   EXPECT_EQ(ratios.back(), 0.0);
+
+  // In another order they are the same particles, and those of one cell follow each other.
+  for (std::size_t i = 0; i < particles.size(); ++i) particles[i].weight = ratios[i];
+  auto arranged = particles;
+  likelihood.arrange(arranged);
+  likelihood.log_ratios(arranged, ratios);
+  for (std::size_t i = 0; i < arranged.size(); ++i) EXPECT_EQ(ratios[i], arranged[i].weight);
+  const auto by_pose = [](const Particle& p) {
+    return std::tuple(p.pose.x_m, p.pose.y_m, p.pose.heading_rad, p.weight);
+  };
+  std::set<const std::uint32_t*> begun;
+  const std::uint32_t* last = nullptr;
+  for (const Particle& particle : arranged) {
+    const std::uint32_t* const near = likelihood.sites_near(particle.pose.position()).data();
+    if (near != last) {
+      EXPECT_TRUE(begun.insert(near).second);
+    }
+    last = near;
+  }
+  EXPECT_GT(begun.size(), 20U);
+  std::ranges::sort(arranged, {}, by_pose);
+  std::ranges::sort(particles, {}, by_pose);
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    EXPECT_EQ(by_pose(arranged[i]), by_pose(particles[i]));
+  }
 }
 
 TEST(ViewLikelihood, WithoutTheCompassHeadingsDoNotCount) {

@@ -7,4 +7,8 @@ void explain_likeness(const LikenessLanes& lanes, const LikenessFall& fall, cons
   explain_likeness_loop(lanes, fall, x_m, y_m, heading_rad, explained, count);
 }
 
+void exponentials(const float* logarithms, float scale, float* values, int count) {
+  exponentials_loop(logarithms, scale, values, count);
+}
+
 }  // namespace panonav::kernels::scalar

@@ -1,7 +1,7 @@
 #pragma once
 
-// The body of explain_likeness: loops without branches, which the compiler vectorises for each
-// instruction set. In an unnamed namespace, so that each has a copy of its own.
+// The bodies of explain_likeness and exponentials: loops without branches, which the compiler
+// vectorises for each instruction set. In an unnamed namespace, so that each has a copy of its own.
 
 #include "panonav/kernels/likeness_targets.hpp"
 
@@ -11,10 +11,10 @@ namespace {
 // Adding it rounds to whole numbers: 1.5 * 2^23.
 constexpr float rounder = 12582912.0F;
 
-// exp(x) for x <= 0; relative error below 4e-6.
-inline float exp_of_negative(float x) {
+// exp(x) for x < 80, 2^least_exponent for what is less; relative error below 4e-6.
+inline float exp_of(float x, float least_exponent) {
   const float product = x * 1.44269504088896F;
-  const float y = product > -126.0F ? product : -126.0F;
+  const float y = product > least_exponent ? product : least_exponent;
   const float whole = (y + rounder) - rounder;
   const float f = (y - whole) * 0.693147180559945F;
   const float series =
@@ -31,36 +31,64 @@ inline float wrapped(float angle_rad) {
   return angle_rad - turn_rad * turns;
 }
 
+// Poses whose sums stay in registers.
+constexpr int poses_together = 16;
+
+inline void explain_likeness_together(const LikenessLanes& lanes, const LikenessFall& fall,
+                                      const float* __restrict x_m, const float* __restrict y_m,
+                                      const float* __restrict heading_rad,
+                                      float* __restrict explained) {
+  constexpr float least = -60.0F;  // the squares are normal numbers still: others are slow
+  float squares[poses_together] = {};
+  float products[poses_together] = {};
+  for (int i = 0; i < likeness_lanes; ++i) {
+    for (int p = 0; p < poses_together; ++p) {
+      const float dx = lanes.x_m[i] - x_m[p];
+      const float dy = lanes.y_m[i] - y_m[p];
+      const float apart = __builtin_sqrtf(dx * dx + dy * dy + fall.blur_square_m2);
+      const float expected = exp_of(-apart * fall.per_metre, least);
+      const float turn = wrapped(heading_rad[p] - lanes.heading_rad[i]);
+      const float other_turn = wrapped(heading_rad[p] - lanes.other_heading_rad[i]);
+      const float facing = lanes.log_likeness[i] + turn * turn * lanes.per_square_turn[i];
+      const float other =
+          lanes.other_log_likeness[i] + other_turn * other_turn * lanes.per_square_turn[i];
+      squares[p] += expected * expected;
+      products[p] += exp_of(facing > other ? facing : other, least) * expected;
+    }
+  }
+  for (int p = 0; p < poses_together; ++p) {
+    // What is left of likeness 0 is nothing.
+    const float product = products[p] > 1e-16F ? products[p] : 0.0F;
+    explained[p] = product * product / (squares[p] + 1e-30F);
+  }
+}
+
 inline void explain_likeness_loop(const LikenessLanes& lanes, const LikenessFall& fall,
                                   const float* __restrict x_m, const float* __restrict y_m,
                                   const float* __restrict heading_rad, float* __restrict explained,
                                   int count) {
-  for (int p = 0; p < count; ++p) {
-    float squares[likeness_lanes];
-    float products[likeness_lanes];
-    for (int i = 0; i < likeness_lanes; ++i) {
-      const float dx = lanes.x_m[i] - x_m[p];
-      const float dy = lanes.y_m[i] - y_m[p];
-      const float turn = wrapped(heading_rad[p] - lanes.heading_rad[i]);
-      const float other_turn = wrapped(heading_rad[p] - lanes.other_heading_rad[i]);
-      const float apart = __builtin_sqrtf(dx * dx + dy * dy + fall.blur_square_m2);
-      const float expected = exp_of_negative(-apart * fall.per_metre);
-      const float facing =
-          lanes.likeness[i] * exp_of_negative(turn * turn * lanes.per_square_turn[i]);
-      const float other = lanes.other_likeness[i] *
-                          exp_of_negative(other_turn * other_turn * lanes.per_square_turn[i]);
-      squares[i] = expected * expected;
-      products[i] = (facing > other ? facing : other) * expected;
-    }
-    // Sums in one order, whatever the width of vectors.
-    for (int half = likeness_lanes / 2; half > 0; half /= 2) {
-      for (int i = 0; i < half; ++i) {
-        squares[i] += squares[i + half];
-        products[i] += products[i + half];
-      }
-    }
-    explained[p] = products[0] * products[0] / (squares[0] + 1e-30F);
+  int done = 0;
+  for (; done + poses_together <= count; done += poses_together) {
+    explain_likeness_together(lanes, fall, x_m + done, y_m + done, heading_rad + done,
+                              explained + done);
   }
+  if (done == count) return;
+  float x[poses_together] = {};
+  float y[poses_together] = {};
+  float heading[poses_together] = {};
+  float last[poses_together];
+  for (int p = done; p < count; ++p) {
+    x[p - done] = x_m[p];
+    y[p - done] = y_m[p];
+    heading[p - done] = heading_rad[p];
+  }
+  explain_likeness_together(lanes, fall, x, y, heading, last);
+  for (int p = done; p < count; ++p) explained[p] = last[p - done];
+}
+
+inline void exponentials_loop(const float* __restrict logarithms, float scale,
+                              float* __restrict values, int count) {
+  for (int i = 0; i < count; ++i) values[i] = exp_of(scale * logarithms[i], -126.0F);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/kernels/likeness.hpp"
 #include "panonav/localisation/hierarchical.hpp"
 #include "panonav/localisation/particle_motion.hpp"
 #include "panonav/localisation/resampling.hpp"
@@ -26,6 +27,7 @@ constexpr double least_followed = 1e-3;  // share of the weight near a site
 constexpr std::size_t followed_when_localised = 16;
 constexpr int most_stages = 6;
 constexpr double least_share = 0.05;
+constexpr double nothing_left = 1e-37;      // the least exponential is 1e-38
 constexpr double enough_effective = 200.0;  // stand for a mode in three dimensions
 constexpr double most_against = 9.0;        // about 1 : 10 000
 // Chances from one image to the next.
@@ -58,7 +60,9 @@ struct MonteCarloLocaliser::Implementation {
   std::optional<ReferenceAreas> areas;
   Random random;
   std::vector<Particle> particles;
-  std::vector<double> log_ratios;
+  std::vector<double> log_ratios;  // of the particles; scratch space of `weigh`, as the next two
+  std::vector<float> log_ratios_below_most;
+  std::vector<float> factors;
   double travelled_m = 0.0;  // since the last image
   bool knows_nothing = true;
   double inside = 0.5;  // belief that the robot is in the memorised area
@@ -136,6 +140,12 @@ struct MonteCarloLocaliser::Implementation {
     }
     return pose;
   }
+  struct Weighed {
+    double sum = 0.0;
+    double squares = 0.0;
+  };
+  Weighed take_share(double share);
+  Weighed take_bearable_share(double& share);
   double weigh();
   void resample(std::size_t count, bool spread);
   int redraw_explained(double log_here);
@@ -277,33 +287,40 @@ int MonteCarloLocaliser::Implementation::redraw_fixed(const PackedSignature& vie
   return static_cast<int>(count);
 }
 
-// Weights need no more digits.
-double exp_of(double x) {
-  return static_cast<double>(std::exp(static_cast<float>(x)));
+// Takes the exponentials of `share` of the log-likelihoods; what they leave of the particles.
+MonteCarloLocaliser::Implementation::Weighed MonteCarloLocaliser::Implementation::take_share(
+    double share) {
+  factors.resize(log_ratios.size());
+  kernels::exponentials(log_ratios_below_most, static_cast<float>(share), factors,
+                        kernels::chosen_instructions());
+  Weighed weighed;
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    const double weight = particles[i].weight * static_cast<double>(factors[i]);
+    weighed.sum += weight;
+    weighed.squares += weight * weight;
+  }
+  return weighed;
 }
 
-// The share of the log-likelihood, at most `most`, after which enough particles still count.
-double bearable_share(std::span<const Particle> particles, std::span<const double> log_weights,
-                      double most) {
-  const auto effective = [&](double share) {
-    double sum = 0.0;
-    double squares = 0.0;
-    for (std::size_t i = 0; i < particles.size(); ++i) {
-      const double weight = particles[i].weight * exp_of(share * log_weights[i]);
-      sum += weight;
-      squares += weight * weight;
-    }
-    return sum * sum / squares;
-  };
+// The share of the log-likelihood, at most `most`, after which enough particles still count; it is
+// taken.
+MonteCarloLocaliser::Implementation::Weighed
+MonteCarloLocaliser::Implementation::take_bearable_share(double& share) {
   const double wanted = std::min(enough_effective, static_cast<double>(particles.size()) / 3.0);
-  if (effective(most) >= wanted) return most;
+  const auto bearable = [&](const Weighed& weighed) {
+    return weighed.sum * weighed.sum >= wanted * weighed.squares;
+  };
+  const double most = share;
+  const Weighed weighed = take_share(most);
+  if (bearable(weighed)) return weighed;
   double low = 0.0;
   double high = most;
   for (int i = 0; i < 6; ++i) {
     const double middle = 0.5 * (low + high);
-    (effective(middle) >= wanted ? low : high) = middle;
+    (bearable(take_share(middle)) ? low : high) = middle;
   }
-  return std::max(low, most / 64.0);
+  share = std::max(low, most / 64.0);
+  return take_share(share);
 }
 
 // Weighs the particles by the view, in stages when one would leave only few of them: after each
@@ -322,32 +339,27 @@ double MonteCarloLocaliser::Implementation::weigh() {
     log_ratios.resize(particles.size());
     likelihood.log_ratios(particles, log_ratios);
     const double most = *std::ranges::max_element(log_ratios);
-    for (double& ratio : log_ratios) ratio = ratio - most;
-    if (stage == 0) {
-      double in_full = 0.0;
-      for (std::size_t i = 0; i < particles.size(); ++i) {
-        in_full += particles[i].weight * exp_of(log_ratios[i]);
-      }
-      evidence_in_full = most + std::log(in_full);
-    }
-    const double share =
-        stage + 1 == most_stages ? left : bearable_share(particles, log_ratios, left);
-    double sum = 0.0;
-    for (std::size_t i = 0; i < particles.size(); ++i) {
-      particles[i].weight *= exp_of(share * log_ratios[i]);
-      sum += particles[i].weight;
-    }
-    if (!(sum > 0.0)) {  // what explains the view had lost all its weight
+    log_ratios_below_most.resize(log_ratios.size());
+    std::ranges::transform(log_ratios, log_ratios_below_most.begin(),
+                           [most](double ratio) { return static_cast<float>(ratio - most); });
+    if (stage == 0) evidence_in_full = most + std::log(take_share(1.0).sum);
+    double share = left;
+    const double sum =
+        (stage + 1 == most_stages ? take_share(share) : take_bearable_share(share)).sum;
+    if (!(sum > nothing_left)) {  // what explains the view had lost all its weight
       for (Particle& particle : particles) {
         particle.weight = 1.0 / static_cast<double>(particles.size());
       }
       return evidence_in_full;
     }
-    for (Particle& particle : particles) particle.weight /= sum;
+    for (std::size_t i = 0; i < particles.size(); ++i) {
+      particles[i].weight *= static_cast<double>(factors[i]) / sum;
+    }
     evidence += share * most + std::log(sum);
     left -= share;
     if (!(left > 1e-9)) break;
     resample(particles.size(), true);
+    likelihood.arrange(particles);
   }
   // Few particles may all miss a narrow maximum that the stages find; a small share of the view
   // says little of the whole.
@@ -394,18 +406,19 @@ void MonteCarloLocaliser::Implementation::resample(std::size_t count, bool sprea
 // earns them.
 int MonteCarloLocaliser::Implementation::redraw_explained(double log_here) {
   std::vector<Candidate> places;
-  std::vector<double> values;
-  double most = 0.0;
+  std::vector<Particle> told;
   const auto add = [&](Candidate candidate) {
     places.push_back(candidate);
-    values.push_back(likelihood.log_ratio(pose_told_by(candidate)));
-    most = std::max(most, values.back());
+    told.push_back({pose_told_by(candidate), 0.0});
   };
   for (const std::uint32_t site : likelihood.compared_sites()) {
     add({site, false});
     if (tells_heading(site) && likelihood.sites()[site].other_likeness > 0.0F) add({site, true});
   }
   if (places.empty()) return 0;
+  std::vector<double> values(told.size());
+  likelihood.log_ratios(told, values);
+  const double most = std::max(0.0, *std::ranges::max_element(values));
   // Anywhere else, and in any other heading, nothing explains the view.
   const double share = (options.compass ? model.heading_width_rad / std::numbers::pi : 1.0) /
                        static_cast<double>(likelihood.sites().size());
@@ -429,14 +442,15 @@ int MonteCarloLocaliser::Implementation::redraw_explained(double log_here) {
 
   const auto count =
       static_cast<std::size_t>(std::max(1L, std::lround(std::max(0.05, 0.9 * mass) * size)));
+  const std::vector<std::size_t> drawn = low_variance_resample(values, count, random);
   std::vector<Particle> fresh;
+  for (const std::size_t d : drawn) fresh.push_back({drawn_around(places[d]), 0.0});
+  std::vector<double> fresh_values(fresh.size());
+  likelihood.log_ratios(fresh, fresh_values);
   double fresh_sum = 0.0;
-  for (const std::size_t d : low_variance_resample(values, count, random)) {
-    const Pose2 pose = drawn_around(places[d]);
-    const double weight =
-        std::exp(std::max(likelihood.log_ratio(pose) - most, -most_against)) / values[d];
-    fresh.push_back({pose, weight});
-    fresh_sum += weight;
+  for (std::size_t n = 0; n < fresh.size(); ++n) {
+    fresh[n].weight = std::exp(std::max(fresh_values[n] - most, -most_against)) / values[drawn[n]];
+    fresh_sum += fresh[n].weight;
   }
   // They take the places of the lightest particles.
   std::vector<std::size_t> order(particles.size());
@@ -461,6 +475,7 @@ int MonteCarloLocaliser::Implementation::redraw_explained(double log_here) {
 MonteCarloEstimate MonteCarloLocaliser::Implementation::observe(const PackedSignature& view) {
   const bool was_localised = latest.state == LocalisationState::localised;
   latest = {};
+  likelihood.arrange(particles);
   compare_views(view, was_localised);
   if (options.redraw == Redraw::uniform || options.redraw == Redraw::topological) {
     latest.redrawn = redraw_fixed(view);

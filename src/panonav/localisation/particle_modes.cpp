@@ -1,7 +1,6 @@
 #include "panonav/localisation/particle_modes.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
@@ -38,7 +37,7 @@ struct Moments {
     const double w = particle.weight;
     const double x = particle.pose.x_m - anchor.x_m;
     const double y = particle.pose.y_m - anchor.y_m;
-    const double h = angle_difference(particle.pose.heading_rad, anchor.heading_rad);
+    const double h = wrap_angle(particle.pose.heading_rad - anchor.heading_rad);
     weight += w;
     first[0] += w * x;
     first[1] += w * y;
@@ -72,52 +71,79 @@ struct Moments {
   }
 };
 
-/// Bins by their place; open addressing, because it is asked for each particle.
+/// Bins by their place; open addressing by their cell, because it is asked for each particle.
 class BinTable {
  public:
-  explicit BinTable(std::size_t most)
-      : slots_(std::bit_ceil(2 * most + 2), none), last_(slots_.size() - 1) {}
+  explicit BinTable(int headings)
+      : headings_(static_cast<std::size_t>(headings)), slots_(64, none) {}
 
   [[nodiscard]] std::span<Bin> bins() { return bins_; }
   [[nodiscard]] std::optional<std::uint32_t> find(std::int32_t x, std::int32_t y,
                                                   std::int32_t heading) const {
-    const std::uint32_t found = slots_[slot_of(x, y, heading)];
-    return found == none ? std::nullopt : std::optional(found);
+    const std::uint32_t cell = slots_[slot_of(x, y)];
+    if (cell == none) return std::nullopt;
+    const std::uint32_t bin = bin_of_[cell * headings_ + static_cast<std::size_t>(heading)];
+    return bin == none ? std::nullopt : std::optional(bin);
   }
   std::uint32_t find_or_add(std::int32_t x, std::int32_t y, std::int32_t heading) {
-    std::uint32_t& slot = slots_[slot_of(x, y, heading)];
-    if (slot == none) {
-      slot = static_cast<std::uint32_t>(bins_.size());
+    // Mostly it is the cell of the particle before.
+    if (cells_.empty() || cells_[last_].x != x || cells_[last_].y != y) {
+      last_ = cell_with(x, y);
+    }
+    std::uint32_t& bin = bin_of_[last_ * headings_ + static_cast<std::size_t>(heading)];
+    if (bin == none) {
+      bin = static_cast<std::uint32_t>(bins_.size());
       bins_.push_back({x, y, heading, 0.0, -1});
     }
-    return slot;
+    return bin;
   }
 
  private:
   static constexpr std::uint32_t none = 0xFFFFFFFF;
-  [[nodiscard]] std::size_t slot_of(std::int32_t x, std::int32_t y, std::int32_t heading) const {
+  struct Cell {
+    std::int32_t x, y;
+  };
+  [[nodiscard]] std::size_t slot_of(std::int32_t x, std::int32_t y) const {
     std::uint64_t hash = static_cast<std::uint32_t>(x) * 0x9E3779B97F4A7C15ULL;
     hash = (hash ^ static_cast<std::uint32_t>(y)) * 0xBF58476D1CE4E5B9ULL;
-    hash = (hash ^ static_cast<std::uint32_t>(heading)) * 0x94D049BB133111EBULL;
-    std::size_t slot = (hash >> 32U) & last_;
+    std::size_t slot = (hash >> 32U) & (slots_.size() - 1);
     while (slots_[slot] != none) {
-      const Bin& bin = bins_[slots_[slot]];
-      if (bin.x == x && bin.y == y && bin.heading == heading) break;
-      slot = (slot + 1) & last_;
+      const Cell& cell = cells_[slots_[slot]];
+      if (cell.x == x && cell.y == y) break;
+      slot = (slot + 1) & (slots_.size() - 1);
     }
     return slot;
   }
+  std::uint32_t cell_with(std::int32_t x, std::int32_t y) {
+    const std::size_t slot = slot_of(x, y);
+    if (slots_[slot] != none) return slots_[slot];
+    const auto added = static_cast<std::uint32_t>(cells_.size());
+    slots_[slot] = added;
+    cells_.push_back({x, y});
+    bin_of_.resize(bin_of_.size() + headings_, none);
+    if (2 * cells_.size() > slots_.size()) {
+      slots_.assign(2 * slots_.size(), none);
+      for (std::uint32_t c = 0; c < cells_.size(); ++c) {
+        slots_[slot_of(cells_[c].x, cells_[c].y)] = c;
+      }
+    }
+    return added;
+  }
 
-  std::vector<std::uint32_t> slots_;
-  std::size_t last_;
+  std::size_t headings_;
+  std::vector<std::uint32_t> slots_;  ///< cells; a power of two, half of them empty
+  std::vector<Cell> cells_;
+  std::vector<std::uint32_t> bin_of_;  ///< each heading of each cell
   std::vector<Bin> bins_;
+  std::uint32_t last_ = 0;
 };
 
 // Particles beyond any map, or at no number, share the outermost bin.
 std::int32_t bin_at(double cells) {
   constexpr double most = 1e9;
-  const double cell = std::floor(cells);
-  return static_cast<std::int32_t>(std::abs(cell) < most ? cell : std::copysign(most, cell));
+  const double far = cells < most ? (cells > -most ? cells : -most) : most;
+  const auto towards_zero = static_cast<std::int32_t>(far);  // faster than floor
+  return towards_zero - (static_cast<double>(towards_zero) > far ? 1 : 0);
 }
 
 }  // namespace
@@ -129,14 +155,15 @@ ParticleModes find_modes(std::span<const Particle> particles, const PoseBins& bi
   ParticleModes result;
   result.mode_of.assign(particles.size(), -1);
 
-  BinTable table(particles.size());
+  BinTable table(bins.headings);
   std::vector<std::uint32_t> bin_of(particles.size());
+  const double cells_per_metre = 1.0 / bins.cell_m;
   const double sectors_per_radian = bins.headings / (2.0 * std::numbers::pi);
   double sum = 0.0;
   for (std::size_t i = 0; i < particles.size(); ++i) {
     const Pose2& pose = particles[i].pose;
-    const auto x = bin_at(pose.x_m / bins.cell_m);
-    const auto y = bin_at(pose.y_m / bins.cell_m);
+    const auto x = bin_at(pose.x_m * cells_per_metre);
+    const auto y = bin_at(pose.y_m * cells_per_metre);
     const auto sector = bin_at((pose.heading_rad + std::numbers::pi) * sectors_per_radian);
     const std::int32_t heading = std::clamp(sector, 0, bins.headings - 1);
     bin_of[i] = table.find_or_add(x, y, heading);
@@ -189,12 +216,14 @@ ParticleModes find_modes(std::span<const Particle> particles, const PoseBins& bi
   for (std::size_t r = 0; r < by_weight.size(); ++r) {
     ranks[static_cast<std::size_t>(by_weight[r])] = static_cast<int>(r);
   }
+  for (Bin& bin : cells) {
+    if (bin.mode >= 0) bin.mode = ranks[static_cast<std::size_t>(bin.mode)];
+  }
   std::vector<Moments> moments(by_weight.size());
   for (std::size_t i = 0; i < particles.size(); ++i) {
     const int mode = cells[bin_of[i]].mode;
-    if (mode < 0 || ranks[static_cast<std::size_t>(mode)] < 0) continue;
-    result.mode_of[i] = ranks[static_cast<std::size_t>(mode)];
-    moments[static_cast<std::size_t>(result.mode_of[i])].add(particles[i]);
+    result.mode_of[i] = mode;
+    if (mode >= 0) moments[static_cast<std::size_t>(mode)].add(particles[i]);
   }
   for (const Moments& m : moments) {
     result.modes.push_back(m.mode());
@@ -204,9 +233,25 @@ ParticleModes find_modes(std::span<const Particle> particles, const PoseBins& bi
 }
 
 double spread_of(std::span<const Particle> particles) {
-  Moments moments;
-  for (const Particle& particle : particles) moments.add(particle);
-  return moments.mode().spread_m;
+  if (particles.empty()) return 0.0;
+  // Relative to the first, so that nothing is lost far from the origin.
+  const Point2 anchor = particles.front().pose.position();
+  double weight = 0.0;
+  double first_x = 0.0;
+  double first_y = 0.0;
+  double second = 0.0;
+  for (const Particle& particle : particles) {
+    const double x = particle.pose.x_m - anchor.x_m;
+    const double y = particle.pose.y_m - anchor.y_m;
+    weight += particle.weight;
+    first_x += particle.weight * x;
+    first_y += particle.weight * y;
+    second += particle.weight * (x * x + y * y);
+  }
+  if (!(weight > 0.0)) return 0.0;
+  const double x = first_x / weight;
+  const double y = first_y / weight;
+  return std::sqrt(std::max(0.0, second / weight - x * x - y * y));
 }
 
 }  // namespace panonav

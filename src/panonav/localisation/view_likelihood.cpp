@@ -94,6 +94,7 @@ void ViewLikelihood::index_sites() {
     while (table_[at].end != 0) at = (at + 1) & last;
     table_[at] = cell;
   }
+  group_of_cell_.assign(table_.size() + 1, 0);
 }
 
 std::optional<std::uint32_t> ViewLikelihood::cell_at(std::int32_t x,
@@ -148,6 +149,8 @@ double ViewLikelihood::compare(std::uint32_t site) {
   };
   s.likeness = likeness_of(match);
   s.other_likeness = likeness_of(matches.other);
+  s.log_likeness = std::log(s.likeness);
+  s.other_log_likeness = std::log(s.other_likeness);
   if (static_cast<double>(s.likeness) > most_likeness_) {
     most_likeness_ = static_cast<double>(s.likeness);
     const double apart_m = model_.range_m * std::log(far * far / most_likeness_);
@@ -182,8 +185,9 @@ const kernels::LikenessLanes& ViewLikelihood::lanes_of(Cell& cell) {
   kernels::LikenessLanes& lanes = lanes_.emplace_back();
   for (std::size_t i = 0; i < lanes_of_all; ++i) {
     lanes.x_m[i] = 1e6F / fall_.per_metre;
-    lanes.y_m[i] = lanes.likeness[i] = lanes.heading_rad[i] = lanes.per_square_turn[i] = 0.0F;
-    lanes.other_likeness[i] = lanes.other_heading_rad[i] = 0.0F;
+    lanes.y_m[i] = lanes.heading_rad[i] = lanes.per_square_turn[i] = 0.0F;
+    lanes.other_heading_rad[i] = 0.0F;
+    lanes.log_likeness[i] = lanes.other_log_likeness[i] = -std::numeric_limits<float>::infinity();
   }
   // Small numbers, wherever on Earth the origin is.
   const Point2 centre = centre_of({cell.x, cell.y});
@@ -194,23 +198,25 @@ const kernels::LikenessLanes& ViewLikelihood::lanes_of(Cell& cell) {
     lanes.x_m[i] = static_cast<float>(s.position.x_m - centre.x_m);
     lanes.y_m[i] = static_cast<float>(s.position.y_m - centre.y_m);
     if (s.compared_at != number_) continue;
-    lanes.likeness[i] = s.likeness;
+    lanes.log_likeness[i] = s.log_likeness;
     if (!compass_ || std::isnan(s.heading_rad)) continue;
     lanes.heading_rad[i] = s.heading_rad;
     lanes.other_heading_rad[i] = s.other_heading_rad;
-    lanes.other_likeness[i] = s.other_likeness;
+    lanes.other_log_likeness[i] = s.other_log_likeness;
     lanes.per_square_turn[i] = per_square_turn;
   }
   return lanes;
 }
 
 void ViewLikelihood::log_ratios(std::span<const Particle> particles, std::span<double> ratios) {
-  // Particles of one cell follow each other mostly: they are handed on together.
-  constexpr std::size_t most = 64;
+  if (particles.empty()) return;
+  // Particles of one cell that follow each other are handed on together.
+  constexpr std::size_t most = 128;
   std::array<float, most> x_m, y_m, heading_rad, explained;
   std::size_t begin = 0;
+  auto next = cell_of(particles.front().pose.position());
   while (begin < particles.size()) {
-    const auto place = cell_of(particles[begin].pose.position());
+    const auto place = next;
     const Point2 centre = centre_of(place);
     std::size_t count = 0;
     do {
@@ -219,8 +225,9 @@ void ViewLikelihood::log_ratios(std::span<const Particle> particles, std::span<d
       y_m[count] = static_cast<float>(pose.y_m - centre.y_m);
       heading_rad[count] = static_cast<float>(pose.heading_rad);
       ++count;
-    } while (count < most && begin + count < particles.size() &&
-             cell_of(particles[begin + count].pose.position()) == place);
+      if (begin + count == particles.size()) break;
+      next = cell_of(particles[begin + count].pose.position());
+    } while (count < most && next == place);
     if (const auto cell = cell_at(place.first, place.second)) {
       kernels::explain_likeness(lanes_of(table_[*cell]), fall_, std::span(x_m).first(count),
                                 std::span(y_m).first(count), std::span(heading_rad).first(count),
@@ -249,28 +256,55 @@ std::span<const std::uint32_t> ViewLikelihood::sites_near(Point2 position) const
   return std::span(near_).subspan(table_[*cell].begin, table_[*cell].end - table_[*cell].begin);
 }
 
-std::vector<std::uint32_t> ViewLikelihood::sites_near_most(std::span<const Particle> particles,
-                                                           std::size_t most, double least) const {
-  std::vector<double> by_cell(table_.size());
-  std::vector<std::uint32_t> cells;
-  std::optional<std::pair<std::int32_t, std::int32_t>> last;
-  std::optional<std::uint32_t> cell;
-  for (const Particle& particle : particles) {
-    const auto place = cell_of(particle.pose.position());
-    if (place != last) {
+void ViewLikelihood::group(std::span<const Particle> particles) {
+  groups_.clear();
+  group_of_.resize(particles.size());
+  std::pair<std::int32_t, std::int32_t> last;
+  std::uint32_t at = 0;
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    const auto place = cell_of(particles[i].pose.position());
+    if (i == 0 || place != last) {
       last = place;
-      cell = cell_at(place.first, place.second);
+      const auto none = static_cast<std::uint32_t>(table_.size());
+      const std::uint32_t cell = cell_at(place.first, place.second).value_or(none);
+      at = group_of_cell_[cell];
+      if (at >= groups_.size() || groups_[at].cell != cell) {
+        at = group_of_cell_[cell] = static_cast<std::uint32_t>(groups_.size());
+        groups_.push_back({cell, 0, 0.0});
+      }
     }
-    if (!cell) continue;
-    if (by_cell[*cell] == 0.0) cells.push_back(*cell);
-    by_cell[*cell] += particle.weight;
+    group_of_[i] = at;
+    ++groups_[at].count;
+    groups_[at].weight += particles[i].weight;
   }
+}
+
+void ViewLikelihood::arrange(std::vector<Particle>& particles) {
+  group(particles);
+  std::uint32_t begin = 0;
+  for (Group& group : groups_) {
+    const std::uint32_t count = group.count;
+    group.count = begin;
+    begin += count;
+  }
+  arranged_.resize(particles.size());
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    arranged_[groups_[group_of_[i]].count++] = particles[i];
+  }
+  particles.swap(arranged_);
+}
+
+std::vector<std::uint32_t> ViewLikelihood::sites_near_most(std::span<const Particle> particles,
+                                                           std::size_t most, double least) {
+  group(particles);
   std::vector<double> mass(sites_.size());
   std::vector<std::uint32_t> found;
-  for (const std::uint32_t c : cells) {
-    for (std::uint32_t i = table_[c].begin; i < table_[c].end; ++i) {
+  for (const Group& group : groups_) {
+    if (group.cell == table_.size()) continue;
+    const Cell& cell = table_[group.cell];
+    for (std::uint32_t i = cell.begin; i < cell.end; ++i) {
       if (mass[near_[i]] == 0.0) found.push_back(near_[i]);
-      mass[near_[i]] += by_cell[c];
+      mass[near_[i]] += group.weight;
     }
   }
   std::erase_if(found, [&](std::uint32_t site) { return mass[site] < least; });

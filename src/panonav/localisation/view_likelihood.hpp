@@ -34,15 +34,17 @@ class ViewLikelihood {
     float reference_heading_rad;  ///< NaN: not known
     float heading_rad;  ///< absolute, of the robot that took the view compared; NaN: not known
     float likeness;     ///< 0: unlike, or not compared
-    float other_heading_rad;    ///< the second heading that fits (`ColumnMatches`), and
-    float other_likeness;       ///< the likeness then
+    float log_likeness;
+    float other_heading_rad;  ///< the second heading that fits (`ColumnMatches`), and
+    float other_likeness;     ///< the likeness then
+    float other_log_likeness;
     std::uint32_t compared_at;  ///< number of the view that it was compared with
   };
 
   /// Forgets the last view. Throws ContractError on a signature of another shape.
   void begin(const PackedSignature& view);
-  /// Compares the view with a site's reference, unless it was; returns their difference. Cost: 2.5
-  /// microseconds.
+  /// Compares the view with a site's reference, unless it was; returns their difference. Cost: 1
+  /// microsecond.
   double compare(std::uint32_t site);
   [[nodiscard]] bool compared(std::uint32_t site) const noexcept {
     return sites_[site].compared_at == number_;
@@ -50,10 +52,11 @@ class ViewLikelihood {
   [[nodiscard]] std::optional<double> least_difference(std::span<const std::uint32_t> sites) const;
 
   /// Log-likelihood of the view at each pose, over that of a view which no reference there
-  /// explains;
-  /// >= 0. Cost: 30 ns a pose.
+  /// explains; >= 0. Cost: 15 ns a pose where those of one cell follow each other (`arrange`).
   void log_ratios(std::span<const Particle> particles, std::span<double> ratios);
   [[nodiscard]] double log_ratio(const Pose2& pose);
+  /// Changes the order of particles so that those of one cell follow each other. Cost: 10 ns each.
+  void arrange(std::vector<Particle>& particles);
 
   [[nodiscard]] std::span<const Site> sites() const noexcept { return sites_; }
   /// Nearest sites of a place, 12 at most; empty far from all references.
@@ -61,7 +64,7 @@ class ViewLikelihood {
   /// The sites near most of the particles' weight, heaviest first: those with at least `least` of
   /// it around them, `most` at most.
   [[nodiscard]] std::vector<std::uint32_t> sites_near_most(std::span<const Particle> particles,
-                                                           std::size_t most, double least) const;
+                                                           std::size_t most, double least);
   [[nodiscard]] std::optional<std::uint32_t> site_of(ViewId view) const noexcept;
   /// Compared with the view so far, in the order of comparison.
   [[nodiscard]] std::span<const std::uint32_t> compared_sites() const noexcept {
@@ -75,7 +78,15 @@ class ViewLikelihood {
     std::uint32_t lanes_revision;  ///< of the comparisons that `lanes` tells
     std::uint32_t lanes;
   };
+  /// Particles of one cell; all that are in no cell are a group too.
+  struct Group {
+    std::uint32_t cell;  ///< in `table_`; its size for no cell
+    std::uint32_t count;
+    double weight;
+  };
   void index_sites();
+  /// Fills `groups_`, in the order of their first particles, and `group_of_`.
+  void group(std::span<const Particle> particles);
   /// Index in `table_`; empty where no reference is near.
   [[nodiscard]] std::optional<std::uint32_t> cell_at(std::int32_t x, std::int32_t y) const noexcept;
   [[nodiscard]] std::pair<std::int32_t, std::int32_t> cell_of(Point2 position) const noexcept;
@@ -92,6 +103,10 @@ class ViewLikelihood {
   std::vector<Cell> table_;    ///< open addressing, a power of two
   std::vector<std::uint32_t> near_;
   std::vector<kernels::LikenessLanes> lanes_;  ///< of cells asked for since the last comparison
+  std::vector<Group> groups_;
+  std::vector<std::uint32_t> group_of_;       ///< each particle
+  std::vector<std::uint32_t> group_of_cell_;  ///< right only where the group is of the cell
+  std::vector<Particle> arranged_;
   std::uint32_t revision_ = 1;
   std::vector<std::uint32_t> compared_sites_;
   std::optional<ColumnProfiles> asked_;
