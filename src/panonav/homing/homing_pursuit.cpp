@@ -1,0 +1,133 @@
+#include "panonav/homing/homing_pursuit.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string_view>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr int stages = 3;
+constexpr double gain_against = 0.5;
+// Less than two such steps undo one halving, so that a direction at random shortens the step.
+constexpr double gain_agreeing = 1.25;
+
+}  // namespace
+
+void visit_options(HomingPursuitOptions& options, OptionVisitor& visitor) {
+  constexpr std::array<std::string_view, 2> strategies{"steady", "coarse_to_fine"};
+  int strategy = static_cast<int>(options.strategy);
+  visitor.visit({.name = "strategy", .help = "which frequencies count at which stage"}, strategies,
+                strategy);
+  options.strategy = static_cast<PursuitStrategy>(strategy);
+  visitor.visit(
+      {.name = "coarse", .help = "highest frequency of the first stage", .low = 1, .high = 62},
+      options.coarse);
+  visitor.visit(
+      {.name = "middle", .help = "highest frequency of the second stage", .low = 1, .high = 62},
+      options.middle);
+  visitor.visit(
+      {.name = "fine", .help = "highest frequency of the third stage", .low = 1, .high = 62},
+      options.fine);
+  visitor.visit({.name = "typical_distance_m",
+                 .help = "typical distance of the things around",
+                 .low = 0,
+                 .high = 1000,
+                 .low_open = true},
+                options.typical_distance_m);
+  visitor.visit({.name = "longest_step_m",
+                 .help = "longest way between two views",
+                 .low = 0,
+                 .high = 100,
+                 .low_open = true},
+                options.longest_step_m);
+  visitor.visit({.name = "stop_length",
+                 .help = "homing stops when the vector is shorter, in units of R",
+                 .low = 0,
+                 .high = 1},
+                options.stop_length);
+  visitor.visit({.name = "shortest_step_m",
+                 .help = "homing stops when the step is shorter",
+                 .low = 0,
+                 .high = 100,
+                 .low_open = true},
+                options.shortest_step_m);
+  visitor.visit(
+      {.name = "most_steps", .help = "steps after which a run ends", .low = 1, .high = 1e6},
+      options.most_steps);
+  visitor.visit({.name = "arrived_difference",
+                 .help = "largest difference of the views at home",
+                 .low = 0,
+                 .high = 2},
+                options.arrived_difference);
+}
+
+HomingPursuit::HomingPursuit(HomingView home, const HomingPursuitOptions& options,
+                             const FourierHomingOptions& vector)
+    : home_(std::move(home)), options_(options), vector_(vector) {
+  validate(options_);
+  validate(vector_);
+}
+
+bool HomingPursuit::is_last_stage() const noexcept {
+  return options_.strategy == PursuitStrategy::steady || stage_ + 1 == stages;
+}
+
+FourierHomingOptions HomingPursuit::vector_of_stage() const {
+  FourierHomingOptions vector = vector_;
+  if (options_.strategy == PursuitStrategy::coarse_to_fine) {
+    const std::array<int, stages> highest{options_.coarse, options_.middle, options_.fine};
+    vector.highest = highest[static_cast<std::size_t>(stage_)];
+  }
+  return vector;
+}
+
+PursuitDecision HomingPursuit::decide(const HomingView& current) {
+  PursuitDecision decision;
+  for (;;) {
+    const FourierHomingOptions options = vector_of_stage();
+    const HomeVector vector = home_vector(home_, current, options);
+    decision.vector = vector;
+    decision.stage = stage_;
+    // The same in a frame that stays: that of the robot at home.
+    const double direction_in_home_rad = vector.direction_rad() - vector.heading_rad;
+    if (direction_in_home_rad_) {
+      const bool against = std::cos(direction_in_home_rad - *direction_in_home_rad_) < 0.0;
+      gain_ = against ? gain_ * gain_against : std::min(1.0, gain_ * gain_agreeing);
+    }
+    direction_in_home_rad_ = direction_in_home_rad;
+    decision.turn_rad = vector.direction_rad();
+    decision.advance_m =
+        gain_ * std::min(options_.longest_step_m, options_.typical_distance_m * vector.length());
+    const bool stops =
+        vector.length() < options_.stop_length || decision.advance_m < options_.shortest_step_m;
+    if (state_ == PursuitState::moving && !stops && steps_ >= options_.most_steps) {
+      state_ = PursuitState::exhausted;
+    }
+    if (state_ == PursuitState::moving && !stops) {
+      ++steps_;
+      return decision;
+    }
+    if (state_ == PursuitState::moving && !is_last_stage()) {
+      ++stage_;
+      gain_ = 1.0;
+      direction_in_home_rad_.reset();
+      continue;
+    }
+    decision.difference = image_difference(home_, current, options.highest);
+    if (state_ == PursuitState::moving) {
+      state_ = *decision.difference <= options_.arrived_difference ? PursuitState::arrived
+                                                                   : PursuitState::wrong_place;
+    }
+    decision.state = state_;
+    decision.advance_m = 0.0;
+    return decision;
+  }
+}
+
+}  // namespace panonav

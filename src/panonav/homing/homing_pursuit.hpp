@@ -1,0 +1,89 @@
+#pragma once
+
+#include <optional>
+
+#include "panonav/core/options.hpp"
+#include "panonav/homing/fourier_homing.hpp"
+#include "panonav/homing/homing_view.hpp"
+
+namespace panonav {
+
+/// Which frequencies count at which stage of a run home.
+enum class PursuitStrategy {
+  steady,          ///< as the options of the home vector say, all the way
+  coarse_to_fine,  ///< few frequencies first; when homing stops, more [S06 section 5]
+};
+
+struct HomingPursuitOptions {
+  PursuitStrategy strategy = PursuitStrategy::steady;
+  /// Highest frequencies of the stages of coarse_to_fine [S06 figure 13].
+  int coarse = 2;
+  int middle = 4;
+  int fine = 10;
+  double typical_distance_m = 3.0;  ///< R_typ, of the things around [S06 section 3]
+  double longest_step_m = 0.3;      ///< l_max [S06 section 3]
+  /// Homing stops when the vector is shorter, in units of R: the root of S06's epsilon.
+  double stop_length = 0.01;
+  /// Homing stops as well when the way of a step has become shorter, because successive vectors
+  /// pointed against each other.
+  double shortest_step_m = 0.01;
+  int most_steps = 60;
+  /// The robot is at home when the views differ by no more where homing stops, by
+  /// `image_difference` [S06 section 4.3].
+  double arrived_difference = 0.35;
+};
+void visit_options(HomingPursuitOptions& options, OptionVisitor& visitor);
+
+enum class PursuitState {
+  moving,
+  arrived,      ///< homing stopped, and the place looks like home
+  wrong_place,  ///< homing stopped, and the place does not look like home
+  exhausted,    ///< the most steps were made
+};
+
+/// What the robot is to do after a view.
+struct PursuitDecision {
+  PursuitState state = PursuitState::moving;
+  double turn_rad = 0.0;   ///< direction in which to go, in the current robot frame
+  double advance_m = 0.0;  ///< how far; 0 unless moving
+  HomeVector vector;       ///< on which the decision rests
+  int stage = 0;           ///< 0 .. 2 of coarse_to_fine
+  /// Of the views; known where homing stopped.
+  std::optional<double> difference;
+};
+
+/// The run home of S06 section 3: one view in, one step out. Direction by the home vector, length
+/// min(l_max, R_typ length) [S06 section 3, step 3]. Where R is not what was assumed, and at any
+/// noise, that alone runs to and fro around the goal for ever; so the step is halved when a vector
+/// points against the one before it, both in the frame of the home view, and grows by a quarter
+/// when they agree.
+///
+/// Holds the state of one run. Knows nothing of how the robot moves: a differential robot turns and
+/// drives, a holonomic one drives sideways; how the robot faces does not count.
+class HomingPursuit {
+ public:
+  /// Throws OptionError.
+  explicit HomingPursuit(HomingView home, const HomingPursuitOptions& options = {},
+                         const FourierHomingOptions& vector = {});
+
+  /// Throws ContractError as `home_vector`. After a decision that stops, further ones do too.
+  [[nodiscard]] PursuitDecision decide(const HomingView& current);
+
+  [[nodiscard]] const HomingView& home() const noexcept { return home_; }
+  [[nodiscard]] int steps() const noexcept { return steps_; }
+
+ private:
+  [[nodiscard]] FourierHomingOptions vector_of_stage() const;
+  [[nodiscard]] bool is_last_stage() const noexcept;
+
+  HomingView home_;
+  HomingPursuitOptions options_;
+  FourierHomingOptions vector_;
+  int stage_ = 0;
+  int steps_ = 0;
+  double gain_ = 1.0;
+  std::optional<double> direction_in_home_rad_;  // of the step before
+  PursuitState state_ = PursuitState::moving;
+};
+
+}  // namespace panonav

@@ -1,0 +1,144 @@
+#include "panonav/homing/homing_pursuit.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "homing/cylinder_world.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+
+namespace panonav {
+namespace {
+
+using test::CylinderWorld;
+constexpr double pi = std::numbers::pi;
+
+struct Ended {
+  PursuitState state = PursuitState::moving;
+  Pose2 pose;
+  int steps = 0;
+};
+
+// A robot that does exactly what it is told.
+Ended run(const CylinderWorld& world, HomingPursuit pursuit, Pose2 pose) {
+  for (;;) {
+    const PursuitDecision decision = pursuit.decide(world.seen_from(pose));
+    if (decision.state != PursuitState::moving) {
+      EXPECT_EQ(decision.advance_m, 0.0);
+      return {decision.state, pose, pursuit.steps()};
+    }
+    pose = pose * Pose2{0.0, 0.0, decision.turn_rad} * Pose2{decision.advance_m, 0.0, 0.0};
+    if (std::hypot(pose.x_m, pose.y_m) > 2.8) return {PursuitState::moving, pose, pursuit.steps()};
+  }
+}
+
+TEST(HomingPursuit, ReachesHomeFromAllAroundWhateverTheHeading) {
+  for (const auto strategy : {PursuitStrategy::steady, PursuitStrategy::coarse_to_fine}) {
+    Random random(5);
+    int arrived = 0;
+    constexpr int starts = 60;
+    for (int i = 0; i < starts; ++i) {
+      const CylinderWorld world(3.0, 100 + static_cast<std::uint64_t>(i % 10));
+      const Pose2 home{random.uniform(-0.8, 0.8), random.uniform(-0.8, 0.8),
+                       random.uniform(-pi, pi)};
+      const double direction = random.uniform(-pi, pi);
+      const double way_m = random.uniform(0.1, 1.0);
+      const Pose2 start{home.x_m + way_m * std::cos(direction),
+                        home.y_m + way_m * std::sin(direction), random.uniform(-pi, pi)};
+      const HomingPursuitOptions options{.strategy = strategy, .typical_distance_m = 3.0};
+      const Ended end = run(world, HomingPursuit(world.seen_from(home), options), start);
+      arrived += end.state == PursuitState::arrived &&
+                 distance(end.pose.position(), home.position()) < 0.05;
+    }
+    EXPECT_GE(arrived, starts * 9 / 10) << "strategy " << static_cast<int>(strategy);
+  }
+}
+
+TEST(HomingPursuit, StepIsThatOfThePaper) {
+  const CylinderWorld world(3.0, 7);
+  const HomingView home = world.seen_from({0.0, 0.0, 0.3});
+  for (const double way_m : {0.1, 0.8}) {
+    const HomingView current = world.seen_from({way_m, 0.0, -1.0});
+    const HomeVector vector = home_vector(home, current);
+    const PursuitDecision decision = HomingPursuit(home).decide(current);
+    ASSERT_EQ(decision.state, PursuitState::moving);
+    EXPECT_EQ(decision.turn_rad, vector.direction_rad());
+    EXPECT_EQ(decision.advance_m, std::min(0.3, 3.0 * vector.length()));
+    EXPECT_FALSE(decision.difference);
+  }
+}
+
+TEST(HomingPursuit, EndsThoughTheThingsAroundAreMuchNearerThanAssumed) {
+  // Every step goes far beyond the goal: without a shorter step it would run to and fro for ever.
+  const CylinderWorld world(3.0, 8);
+  const Pose2 home{0.2, 0.1, 1.0};
+  const HomingPursuitOptions far{.typical_distance_m = 9.0, .longest_step_m = 2.0};
+  const Ended end = run(world, HomingPursuit(world.seen_from(home), far), {0.5, -0.1, 2.0});
+  EXPECT_EQ(end.state, PursuitState::arrived);
+  EXPECT_LT(distance(end.pose.position(), home.position()), 0.1);
+  EXPECT_LT(end.steps, 30);
+}
+
+TEST(HomingPursuit, NoticesAWrongPlace) {
+  // One row with most of its energy in one frequency: even unrelated views look much alike.
+  const HomingPursuitOptions strict{.arrived_difference = 0.05};
+  int stopped = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const CylinderWorld world(3.0, seed);
+    const CylinderWorld other(3.0, seed + 1000);
+    const HomingView home = other.seen_from({0.1, 0.2, 0.0});
+    EXPECT_EQ(run(other, HomingPursuit(home, strict), {0.4, 0.0, 0.0}).state, PursuitState::arrived)
+        << "seed " << seed;
+    const Ended end = run(world, HomingPursuit(home, strict), {0.4, 0.0, 0.0});
+    EXPECT_NE(end.state, PursuitState::arrived) << "seed " << seed;
+    stopped += end.state == PursuitState::wrong_place;
+  }
+  EXPECT_GT(stopped, 0);
+}
+
+TEST(HomingPursuit, StopsAtOnceAtHomeAndStaysStopped) {
+  const CylinderWorld world(3.0, 9);
+  const HomingView home = world.seen_from({});
+  HomingPursuit pursuit(home);
+  for (int i = 0; i < 3; ++i) {
+    const PursuitDecision decision =
+        pursuit.decide(i < 2 ? home : world.seen_from({0.8, 0.2, 1.0}));
+    EXPECT_EQ(decision.state, PursuitState::arrived);
+    EXPECT_EQ(decision.advance_m, 0.0);
+    ASSERT_TRUE(decision.difference);
+  }
+  EXPECT_EQ(pursuit.steps(), 0);
+}
+
+TEST(HomingPursuit, GivesUpAfterTheMostSteps) {
+  const CylinderWorld world(3.0, 10);
+  HomingPursuit pursuit(world.seen_from({}), {.most_steps = 3});
+  const HomingView stuck = world.seen_from({0.9, 0.0, 0.0});
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(pursuit.decide(stuck).state, PursuitState::moving);
+  EXPECT_EQ(pursuit.decide(stuck).state, PursuitState::exhausted);
+}
+
+TEST(HomingPursuit, CoarseToFineGoesThroughItsStages) {
+  const CylinderWorld world(3.0, 11);
+  const HomingView home = world.seen_from({});
+  HomingPursuit pursuit(home, {.strategy = PursuitStrategy::coarse_to_fine});
+  EXPECT_EQ(pursuit.decide(world.seen_from({0.8, 0.1, 0.0})).stage, 0);
+  const PursuitDecision last = pursuit.decide(home);
+  EXPECT_EQ(last.stage, 2);
+  EXPECT_EQ(last.state, PursuitState::arrived);
+}
+
+TEST(HomingPursuit, ChecksItsInputs) {
+  const CylinderWorld world(3.0, 12);
+  EXPECT_THROW(HomingPursuit(world.seen_from({}), {.typical_distance_m = 0.0}), OptionError);
+  EXPECT_THROW(HomingPursuit(world.seen_from({}), {.most_steps = 0}), OptionError);
+  HomingPursuit pursuit(world.seen_from({}));
+  const std::vector<float> zeros(2 * 14);
+  EXPECT_THROW((void)pursuit.decide(HomingView(2, 14, zeros, zeros)), ContractError) << "rows";
+}
+
+}  // namespace
+}  // namespace panonav
