@@ -36,7 +36,8 @@ Ended run(const CylinderWorld& world, HomingPursuit pursuit, Pose2 pose) {
 }
 
 TEST(HomingPursuit, ReachesHomeFromAllAroundWhateverTheHeading) {
-  for (const auto strategy : {PursuitStrategy::steady, PursuitStrategy::coarse_to_fine}) {
+  for (const auto strategy :
+       {PursuitStrategy::steady, PursuitStrategy::coarse_to_fine, PursuitStrategy::recovering}) {
     Random random(5);
     int arrived = 0;
     constexpr int starts = 60;

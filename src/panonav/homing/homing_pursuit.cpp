@@ -12,7 +12,8 @@ namespace panonav {
 
 namespace {
 
-constexpr int stages = 3;
+constexpr int stages_of_coarse_to_fine = 3;
+constexpr int stages_of_recovering = 4;
 constexpr double gain_against = 0.5;
 // Less than two such steps undo one halving, so that a direction at random shortens the step.
 constexpr double gain_agreeing = 1.25;
@@ -20,7 +21,7 @@ constexpr double gain_agreeing = 1.25;
 }  // namespace
 
 void visit_options(HomingPursuitOptions& options, OptionVisitor& visitor) {
-  constexpr std::array<std::string_view, 2> strategies{"steady", "coarse_to_fine"};
+  constexpr std::array<std::string_view, 3> strategies{"steady", "coarse_to_fine", "recovering"};
   int strategy = static_cast<int>(options.strategy);
   visitor.visit({.name = "strategy", .help = "which frequencies count at which stage"}, strategies,
                 strategy);
@@ -74,15 +75,30 @@ HomingPursuit::HomingPursuit(HomingView home, const HomingPursuitOptions& option
   validate(vector_);
 }
 
-bool HomingPursuit::is_last_stage() const noexcept {
-  return options_.strategy == PursuitStrategy::steady || stage_ + 1 == stages;
+// Whether there is a further stage after homing stopped in this one.
+bool HomingPursuit::goes_on(double difference) const noexcept {
+  switch (options_.strategy) {
+    case PursuitStrategy::steady:
+      return false;
+    case PursuitStrategy::coarse_to_fine:
+      return stage_ + 1 < stages_of_coarse_to_fine;
+    case PursuitStrategy::recovering:
+      return difference > options_.arrived_difference && stage_ + 1 < stages_of_recovering;
+  }
+  return false;
 }
 
-FourierHomingOptions HomingPursuit::vector_of_stage() const {
+FourierHomingOptions HomingPursuit::vector_of_stage(const HomingView& current) const {
   FourierHomingOptions vector = vector_;
+  int highest = 0;
   if (options_.strategy == PursuitStrategy::coarse_to_fine) {
-    const std::array<int, stages> highest{options_.coarse, options_.middle, options_.fine};
-    vector.highest = highest[static_cast<std::size_t>(stage_)];
+    highest = std::array{options_.coarse, options_.middle,
+                         options_.fine}[static_cast<std::size_t>(stage_)];
+  } else if (options_.strategy == PursuitStrategy::recovering) {
+    highest = std::array{0, options_.coarse, options_.middle, 0}[static_cast<std::size_t>(stage_)];
+  }
+  if (highest > 0) {
+    vector.highest = std::min(highest, std::min(home_.components(), current.components()) - 2);
   }
   return vector;
 }
@@ -90,7 +106,7 @@ FourierHomingOptions HomingPursuit::vector_of_stage() const {
 PursuitDecision HomingPursuit::decide(const HomingView& current) {
   PursuitDecision decision;
   for (;;) {
-    const FourierHomingOptions options = vector_of_stage();
+    const FourierHomingOptions options = vector_of_stage(current);
     const HomeVector vector = home_vector(home_, current, options);
     decision.vector = vector;
     decision.stage = stage_;
@@ -113,17 +129,18 @@ PursuitDecision HomingPursuit::decide(const HomingView& current) {
       ++steps_;
       return decision;
     }
-    if (state_ == PursuitState::moving && !is_last_stage()) {
+    const double difference = image_difference(home_, current);
+    if (state_ == PursuitState::moving && goes_on(difference)) {
       ++stage_;
       gain_ = 1.0;
       direction_in_home_rad_.reset();
       continue;
     }
-    decision.difference = image_difference(home_, current, options.highest);
     if (state_ == PursuitState::moving) {
-      state_ = *decision.difference <= options_.arrived_difference ? PursuitState::arrived
-                                                                   : PursuitState::wrong_place;
+      state_ = difference <= options_.arrived_difference ? PursuitState::arrived
+                                                         : PursuitState::wrong_place;
     }
+    decision.difference = difference;
     decision.state = state_;
     decision.advance_m = 0.0;
     return decision;

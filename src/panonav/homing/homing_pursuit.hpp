@@ -12,11 +12,17 @@ namespace panonav {
 enum class PursuitStrategy {
   steady,          ///< as the options of the home vector say, all the way
   coarse_to_fine,  ///< few frequencies first; when homing stops, more [S06 section 5]
+  /// Ours: steady; where homing stops and the difference of the views says that this is not home,
+  /// coarse to fine from there, and in the end once more as the options say. The home vector
+  /// weighs frequencies by their coherence, so what is left at a wrong place is mostly a view too
+  /// far from home for any but the lowest ones.
+  recovering,
 };
 
 struct HomingPursuitOptions {
-  PursuitStrategy strategy = PursuitStrategy::steady;
-  /// Highest frequencies of the stages of coarse_to_fine [S06 figure 13].
+  PursuitStrategy strategy = PursuitStrategy::recovering;
+  /// Highest frequencies of the stages of coarse_to_fine [S06 figure 13]; the first two count for
+  /// `recovering`, too. Where the views have fewer, all that they have.
   int coarse = 2;
   int middle = 4;
   int fine = 10;
@@ -30,7 +36,7 @@ struct HomingPursuitOptions {
   int most_steps = 60;
   /// The robot is at home when the views differ by no more where homing stops, by
   /// `image_difference` [S06 section 4.3].
-  double arrived_difference = 0.35;
+  double arrived_difference = 0.08;
 };
 void visit_options(HomingPursuitOptions& options, OptionVisitor& visitor);
 
@@ -47,7 +53,7 @@ struct PursuitDecision {
   double turn_rad = 0.0;   ///< direction in which to go, in the current robot frame
   double advance_m = 0.0;  ///< how far; 0 unless moving
   HomeVector vector;       ///< on which the decision rests
-  int stage = 0;           ///< 0 .. 2 of coarse_to_fine
+  int stage = 0;           ///< counts changes of the frequencies
   /// Of the views; known where homing stopped.
   std::optional<double> difference;
 };
@@ -73,8 +79,8 @@ class HomingPursuit {
   [[nodiscard]] int steps() const noexcept { return steps_; }
 
  private:
-  [[nodiscard]] FourierHomingOptions vector_of_stage() const;
-  [[nodiscard]] bool is_last_stage() const noexcept;
+  [[nodiscard]] FourierHomingOptions vector_of_stage(const HomingView& current) const;
+  [[nodiscard]] bool goes_on(double difference) const noexcept;
 
   HomingView home_;
   HomingPursuitOptions options_;
