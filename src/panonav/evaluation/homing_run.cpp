@@ -82,7 +82,6 @@ class SimulatedRobot {
     if (options_.motion.drive == DriveKind::differential) {
       const Pose2 turned =
           sample_step({0.0, 0.0, wrap_angle(direction_rad)}, options_.motion, random_);
-      // A turn on the spot: the random walk of the axle's middle during it counts as travel.
       pose_.heading_rad = wrap_angle(pose_.heading_rad + turned.heading_rad);
       after = pose_ * sample_step({advance_m, 0.0, 0.0}, options_.motion, random_);
     } else {

@@ -74,7 +74,7 @@ enum class HomingRunEnd {
 /// What a robot did on its way home.
 struct HomingRun {
   Pose2 goal;
-  std::vector<Pose2> path;          ///< true poses, one per view, the start first
+  std::vector<Pose2> path;          ///< true poses at the views, the start first; and the last one
   std::vector<HomeVector> vectors;  ///< at these poses
   HomingRunEnd end = HomingRunEnd::exhausted;
   double end_distance_m = 0.0;  ///< from the goal
