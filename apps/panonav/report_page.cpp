@@ -68,6 +68,22 @@ std::string table_row(std::string_view cell, const std::vector<std::string>& tex
 
 }  // namespace
 
+void prepare_report_folder(const std::filesystem::path& folder, std::string_view own_file,
+                           std::string_view verb) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const bool there = fs::exists(folder, error);
+  const bool ours = fs::exists(folder / own_file, error);
+  if (there && (!fs::is_directory(folder, error) || (!ours && !fs::is_empty(folder, error)))) {
+    throw FileError(folder.string(), "is there already and was not made by panonav " +
+                                         std::string(verb) +
+                                         "; allowed for --report: a new folder, or that of an "
+                                         "earlier report");
+  }
+  fs::create_directories(folder, error);
+  if (error) throw FileError(folder.string(), "cannot be made: " + error.message());
+}
+
 ReportPage::ReportPage(std::string title, std::string lead) : title_(std::move(title)) {
   body_ = element("h1", title_) + "\n<p class=\"lead\">" + escaped(lead) + "</p>\n";
 }

@@ -14,6 +14,11 @@ struct ReportPicture {
   std::string caption;
 };
 
+/// Makes the folder of a report. Throws FileError when something is there that is neither empty nor
+/// an earlier report of the same verb, which holds `own_file`.
+void prepare_report_folder(const std::filesystem::path& folder, std::string_view own_file,
+                           std::string_view verb);
+
 /// One HTML page that needs nothing but the pictures beside it: no scripts, nothing from the
 /// network.
 class ReportPage {

@@ -221,16 +221,7 @@ std::vector<std::pair<std::string, std::string>> main_figures(const TrackSummary
 }  // namespace
 
 void prepare_track_report(const fs::path& folder) {
-  std::error_code error;
-  const bool there = fs::exists(folder, error);
-  const bool ours = fs::exists(folder / animation_file, error);
-  if (there && (!fs::is_directory(folder, error) || (!ours && !fs::is_empty(folder, error)))) {
-    throw FileError(folder.string(),
-                    "is there already and was not made by panonav track; allowed for --report: a "
-                    "new folder, or that of an earlier report");
-  }
-  fs::create_directories(folder, error);
-  if (error) throw FileError(folder.string(), "cannot be made: " + error.message());
+  prepare_report_folder(folder, animation_file, "track");
 }
 
 std::size_t particles_shown(std::size_t images) {

@@ -13,6 +13,7 @@ namespace panonav::command {
 [[nodiscard]] Verb demo_verb();
 [[nodiscard]] Verb evaluate_verb();
 [[nodiscard]] Verb forget_verb();
+[[nodiscard]] Verb home_verb();
 [[nodiscard]] Verb info_verb();
 [[nodiscard]] Verb localise_verb();
 [[nodiscard]] Verb memorise_verb();

@@ -10,9 +10,10 @@ namespace {
 std::vector<std::string> verbs() {
   return {
 #ifdef PANONAV_COMMAND_SIMULATES
-      "simulate",  "demo",   "reproduce", "evaluate",
+      "simulate",  "demo",     "reproduce", "evaluate",
 #endif
-      "calibrate", "unwrap", "memorise",  "info",     "verify", "forget", "localise", "track"};
+      "calibrate", "unwrap",   "memorise",  "info",     "verify",
+      "forget",    "localise", "track",     "home"};
 }
 
 TEST(Usage, VersionAndHelpGoToStandardOutput) {
