@@ -10,6 +10,7 @@ namespace panonav::command {
 [[nodiscard]] std::vector<Verb> all_verbs();
 
 [[nodiscard]] Verb calibrate_verb();
+[[nodiscard]] Verb catchment_verb();
 [[nodiscard]] Verb demo_verb();
 [[nodiscard]] Verb evaluate_verb();
 [[nodiscard]] Verb forget_verb();

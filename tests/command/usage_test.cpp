@@ -10,7 +10,7 @@ namespace {
 std::vector<std::string> verbs() {
   return {
 #ifdef PANONAV_COMMAND_SIMULATES
-      "simulate",  "demo",     "reproduce", "evaluate",
+      "simulate",  "demo",     "reproduce", "evaluate", "catchment",
 #endif
       "calibrate", "unwrap",   "memorise",  "info",     "verify",
       "forget",    "localise", "track",     "home"};

@@ -1,0 +1,144 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "command_runner.hpp"
+#include "landmark_world.hpp"
+#include "panonav/geometry/angles.hpp"
+
+namespace panonav::testing {
+namespace {
+
+using nlohmann::json;
+
+#define REQUIRE_REAL_DATA(variable, folder) \
+  const auto variable = real_data(folder);  \
+  if (!variable) GTEST_SKIP() << "PANONAV_DATA does not name a folder that holds " folder
+
+json answer_of(const std::vector<std::string>& arguments) {
+  const auto result = run_panonav(arguments);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  return json::parse(result.out);
+}
+
+class Catchment : public ::testing::Test {
+ protected:
+  Catchment() {
+    auto poses = grid_poses(5);
+    for (Pose2& pose : poses) pose = {0.2 * pose.x_m, 0.2 * pose.y_m, 0.3};
+    std::filesystem::create_directory(run);
+    write_dataset(run, world, poses);
+  }
+  TemporaryFolder folder;
+  LandmarkWorld world{11};
+  std::string run = folder / "run";
+};
+
+TEST_F(Catchment, CountsAllPairsAndKeepsItsBooks) {
+  const auto answer = answer_of({"catchment", run, "--json"});
+  EXPECT_EQ(answer["goals"], 25);
+  EXPECT_EQ(answer["places"], 25);
+  EXPECT_EQ(answer["pairs"], 25 * 24);
+  EXPECT_NEAR(answer["spacing_m"].get<double>(), 0.1, 1e-9);
+  double pairs = 0.0;
+  double weighted = 0.0;
+  for (const auto& bin : answer["bins"]) {
+    pairs += bin["pairs"].get<double>();
+    weighted += bin["pairs"].get<double>() * bin["homeward_component"].get<double>();
+  }
+  EXPECT_EQ(pairs, 600.0);
+  EXPECT_NEAR(weighted / pairs, answer["homeward_component"].get<double>(), 1e-6);
+  EXPECT_GE(answer["homeward_component"].get<double>(), 0.8);
+  double views = 0.0;
+  for (const auto& view : answer["views"]) views += view["places"].get<double>();
+  const auto& areas = answer["catchment_areas"];
+  EXPECT_NEAR(views / 25.0, areas[1]["places"].get<double>(), 1e-9);
+  for (std::size_t i = 1; i < areas.size(); ++i) {
+    EXPECT_GE(areas[i]["places"].get<double>(), areas[i - 1]["places"].get<double>());
+  }
+  EXPECT_GE(areas[0]["places"].get<double>(), 1.0) << "who is at home stays there";
+}
+
+TEST_F(Catchment, NearPairsOnly) {
+  const auto answer = answer_of({"catchment", run, "--up-to-m", "0.1", "--json"});
+  EXPECT_EQ(answer["pairs"], 2 * (2 * 5 * 4));
+}
+
+TEST_F(Catchment, TurningTheRobotChangesNothingButRounding) {
+  const auto straight = answer_of({"catchment", run, "--json"});
+  const auto turned = answer_of({"catchment", run, "--turn-randomly", "3", "--json"});
+  EXPECT_NEAR(straight["homeward_component"].get<double>(),
+              turned["homeward_component"].get<double>(), 0.01);
+  EXPECT_NEAR(straight["orientation_error_rad"].get<double>(),
+              turned["orientation_error_rad"].get<double>(), 0.01);
+  EXPECT_EQ(run_panonav({"catchment", run, "--json", "--threads", "1"}).out,
+            run_panonav({"catchment", run, "--json", "--threads", "3"}).out);
+}
+
+TEST_F(Catchment, ASecondRecordingOfTheSamePlacesIsComparedWithTheFirst) {
+  const auto answer = answer_of({"catchment", run, "--current", run, "--json"});
+  EXPECT_EQ(answer["current"], run);
+  EXPECT_EQ(answer["pairs"], 25 * 24);
+}
+
+TEST_F(Catchment, AheadPointsAlongTheWay) {
+  std::vector<Pose2> poses;
+  for (int i = 0; i < 30; ++i) poses.push_back({0.02 * i, 0.5, 0.0});
+  const auto way = folder.path() / "way";
+  std::filesystem::create_directory(way);
+  write_dataset(way, world, poses);
+  for (const std::string seed : {"", "5"}) {
+    std::vector<std::string> ask{"catchment", way, "--ahead", "5", "--json"};
+    if (!seed.empty()) ask.insert(ask.end(), {"--turn-randomly", seed});
+    const auto answer = answer_of(ask);
+    EXPECT_EQ(answer["pairs"], 25);
+    EXPECT_NEAR(answer["direction_rad"].get<double>(), 0.0, radians(15.0));
+    EXPECT_GE(answer["resultant_length"].get<double>(), 0.9);
+  }
+  EXPECT_NE(refusal({"catchment", way, "--ahead", "30"}).find("1 to 29"), std::string::npos);
+}
+
+TEST_F(Catchment, BadInputIsOneLine) {
+  EXPECT_NE(refusal({"catchment", run, "--up-to-m", "0"}).find("> 0"), std::string::npos);
+  EXPECT_NE(refusal({"catchment", run, "--bin-m", "-1"}).find("> 0"), std::string::npos);
+  EXPECT_NE(refusal({"catchment", run, "--goal", "none.png"}).find("none.png"), std::string::npos);
+  EXPECT_NE(refusal({"catchment", run, "--ahead", "2", "--goal", "x"}).find("leave out"),
+            std::string::npos);
+  EXPECT_NE(refusal({"catchment", run, "--longest-step-m", "0"}).find("longest_step_m"),
+            std::string::npos);
+  std::ofstream(std::filesystem::path(run) / "poses.csv") << "file,x_m,y_m\n"
+                                                          << view_name(0) << ",0,0\n";
+  EXPECT_NE(refusal({"catchment", run}).find("has no heading"), std::string::npos);
+}
+
+TEST_F(Catchment, TheReportHasItsPictures) {
+  const auto report = folder.path() / "report";
+  ASSERT_EQ(run_panonav({"catchment", run, "--report", report}).exit_code, 0);
+  for (const auto* file : {"index.html", "homeward.png", "orientation.png", "areas.png",
+                           "catchment.png", "field.png", "difference.png", "ends.png"}) {
+    EXPECT_TRUE(std::filesystem::exists(report / file)) << file;
+  }
+}
+
+TEST(RealHoming, GantryPlantsLeadHomeFromThirtyCentimetres) {
+  REQUIRE_REAL_DATA(data, "gantry_plants");
+  for (const std::string seed : {"1", "2"}) {
+    const auto answer =
+        answer_of({"catchment", *data, "--up-to-m", "0.3", "--turn-randomly", seed, "--json"});
+    EXPECT_GT(answer["pairs"].get<int>(), 3000);
+    EXPECT_GE(answer["homeward_component"].get<double>(), 0.77);
+  }
+}
+
+TEST(RealHoming, SussexRouteLeadsAlongTheWay) {
+  REQUIRE_REAL_DATA(data, "sussex_route");
+  const auto answer = answer_of({"catchment", *data, "--ahead", "20", "--json"});
+  EXPECT_EQ(answer["pairs"], 435);
+  EXPECT_NEAR(answer["direction_rad"].get<double>(), 0.0, radians(10.0));
+  EXPECT_GE(answer["resultant_length"].get<double>(), 0.95);
+}
+
+}  // namespace
+}  // namespace panonav::testing
