@@ -246,12 +246,34 @@ TEST(FourierHoming, VerticalMotionIsTakenIntoAccount) {
   EXPECT_LT(with, 0.5 * without);
 }
 
+TEST(FourierHoming, SearchFindsTheWayFromFarAway) {
+  double with = 0.0;
+  double without = 0.0;
+  Random random(77);
+  for (int trial = 0; trial < 60; ++trial) {
+    const Surroundings around = random_surroundings(500 + trial);
+    const double angle = random.uniform(-pi, pi);
+    const HomingView home = view_of(around.seen_from(0.0, 0.0, 0.0, 1), 20);
+    const HomingView current =
+        view_of(around.seen_from(0.55 * std::cos(angle), 0.55 * std::sin(angle), 2.0, 1), 20);
+    const auto component = [&](bool search) {
+      const HomeVector v = home_vector(home, current, {.displacement_search = search});
+      return std::cos(v.direction_rad() - (angle + pi - 2.0));
+    };
+    with += component(true);
+    without += component(false);
+  }
+  EXPECT_GT(with / 60.0, 0.8);
+  EXPECT_GT(with, without);
+}
+
 TEST(FourierHoming, CoherenceTakesFewerFrequenciesFromAfar) {
   const Surroundings around = random_surroundings(9);
   const HomingView home = view_of(around.seen_from(0.0, 0.0, 0.0, 1));
   double before = 100.0;
   for (const double d : {0.01, 0.2, 0.5, 0.8}) {
-    const HomeVector v = home_vector(home, view_of(around.seen_from(d, 0.0, 0.0, 1)));
+    const HomeVector v = home_vector(home, view_of(around.seen_from(d, 0.0, 0.0, 1)),
+                                     {.displacement_search = false});
     EXPECT_LE(v.frequencies, before + 0.5) << d;
     before = v.frequencies;
   }

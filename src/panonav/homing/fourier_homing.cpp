@@ -3,12 +3,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/homing/displacement.hpp"
 #include "panonav/homing/turn_correlation.hpp"
 
 namespace panonav {
@@ -101,11 +105,62 @@ Solution solve(const Normal& normal) noexcept {
   return s;
 }
 
+// What one row becomes when the robot turns.
+void turn_row(std::span<float> a, std::span<float> b, double turn_rad) {
+  const double step_cosine = std::cos(turn_rad);
+  const double step_sine = std::sin(turn_rad);
+  double cosine = 1.0;
+  double sine = 0.0;
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    const auto c = static_cast<float>(cosine);
+    const auto s = static_cast<float>(sine);
+    const float turned = a[k] * c + b[k] * s;
+    b[k] = b[k] * c - a[k] * s;
+    a[k] = turned;
+    const double next = cosine * step_cosine - sine * step_sine;
+    sine = sine * step_cosine + cosine * step_sine;
+    cosine = next;
+  }
+}
+
+using PerFrequency = std::array<double, TurnCorrelation::most_frequencies + 1>;
+
+// The bell exp(-k^2 / (2 width^2)) that is nearest to the coherences in least squares, up to its
+// height: noise lowers all coherences, distance the high ones first. One row gives little more than
+// a sign for each frequency, so only one number is asked of all of them.
+PerFrequency fitted_bell(const PerFrequency& coherences, int highest) {
+  PerFrequency best{};
+  double most = -std::numeric_limits<double>::infinity();
+  for (double width = 1.5; width < 3.0 * highest; width *= 1.19) {
+    PerFrequency bell{};
+    const double step = std::exp(-0.5 / (width * width));
+    double value = step;
+    double ratio = step * step * step;  // step^(2 k + 1)
+    double common = 0.0;
+    double square = 0.0;
+    for (int k = 1; k <= highest; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      bell[i] = value;
+      common += value * coherences[i];
+      square += value * value;
+      value *= ratio;
+      ratio *= step * step;
+    }
+    const double gain = common / std::sqrt(square);
+    if (gain > most) {
+      most = gain;
+      best = bell;
+    }
+  }
+  return best;
+}
+
 class PairOfViews {
  public:
   PairOfViews(const HomingView& home, const HomingView& current,
               const FourierHomingOptions& options, int highest)
       : home_(home),
+        current_(current),
         options_(options),
         rows_(static_cast<std::size_t>(home.rows())),
         highest_(highest),
@@ -129,8 +184,17 @@ class PairOfViews {
   [[nodiscard]] Normal equations(int k);
   [[nodiscard]] Solution solve_at(double turn_rad);
   void move_current(double xi, double eta);
+  // Where the least squares start, with the heading that fits there.
+  struct Start {
+    Displacement displacement;
+    double ahead_rad = 0.0;  // from which the displacement's direction is counted
+    double turn_rad = 0.0;
+  };
+  [[nodiscard]] Start search() const;
+  void move_current(const Start& start);
 
   const HomingView& home_;
+  const HomingView& current_;
   const FourierHomingOptions& options_;
   std::size_t rows_;
   int highest_;
@@ -139,7 +203,7 @@ class PairOfViews {
   TurnCorrelation correlation_;
   double home_energy_ = 0.0;
   double current_energy_ = 0.0;
-  std::array<double, TurnCorrelation::most_frequencies + 1> component_weights_{};
+  PerFrequency component_weights_{};
   std::vector<float> row_weights_;  // empty: all alike
   Normal normal_;
 };
@@ -199,7 +263,7 @@ void PairOfViews::weigh() {
   row_weights_.clear();
   if (options_.weights == HomingWeights::equal) return;
 
-  double coherent = 0.0;
+  PerFrequency coherences{};
   for (int k = 1; k <= highest_; ++k) {
     float common = 0.0F;
     float home = 0.0F;
@@ -214,12 +278,9 @@ void PairOfViews::weigh() {
       current += ca[y] * ca[y] + cb[y] * cb[y];
     }
     const float most = std::sqrt(home) * std::sqrt(current);
-    if (most > 0.0F) coherent += std::max(0.0, static_cast<double>(common / most));
+    if (most > 0.0F) coherences[static_cast<std::size_t>(k)] = static_cast<double>(common / most);
   }
-  const double width = std::max(1.0, coherent);
-  for (int k = 1; k <= highest_; ++k) {
-    component_weights_[static_cast<std::size_t>(k)] = std::exp(-0.5 * k * k / (width * width));
-  }
+  component_weights_ = fitted_bell(coherences, highest_);
   if (rows_ == 1) return;
 
   std::vector<double> common(rows_);
@@ -362,8 +423,79 @@ void PairOfViews::move_current(double xi, double eta) {
   }
 }
 
+// Rows are averaged to a few bands: things move less than a band up or down, and coarse structure
+// decides. Directions are counted from where the first frequency of the current view has its
+// maximum, so that a turn of the robot changes nothing.
+PairOfViews::Start PairOfViews::search() const {
+  constexpr std::size_t most_bands = 8;
+  // The current view is known to more frequencies than are compared.
+  const int frequencies = std::min(known_, 2 * searched_frequencies);
+  const std::size_t bands = std::min(most_bands, rows_);
+  const auto stride = static_cast<std::size_t>(frequencies) + 1;
+  std::vector<float> values(4 * bands * stride);
+  const auto part = [&](std::size_t i) {
+    return std::span(values).subspan(i * bands * stride, bands * stride);
+  };
+  float ahead_a = 0.0F;
+  float ahead_b = 0.0F;
+  for (std::size_t band = 0; band < bands; ++band) {
+    const std::size_t begin = band * rows_ / bands;
+    const std::size_t end = (band + 1) * rows_ / bands;
+    for (int k = 0; k <= frequencies; ++k) {
+      const std::size_t at = band * stride + static_cast<std::size_t>(k);
+      for (std::size_t y = begin; y < end; ++y) {
+        part(0)[at] += home_.cosines(k)[y];
+        part(1)[at] += home_.sines(k)[y];
+        part(2)[at] += current_.cosines(k)[y];
+        part(3)[at] += current_.sines(k)[y];
+      }
+    }
+    ahead_a += part(2)[band * stride + 1];
+    ahead_b += part(3)[band * stride + 1];
+  }
+  const double ahead_rad = std::atan2(static_cast<double>(ahead_b), static_cast<double>(ahead_a));
+  for (std::size_t band = 0; band < bands; ++band) {
+    turn_row(part(2).subspan(band * stride, stride), part(3).subspan(band * stride, stride),
+             ahead_rad);
+  }
+  const BestDisplacement best =
+      best_displacement(part(0), part(1), part(2), part(3), static_cast<int>(bands), frequencies);
+  return {best.displacement, ahead_rad, static_cast<double>(best.turn_rad) + ahead_rad};
+}
+
+// The expected image at a displacement of any length.
+void PairOfViews::move_current(const Start& start) {
+  const auto count = static_cast<std::size_t>(known_) + 1;
+  std::array<float, most_displaced_frequencies + 1> a{};
+  std::array<float, most_displaced_frequencies + 1> b{};
+  std::array<float, most_displaced_frequencies + 1> to_a{};
+  std::array<float, most_displaced_frequencies + 1> to_b{};
+  for (std::size_t y = 0; y < rows_; ++y) {
+    for (int k = 0; k <= known_; ++k) {
+      a[static_cast<std::size_t>(k)] = c_.current_a(k)[y];
+      b[static_cast<std::size_t>(k)] = c_.current_b(k)[y];
+    }
+    turn_row(std::span(a).first(count), std::span(b).first(count), start.ahead_rad);
+    displace(start.displacement, std::span(a).first(count), std::span(b).first(count),
+             std::span(to_a).first(count), std::span(to_b).first(count));
+    turn_row(std::span(to_a).first(count), std::span(to_b).first(count), -start.ahead_rad);
+    for (int k = 0; k <= known_; ++k) {
+      c_.current_a(k)[y] = to_a[static_cast<std::size_t>(k)];
+      c_.current_b(k)[y] = to_b[static_cast<std::size_t>(k)];
+    }
+  }
+}
+
 HomeVector PairOfViews::result() {
   HomeVector vector;
+  std::optional<Start> found;
+  if (options_.displacement_search) {
+    found = search();
+    const double direction = found->displacement.direction_rad() + found->ahead_rad;
+    if (found->displacement.ring > 0) move_current(*found);
+    vector.xi = found->displacement.length() * std::cos(direction);
+    vector.eta = found->displacement.length() * std::sin(direction);
+  }
   const int last = options_.iterations;
   const int most_frequencies = highest_;
   for (int iteration = 0;; ++iteration) {
@@ -379,7 +511,9 @@ HomeVector PairOfViews::result() {
 
     std::array<float, most_starts> turns{};
     int starts = 1;
-    if (options_.turn == TurnEstimate::sequential) {
+    if (found && found->displacement.ring > 0 && iteration == 0) {
+      turns[0] = static_cast<float>(found->turn_rad);
+    } else if (options_.turn == TurnEstimate::sequential) {
       turns[0] = sequential_turn(correlation_);
     } else {
       starts = highest_turns(
@@ -478,6 +612,9 @@ void visit_options(FourierHomingOptions& options, OptionVisitor& visitor) {
                  .low = 1,
                  .high = static_cast<double>(most_starts)},
                 options.starting_estimates);
+  visitor.visit({.name = "displacement_search",
+                 .help = "try displacements up to two thirds of R before solving"},
+                options.displacement_search);
   visitor.visit({.name = "vertical_motion", .help = "rows off the horizon move up and down, too"},
                 options.vertical_motion);
 }
@@ -489,6 +626,7 @@ FourierHomingOptions published_homing(int highest, int iterations) {
           .gradient = HomingGradient::current,
           .weights = HomingWeights::equal,
           .starting_estimates = 1,
+          .displacement_search = false,
           .vertical_motion = false};
 }
 

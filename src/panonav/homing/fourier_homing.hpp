@@ -62,6 +62,10 @@ struct FourierHomingOptions {
   /// Headings from which the displacement is solved; the one that explains the views best is taken
   /// [S06 footnote 10].
   int starting_estimates = 2;
+  /// Displacements up to two thirds of R are tried first, as hs_ei tries them, and the best is
+  /// where the least squares start: so views from far away are compared as they would look from
+  /// there, with the heading that fits there.
+  bool displacement_search = true;
   /// Rows off the horizon: things move up and down in the image as the robot comes nearer, too.
   /// Only where elevations are known.
   bool vertical_motion = true;
