@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "panonav/core/executor.hpp"
-#include "panonav/core/options.hpp"
+#include "panonav/evaluation/simulated_robot.hpp"
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/homing/homing_pursuit.hpp"
 #include "panonav/homing/homing_view.hpp"
@@ -42,16 +42,6 @@ struct HomingPlace {
 /// What a robot there sees. The same pose and seed give the same bits.
 [[nodiscard]] HomingView take_homing_view(const HomingPlace& place, const Pose2& pose,
                                           std::uint64_t seed);
-
-/// What a robot does whose way is not free.
-enum class ObstacleRule {
-  stop,  ///< it stops there, and the run ends
-  /// It goes past: with feelers as long as the step, it tries directions left and right of the one
-  /// it wants, 15 degrees apart, up to 120 degrees off, nearest first, and takes the first in which
-  /// half a step is free. As long as the wanted way stays blocked it keeps to the side it has
-  /// chosen, and changes it where that side has no way. Nowhere a way: it stops.
-  pass,
-};
 
 struct HomingRunOptions {
   /// Error of what wheels do against what they were told; its drive says how the robot moves: a

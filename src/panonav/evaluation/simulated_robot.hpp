@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "panonav/core/random.hpp"
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/motion/odometry.hpp"
+#include "panonav/simulation/free_space.hpp"
+
+namespace panonav {
+
+/// What a robot does whose way is not free.
+enum class ObstacleRule {
+  stop,  ///< it stops there, and the run ends
+  /// It goes past: with feelers as long as the step, it tries directions left and right of the one
+  /// it wants, 15 degrees apart, up to 120 degrees off, nearest first, and takes the first in which
+  /// half a step is free. As long as the wanted way stays blocked it keeps to the side it has
+  /// chosen, and changes it where that side has no way. Nowhere a way: it stops.
+  pass,
+};
+
+/// A robot base in a simulated place: does what it is told as well as it can. Holds the true pose
+/// and the random stream of its errors.
+class SimulatedRobot {
+ public:
+  /// `space` must outlive the robot. Throws OptionError, and ContractError when `start` is not
+  /// free.
+  SimulatedRobot(const FreeSpace& space, const OdometryNoise& motion, ObstacleRule obstacles,
+                 const Pose2& start, std::uint64_t seed);
+
+  [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }
+
+  /// The direction in which the robot goes when it wants to go `advance_m` along `wanted_rad`, both
+  /// in its own frame; empty when an obstacle stops it. Remembers on which side it goes past.
+  [[nodiscard]] std::optional<double> free_direction(double wanted_rad, double advance_m);
+
+  /// Goes as far as nothing stands in the way. Returns whether that was all of it.
+  bool go(double direction_rad, double advance_m);
+
+ private:
+  [[nodiscard]] bool is_open(double direction_rad, double distance_m) const;
+  [[nodiscard]] std::optional<double> open_on_side(double wanted_rad, double advance_m, int side,
+                                                   int feeler) const;
+
+  const FreeSpace* space_;
+  OdometryNoise motion_;
+  ObstacleRule obstacles_;
+  Pose2 pose_;
+  Random random_;
+  int side_ = 0;  // on which it goes past something: 1 left, -1 right
+};
+
+}  // namespace panonav

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+
+#include "panonav/core/options.hpp"
+#include "panonav/homing/fourier_homing.hpp"
+#include "panonav/homing/homing_pursuit.hpp"
+#include "panonav/homing/snapshot_chain.hpp"
+
+namespace panonav {
+
+enum class ChainDirection { forward, back };
+
+struct ChainFollowerOptions {
+  /// The robot goes on for the next snapshot where the vector to the present one is shorter, in
+  /// units of R.
+  double switch_length = 0.1;
+  /// A vector that points farther from where odometry expects the snapshot is not followed.
+  double mistrust_rad = 1.0;
+  /// Nearer than this to where odometry expects the snapshot, vectors are always followed: there
+  /// the drift of odometry decides its direction.
+  double near_m = 0.4;
+  /// The robot is lost after so long a way without reaching a snapshot.
+  double longest_unseen_m = 10.0;
+};
+void visit_options(ChainFollowerOptions& options, OptionVisitor& visitor);
+
+enum class ChainState {
+  following,
+  finished,  ///< homing stopped at the last snapshot, and the place looks like it
+  lost,      ///< it stopped elsewhere, or reached no snapshot for too long a way
+};
+
+/// What the robot is to do after a view.
+struct ChainDecision {
+  ChainState state = ChainState::following;
+  std::size_t target = 0;  ///< snapshot that is homed to
+  double turn_rad = 0.0;   ///< direction in which to go, in the current robot frame
+  double advance_m = 0.0;  ///< how far; 0 unless following
+  HomeVector vector;       ///< to the target
+  bool by_odometry = false;
+};
+
+/// Drives a route again: homes to one snapshot after the other, in the order of recording or back.
+/// Begins with the snapshot that looks most like the first view. While homing to one it looks for
+/// the next: it goes on for it where the present one is near (by the vector's length), or where the
+/// view has become more alike to the next than to the present one, so that none is searched for
+/// that the robot has passed. Odometry since the last snapshot, which drifts little over such a
+/// way, is the second opinion: a vector that contradicts it is not followed, no snapshot is near of
+/// which it expects more than half of the way still to go, and one that is not found within three
+/// times the steps of its way is given up for the next. The last snapshot is reached by a
+/// `HomingPursuit`.
+class ChainFollower {
+ public:
+  /// Throws OptionError, ContractError as `validate(chain)`.
+  ChainFollower(SnapshotChain chain, ChainDirection direction,
+                const ChainFollowerOptions& options = {}, const HomingPursuitOptions& pursuit = {},
+                const FourierHomingOptions& vector = {});
+
+  /// The robot moved by `moved` since the last view (robot_old_from_robot_new, by its odometry; of
+  /// no meaning for the first view). Throws ContractError as `home_vector`.
+  [[nodiscard]] ChainDecision decide(const HomingView& current, const Pose2& moved);
+
+  [[nodiscard]] const SnapshotChain& chain() const noexcept { return chain_; }
+
+ private:
+  [[nodiscard]] bool is_last(std::size_t target) const noexcept;
+  [[nodiscard]] std::size_t next(std::size_t target) const noexcept;
+  [[nodiscard]] Pose2 target_from_next() const;
+  void aim_at_next(const Pose2& target_from_robot);
+  [[nodiscard]] const HomingView& view(std::size_t i) const { return chain_.snapshots[i].view; }
+  [[nodiscard]] ChainDecision approach_last(const HomingView& current);
+
+  SnapshotChain chain_;
+  ChainDirection direction_;
+  ChainFollowerOptions options_;
+  HomingPursuitOptions pursuit_options_;
+  FourierHomingOptions vector_;
+  std::optional<std::size_t> target_;       // empty: no view yet
+  std::optional<Pose2> target_from_robot_;  // by odometry; unknown on the way to the first
+  double way_m_ = 0.0;                      // to the target, when it became the target
+  int steps_to_target_ = 0;
+  int most_steps_to_target_ = 0;
+  double unseen_m_ = 0.0;  // since the last snapshot that was reached
+  std::optional<HomingPursuit> pursuit_;
+};
+
+}  // namespace panonav
