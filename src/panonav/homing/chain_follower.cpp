@@ -29,6 +29,11 @@ void visit_options(ChainFollowerOptions& options, OptionVisitor& visitor) {
                  .low = 0,
                  .high = std::numbers::pi},
                 options.mistrust_rad);
+  visitor.visit({.name = "mistrust_heading_rad",
+                 .help = "headings farther from what odometry expects are not believed",
+                 .low = 0,
+                 .high = std::numbers::pi},
+                options.mistrust_heading_rad);
   visitor.visit({.name = "near_m",
                  .help = "nearer to the expected place vectors are always followed",
                  .low = 0,
@@ -80,6 +85,12 @@ void ChainFollower::aim_at_next(const Pose2& target_from_robot) {
       3 + 3 * static_cast<int>(std::ceil(way_m_ / pursuit_options_.longest_step_m));
 }
 
+bool ChainFollower::contradicts_odometry(const HomeVector& vector) const noexcept {
+  if (!target_from_robot_) return false;
+  const double drift_rad = wrap_angle(-vector.heading_rad - target_from_robot_->heading_rad);
+  return std::abs(drift_rad) > options_.mistrust_heading_rad;
+}
+
 ChainDecision ChainFollower::approach_last(const HomingView& current) {
   if (!pursuit_) pursuit_.emplace(view(*target_), pursuit_options_, vector_);
   const PursuitDecision step = pursuit_->decide(current);
@@ -117,13 +128,19 @@ ChainDecision ChainFollower::decide(const HomingView& current, const Pose2& move
   HomeVector vector = home_vector(view(*target_), current, vector_);
   if (!is_last(*target_)) {
     // What the views say counts where odometry does not exclude it.
-    const bool plausible = !target_from_robot_ ||
-                           length(*target_from_robot_) <= std::max(options_.near_m, 0.5 * way_m_);
+    const bool contradicts = contradicts_odometry(vector);
+    const bool plausible =
+        !target_from_robot_ ||
+        (!contradicts && length(*target_from_robot_) <= std::max(options_.near_m, 0.5 * way_m_));
     const bool is_near = plausible && vector.length() < options_.switch_length;
     const bool passed =
         plausible && !is_near &&
         image_difference(view(next(*target_)), current) < image_difference(view(*target_), current);
-    const bool given_up = !is_near && !passed && steps_to_target_ >= most_steps_to_target_;
+    const bool is_there_by_odometry =
+        contradicts &&
+        length(*target_from_robot_) < pursuit_options_.typical_distance_m * options_.switch_length;
+    const bool given_up =
+        !is_near && !passed && (is_there_by_odometry || steps_to_target_ >= most_steps_to_target_);
     if (is_near || passed) unseen_m_ = 0.0;
     if (is_near || passed || given_up) {
       // Heading by the compass. Position by the vector where it is short, else by odometry.
@@ -146,21 +163,22 @@ ChainDecision ChainFollower::decide(const HomingView& current, const Pose2& move
     decision.state = ChainState::lost;
     return decision;
   }
-  if (target_from_robot_ && length(*target_from_robot_) > options_.near_m) {
+  if (target_from_robot_) {
+    const bool contradicts = contradicts_odometry(vector);
+    const bool near = length(*target_from_robot_) <= options_.near_m;
     const Pose2 expected = inverse(*target_from_robot_);
     const double expected_rad = std::atan2(expected.y_m, expected.x_m);
     const double off_rad = std::abs(wrap_angle(vector.direction_rad() - expected_rad));
-    if (off_rad > options_.mistrust_rad || vector.length() == 0.0) {
+    const bool at_last = near && is_last(*target_);
+    if (!at_last &&
+        (contradicts || vector.length() == 0.0 || (!near && off_rad > options_.mistrust_rad))) {
       decision.by_odometry = true;
       decision.turn_rad = expected_rad;
       decision.advance_m = std::min(pursuit_options_.longest_step_m, length(expected));
       return decision;
     }
-    // The compass does not drift. But where it contradicts odometry, it is wrong.
-    const double drift_rad = wrap_angle(-vector.heading_rad - target_from_robot_->heading_rad);
-    if (std::abs(drift_rad) < options_.mistrust_rad) {
-      target_from_robot_->heading_rad = wrap_angle(-vector.heading_rad);
-    }
+    // The compass does not drift.
+    if (!contradicts) target_from_robot_->heading_rad = wrap_angle(-vector.heading_rad);
   }
   if (is_last(*target_)) return approach_last(current);
   decision.turn_rad = vector.direction_rad();

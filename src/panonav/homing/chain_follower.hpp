@@ -18,8 +18,11 @@ struct ChainFollowerOptions {
   double switch_length = 0.1;
   /// A vector that points farther from where odometry expects the snapshot is not followed.
   double mistrust_rad = 1.0;
-  /// Nearer than this to where odometry expects the snapshot, vectors are always followed: there
-  /// the drift of odometry decides its direction.
+  /// The same of the heading that the compass finds, whatever the distance: odometry loses less
+  /// over the way between two snapshots.
+  double mistrust_heading_rad = 0.5;
+  /// Nearer than this to where odometry expects the snapshot, vectors are followed in any
+  /// direction: there the drift of odometry decides its direction.
   double near_m = 0.4;
   /// The robot is lost after so long a way without reaching a snapshot.
   double longest_unseen_m = 10.0;
@@ -68,6 +71,7 @@ class ChainFollower {
   [[nodiscard]] bool is_last(std::size_t target) const noexcept;
   [[nodiscard]] std::size_t next(std::size_t target) const noexcept;
   [[nodiscard]] Pose2 target_from_next() const;
+  [[nodiscard]] bool contradicts_odometry(const HomeVector& vector) const noexcept;
   void aim_at_next(const Pose2& target_from_robot);
   [[nodiscard]] const HomingView& view(std::size_t i) const { return chain_.snapshots[i].view; }
   [[nodiscard]] ChainDecision approach_last(const HomingView& current);
