@@ -1,13 +1,44 @@
 #include "panonav/evaluation/chain_run.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <utility>
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/evaluation/simulated_robot.hpp"
 
 namespace panonav {
+
+std::vector<std::vector<Pose2>> random_routes(const FreeSpace& space, int count, double length_m,
+                                              double spacing_m, std::uint64_t seed) {
+  require(length_m > 0.0, "length of a route", length_m, "> 0");
+  require(spacing_m > 0.0, "spacing of a route", spacing_m, "> 0");
+  std::vector<std::vector<Pose2>> routes;
+  for (int number = 0; number < count; ++number) {
+    Random random(seed, static_cast<std::uint64_t>(number));
+    std::vector<Pose2> corners{space.random_pose(random)};
+    double way_m = 0.0;
+    while (way_m < length_m) {
+      const auto leg =
+          space.shortest_path(corners.back().position(), space.random_pose(random).position());
+      if (!leg) continue;
+      for (const Point2& place : std::span(*leg).subspan(1)) {
+        way_m += distance(corners.back().position(), place);
+        corners.push_back({place.x_m, place.y_m, 0.0});
+      }
+    }
+    std::vector<Pose2> route = resample(corners, spacing_m);
+    for (std::size_t i = 0; i + 1 < route.size(); ++i) {
+      route[i].heading_rad =
+          wrap_angle(std::atan2(route[i + 1].y_m - route[i].y_m, route[i + 1].x_m - route[i].x_m));
+    }
+    if (route.size() > 1) route.back().heading_rad = route[route.size() - 2].heading_rad;
+    routes.push_back(std::move(route));
+  }
+  return routes;
+}
 
 SnapshotChain record_chain(const HomingPlace& place, std::span<const Pose2> route,
                            const OdometryNoise& odometry, const ChainRecorderOptions& options,

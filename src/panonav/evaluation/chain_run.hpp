@@ -9,8 +9,16 @@
 #include "panonav/homing/chain_follower.hpp"
 #include "panonav/homing/chain_recorder.hpp"
 #include "panonav/homing/snapshot_chain.hpp"
+#include "panonav/motion/path.hpp"
 
 namespace panonav {
+
+/// Routes of at least `length_m` through the free places: shortest ways between random places, one
+/// after the other, heading along the way, poses every `spacing_m`. Throws ContractError unless
+/// both are above 0.
+[[nodiscard]] std::vector<std::vector<Pose2>> random_routes(const FreeSpace& space, int count,
+                                                            double length_m, double spacing_m,
+                                                            std::uint64_t seed);
 
 /// The chain that a robot records on its way along `route` (a view at each pose, which need not be
 /// far apart), with odometry of this noise. The same seed gives the same chain. Throws OptionError,

@@ -10,7 +10,7 @@ namespace panonav {
 namespace {
 
 constexpr double feeler_spacing_rad = std::numbers::pi / 12.0;
-constexpr int feelers_each_side = 8;
+constexpr int feelers_each_side = 11;
 
 Point2 ahead(const Pose2& pose, double direction_rad, double distance_m) {
   return pose * Point2{distance_m * std::cos(direction_rad), distance_m * std::sin(direction_rad)};

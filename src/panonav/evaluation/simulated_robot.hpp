@@ -14,7 +14,7 @@ namespace panonav {
 enum class ObstacleRule {
   stop,  ///< it stops there, and the run ends
   /// It goes past: with feelers as long as the step, it tries directions left and right of the one
-  /// it wants, 15 degrees apart, up to 120 degrees off, nearest first, and takes the first in which
+  /// it wants, 15 degrees apart, up to 165 degrees off, nearest first, and takes the first in which
   /// half a step is free. As long as the wanted way stays blocked it keeps to the side it has
   /// chosen, and changes it where that side has no way. Nowhere a way: it stops.
   pass,
