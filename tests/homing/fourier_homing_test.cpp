@@ -226,6 +226,49 @@ TEST(FourierHoming, IterationsExplainAFarViewBetter) {
   EXPECT_LT(length_often, length_once);
 }
 
+// Far surroundings: a lean is a rotation of all directions.
+TEST(FourierHoming, LeanIsToldFromDisplacement) {
+  double with = 0.0;
+  double without = 0.0;
+  for (int trial = 0; trial < 30; ++trial) {
+    const Surroundings around = random_surroundings(600 + trial, 6.0);
+    const HomingView home = view_of(around.seen_from(0.0, 0.0, 0.0, 40));
+    const Panorama level = around.seen_from(0.05, 0.03, 0.0, 40);
+    // Pitch by 1.5 degrees: the direction u comes from u - omega x u.
+    const double lean = radians(1.5);
+    Panorama leaning = level;
+    for (int r = 0; r < level.rows(); ++r) {
+      for (int c = 0; c < level.columns(); ++c) {
+        const double phi = level.azimuth_rad(c);
+        const double elevation = level.elevation_rad(r);
+        const double row_rad = (band.top_rad - band.bottom_rad) / level.rows();
+        const double from_row =
+            std::clamp(r + lean * std::cos(phi) / row_rad, 0.0, level.rows() - 1.001);
+        const double from_column =
+            (phi - lean * std::tan(elevation) * std::sin(phi)) * level.columns() / (2.0 * pi) +
+            level.columns();
+        const int r0 = static_cast<int>(from_row);
+        const int c0 = static_cast<int>(std::floor(from_column));
+        const auto fr = static_cast<float>(from_row - r0);
+        const auto fc = static_cast<float>(from_column - c0);
+        const auto at = [&](int row, int column) {
+          return level.at(row, column % level.columns());
+        };
+        leaning.at(r, c) = (1 - fr) * ((1 - fc) * at(r0, c0) + fc * at(r0, c0 + 1)) +
+                           fr * ((1 - fc) * at(r0 + 1, c0) + fc * at(r0 + 1, c0 + 1));
+      }
+    }
+    const HomingView current = view_of(leaning);
+    const auto error = [&](bool solved) {
+      const HomeVector v = home_vector(home, current, {.lean = solved});
+      return std::hypot(v.xi + 0.05, v.eta + 0.03);
+    };
+    with += error(true);
+    without += error(false);
+  }
+  EXPECT_LT(with, 0.6 * without);
+}
+
 // A feature off the horizon moves up and down as the robot moves to and from it.
 TEST(FourierHoming, VerticalMotionIsTakenIntoAccount) {
   double with = 0.0;

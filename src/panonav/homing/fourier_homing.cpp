@@ -36,7 +36,7 @@ class Coefficients {
   // The view whose slope counts.
   [[nodiscard]] float* middle_a(int k) noexcept { return at(4, k); }
   [[nodiscard]] float* middle_b(int k) noexcept { return at(5, k); }
-  // Its change with elevation, times sin(elevation) cos(elevation).
+  // Its change with elevation.
   [[nodiscard]] float* rise_a(int k) noexcept { return at(6, k); }
   [[nodiscard]] float* rise_b(int k) noexcept { return at(7, k); }
 
@@ -67,6 +67,37 @@ struct Normal {
     energy_of_views += weight * other.energy_of_views;
   }
 };
+
+// The same of a lean in two directions, P and Q: PD Px Pe, QD Qx Qe, PP PQ QQ, right sides P Q.
+struct LeanTerms {
+  std::array<double, 11> sums{};
+
+  void add(const LeanTerms& other, double weight) noexcept {
+    for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += weight * other.sums[i];
+  }
+};
+
+// The normal equations once the lean that fits best is taken out. `certain`: the inverse variance
+// of the lean, in units of that of an equation.
+Normal without_lean(Normal normal, const LeanTerms& lean, double certain) noexcept {
+  const auto& s = lean.sums;
+  const double pp = s[6] + certain;
+  const double qq = s[8] + certain;
+  const double determinant = pp * qq - s[7] * s[7];
+  if (!(determinant > 0.0)) return normal;
+  const auto product = [&](double p1, double q1, double p2, double q2) {
+    return (qq * p1 * p2 - s[7] * (p1 * q2 + q1 * p2) + pp * q1 * q2) / determinant;
+  };
+  std::size_t at = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = i; j < 3; ++j) {
+      normal.matrix[at++] -= product(s[i], s[3 + i], s[j], s[3 + j]);
+    }
+    normal.right[i] -= product(s[i], s[3 + i], s[9], s[10]);
+  }
+  normal.energy -= product(s[9], s[10], s[9], s[10]);
+  return normal;
+}
 
 struct Solution {
   double turn = 0.0;
@@ -172,6 +203,14 @@ class PairOfViews {
       std::copy_n(current.cosines(k).data(), rows_, c_.current_a(k));
       std::copy_n(current.sines(k).data(), rows_, c_.current_b(k));
     }
+    if (!sees_rise()) return;
+    const auto& band = home.elevations();
+    const double row_rad = (band->top_rad - band->bottom_rad) / static_cast<double>(rows_);
+    for (std::size_t y = 0; y < rows_; ++y) {
+      const double elevation = band->top_rad - (static_cast<double>(y) + 0.5) * row_rad;
+      approach_.push_back(static_cast<float>(std::sin(elevation) * std::cos(elevation)));
+      tangent_.push_back(static_cast<float>(std::tan(elevation)));
+    }
   }
 
   HomeVector result();
@@ -182,6 +221,11 @@ class PairOfViews {
   void weigh();
   void take_slopes();
   [[nodiscard]] Normal equations(int k);
+  [[nodiscard]] LeanTerms lean_terms(int k);
+  // Whether it is known how the image changes from row to row.
+  [[nodiscard]] bool sees_rise() const noexcept {
+    return (options_.vertical_motion || options_.lean) && home_.elevations() && rows_ >= 3;
+  }
   [[nodiscard]] Solution solve_at(double turn_rad);
   void move_current(double xi, double eta);
   // Where the least squares start, with the heading that fits there.
@@ -204,6 +248,8 @@ class PairOfViews {
   double home_energy_ = 0.0;
   double current_energy_ = 0.0;
   PerFrequency component_weights_{};
+  // By row: how fast things rise as the robot comes nearer, and the tangent of the elevation.
+  std::vector<float> approach_, tangent_;
   std::vector<float> row_weights_;  // empty: all alike
   Normal normal_;
 };
@@ -322,16 +368,14 @@ void PairOfViews::take_slopes() {
       mb[y] = both ? 0.5F * (hb[y] + cb[y]) : cb[y];
     }
     const auto& band = home_.elevations();
-    if (!options_.vertical_motion || !band || rows_ < 3) continue;
+    if (!sees_rise()) continue;
     const double row_rad = (band->top_rad - band->bottom_rad) / static_cast<double>(rows_);
     float* const ra = c_.rise_a(k);
     float* const rb = c_.rise_b(k);
     for (std::size_t y = 0; y < rows_; ++y) {
       const std::size_t above = y == 0 ? 0 : y - 1;
       const std::size_t below = std::min(y + 1, rows_ - 1);
-      const double elevation = band->top_rad - (static_cast<double>(y) + 0.5) * row_rad;
-      const auto factor = static_cast<float>(std::sin(elevation) * std::cos(elevation) /
-                                             (row_rad * static_cast<double>(below - above)));
+      const auto factor = static_cast<float>(1.0 / (row_rad * static_cast<double>(below - above)));
       ra[y] = factor * (ma[above] - ma[below]);
       rb[y] = factor * (mb[above] - mb[below]);
     }
@@ -340,7 +384,8 @@ void PairOfViews::take_slopes() {
 
 Normal PairOfViews::equations(int k) {
   const float* const row_weights = row_weights_.empty() ? nullptr : row_weights_.data();
-  const bool vertical = options_.vertical_motion && home_.elevations() && rows_ >= 3;
+  const float* const approach =
+      options_.vertical_motion && sees_rise() ? approach_.data() : nullptr;
   const float* const ha = c_.home_a(k);
   const float* const hb = c_.home_b(k);
   const float* const ca = c_.current_a(k);
@@ -366,11 +411,12 @@ Normal PairOfViews::equations(int k) {
     float ya = upper * ub[y] + lower * lb[y];
     float xb = upper * ub[y] - lower * lb[y];
     float yb = -upper * ua[y] - lower * la[y];
-    if (vertical) {
-      xa -= 0.5F * (lra[y] + ura[y]);
-      xb -= 0.5F * (lrb[y] + urb[y]);
-      ya -= 0.5F * (urb[y] - lrb[y]);
-      yb -= 0.5F * (lra[y] - ura[y]);
+    if (approach != nullptr) {
+      const float half = 0.5F * approach[y];
+      xa -= half * (lra[y] + ura[y]);
+      xb -= half * (lrb[y] + urb[y]);
+      ya -= half * (urb[y] - lrb[y]);
+      yb -= half * (lra[y] - ura[y]);
     }
     const float ea = ha[y] - ca[y];
     const float eb = hb[y] - cb[y];
@@ -390,6 +436,66 @@ Normal PairOfViews::equations(int k) {
   return {{m00, m01, m02, m11, m12, m22}, {v0, v1, v2}, energy, both};
 }
 
+// A lean of the robot moves things up and down by P cos phi + Q sin phi, and those off the horizon
+// to the side by tan(elevation) (P sin phi - Q cos phi).
+LeanTerms PairOfViews::lean_terms(int k) {
+  const float* const row_weights = row_weights_.empty() ? nullptr : row_weights_.data();
+  const float* const ha = c_.home_a(k);
+  const float* const hb = c_.home_b(k);
+  const float* const ca = c_.current_a(k);
+  const float* const cb = c_.current_b(k);
+  const float* const la = c_.middle_a(k - 1);
+  const float* const lb = c_.middle_b(k - 1);
+  const float* const ua = c_.middle_a(k + 1);
+  const float* const ub = c_.middle_b(k + 1);
+  const float* const lra = c_.rise_a(k - 1);
+  const float* const lrb = c_.rise_b(k - 1);
+  const float* const ura = c_.rise_a(k + 1);
+  const float* const urb = c_.rise_b(k + 1);
+  const auto frequency = static_cast<float>(k);
+  const float lower = 0.5F * (frequency - 1.0F);
+  const float upper = 0.5F * (frequency + 1.0F);
+  std::array<float, 11> sums{};
+  for (std::size_t y = 0; y < rows_; ++y) {
+    const float ta = frequency * hb[y];
+    const float tb = -frequency * ha[y];
+    const float xa = upper * ua[y] - lower * la[y];
+    const float ya = upper * ub[y] + lower * lb[y];
+    const float xb = upper * ub[y] - lower * lb[y];
+    const float yb = -upper * ua[y] - lower * la[y];
+    const float ra = 0.5F * (lra[y] + ura[y]);
+    const float rb = 0.5F * (lrb[y] + urb[y]);
+    const float sa = 0.5F * (urb[y] - lrb[y]);
+    const float sb = 0.5F * (lra[y] - ura[y]);
+    const float near = options_.vertical_motion ? approach_[y] : 0.0F;
+    const float mxa = xa - near * ra;
+    const float mxb = xb - near * rb;
+    const float mya = ya - near * sa;
+    const float myb = yb - near * sb;
+    const float pa = tangent_[y] * xa - ra;
+    const float pb = tangent_[y] * xb - rb;
+    const float qa = tangent_[y] * ya - sa;
+    const float qb = tangent_[y] * yb - sb;
+    const float ea = ha[y] - ca[y];
+    const float eb = hb[y] - cb[y];
+    const float weight = row_weights != nullptr ? row_weights[y] : 1.0F;
+    sums[0] += weight * (pa * ta + pb * tb);
+    sums[1] += weight * (pa * mxa + pb * mxb);
+    sums[2] += weight * (pa * mya + pb * myb);
+    sums[3] += weight * (qa * ta + qb * tb);
+    sums[4] += weight * (qa * mxa + qb * mxb);
+    sums[5] += weight * (qa * mya + qb * myb);
+    sums[6] += weight * (pa * pa + pb * pb);
+    sums[7] += weight * (pa * qa + pb * qb);
+    sums[8] += weight * (qa * qa + qb * qb);
+    sums[9] += weight * (pa * ea + pb * eb);
+    sums[10] += weight * (qa * ea + qb * eb);
+  }
+  LeanTerms terms;
+  std::copy(sums.begin(), sums.end(), terms.sums.begin());
+  return terms;
+}
+
 Solution PairOfViews::solve_at(double turn_rad) {
   turn_home(turn_rad);
   weigh();
@@ -397,6 +503,19 @@ Solution PairOfViews::solve_at(double turn_rad) {
   normal_ = {};
   for (int k = 1; k <= highest_; ++k) {
     normal_.add(equations(k), component_weights_[static_cast<std::size_t>(k)]);
+  }
+  if (options_.lean && sees_rise()) {
+    LeanTerms lean;
+    double equations = 0.0;
+    for (int k = 1; k <= highest_; ++k) {
+      const double weight = component_weights_[static_cast<std::size_t>(k)];
+      lean.add(lean_terms(k), weight);
+      equations += 2.0 * weight * static_cast<double>(rows_);
+    }
+    // Robots lean by a degree or two: more must be shown by the views.
+    constexpr double usual_rad = 0.035;
+    const double certain = normal_.energy / std::max(1.0, equations) / (usual_rad * usual_rad);
+    normal_ = without_lean(normal_, lean, certain);
   }
   return solve(normal_);
 }
@@ -617,6 +736,8 @@ void visit_options(FourierHomingOptions& options, OptionVisitor& visitor) {
                 options.displacement_search);
   visitor.visit({.name = "vertical_motion", .help = "rows off the horizon move up and down, too"},
                 options.vertical_motion);
+  visitor.visit({.name = "lean", .help = "the robot may lean a little, as on uneven ground"},
+                options.lean);
 }
 
 FourierHomingOptions published_homing(int highest, int iterations) {
@@ -627,7 +748,8 @@ FourierHomingOptions published_homing(int highest, int iterations) {
           .weights = HomingWeights::equal,
           .starting_estimates = 1,
           .displacement_search = false,
-          .vertical_motion = false};
+          .vertical_motion = false,
+          .lean = false};
 }
 
 HomeVector home_vector(const HomingView& home, const HomingView& current,

@@ -69,6 +69,9 @@ struct FourierHomingOptions {
   /// Rows off the horizon: things move up and down in the image as the robot comes nearer, too.
   /// Only where elevations are known.
   bool vertical_motion = true;
+  /// Two more unknowns: the robot may lean by a degree or two against the home view, as on uneven
+  /// ground. Only where elevations are known.
+  bool lean = true;
 };
 void visit_options(FourierHomingOptions& options, OptionVisitor& visitor);
 
