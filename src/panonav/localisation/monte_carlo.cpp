@@ -38,7 +38,6 @@ constexpr double coming_back = 0.1;
 // (docs/decisions.md).
 constexpr double by_chance = 1.0;
 constexpr double most_for = 5.0;
-constexpr double most_against_inside = 1.0;
 constexpr double most_for_alike = 2.0;
 constexpr double localised_weight = 0.9;
 constexpr double memorised_reach = 2.0;  // times the spacing or the range of likeness
@@ -106,12 +105,6 @@ struct MonteCarloLocaliser::Implementation {
     return std::ranges::any_of(likelihood.sites(), [&](const ViewLikelihood::Site& site) {
       return distance(site.position, place) <= reach_m;
     });
-  }
-
-  // What places that look alike give as evidence to a view of none of them.
-  [[nodiscard]] double evidence_of_likeness() const {
-    const double share = options.compass ? model.heading_width_rad / std::numbers::pi : 1.0;
-    return std::log(1.0 - share + share * std::exp(model.evidence_elsewhere));
   }
 
   // A site, and which of the two headings that fit there.
@@ -432,10 +425,8 @@ int MonteCarloLocaliser::Implementation::redraw_explained(double log_here) {
   latest.log_there = log_there;
   // A robot that was outside may come back anywhere.
   const double hazard = knows_nothing ? nothing_known : carried_away + (1.0 - inside) * coming_back;
-  // What looks alike explains a view without the robot being there.
-  const double by_likeness = knows_nothing ? 0.0 : evidence_of_likeness();
-  const double odds = hazard / (1.0 - hazard) *
-                      std::exp(std::clamp(log_there - by_likeness - log_here, -50.0, 50.0));
+  const double odds =
+      hazard / (1.0 - hazard) * std::exp(std::clamp(log_there - log_here, -50.0, 50.0));
   const double mass = odds / (1.0 + odds);
   const auto size = static_cast<double>(particles.size());
   if (mass * size < least_redrawn) return 0;
@@ -481,22 +472,21 @@ MonteCarloEstimate MonteCarloLocaliser::Implementation::observe(const PackedSign
     latest.redrawn = redraw_fixed(view);
   }
   latest.log_here = weigh();
-  double evidence = latest.log_here - std::max(by_chance, model.most_elsewhere);
+  double evidence = latest.log_here;
   if (options.redraw == Redraw::explained) {
     latest.redrawn = redraw_explained(latest.log_here);
-    evidence = std::max(
-        evidence, latest.log_there - evidence_of_likeness() + std::log(carried_away) - by_chance);
+    evidence = std::max(evidence, latest.log_there + std::log(carried_away));
   }
   // Where nothing is known yet, a view like one of the memory's speaks for being inside.
   if (latest.difference_anywhere) {
     const double margin = (model.explained_difference - *latest.difference_anywhere) /
                           std::max(0.05, model.far_difference - model.explained_difference);
-    evidence = std::max(evidence, std::min(most_for_alike, 4.0 * margin));
+    evidence = std::max(evidence, std::min(most_for_alike, 4.0 * margin) + by_chance);
   }
   knows_nothing = false;
   travelled_m = 0.0;
   inside = inside * (1.0 - leaving) + (1.0 - inside) * coming_back;
-  const double ratio = std::exp(std::clamp(evidence, -most_against_inside, most_for));
+  const double ratio = std::exp(std::clamp(evidence - by_chance, -by_chance, most_for));
   inside = inside * ratio / (inside * ratio + 1.0 - inside);
 
   const ParticleModes found = find_modes(particles, bins());

@@ -250,7 +250,6 @@ ObservationModel learn_observation_model(const ColumnRanking& ranking,
 
   std::vector<std::vector<std::uint32_t>> near(sites.size());
   std::vector<Explained> explained;
-  std::vector<Explained> explained_elsewhere;
   for (std::size_t i = 0; i < own.size(); ++i) {
     const auto at = [&](std::uint32_t where) {
       if (near[where].empty()) {
@@ -270,30 +269,12 @@ ObservationModel learn_observation_model(const ColumnRanking& ranking,
       return square > 0.0 ? product * product / square : 0.0;
     };
     Explained view{at(own[i])};
-    Explained elsewhere;
     for (const std::uint32_t c : candidates) {
-      if (c == own[i]) continue;
-      view.push_back(at(c));
-      if (distance(sites[c].position, sites[own[i]].position) >= far_spacings * model.spacing_m) {
-        elsewhere.push_back(view.back());
-      }
+      if (c != own[i]) view.push_back(at(c));
     }
     explained.push_back(std::move(view));
-    if (!elsewhere.empty()) explained_elsewhere.push_back(std::move(elsewhere));
   }
   model.sharpness = fit_sharpness(explained);
-  std::vector<double> evidence;
-  std::vector<double> most;
-  for (const Explained& view : explained_elsewhere) {
-    most.push_back(model.sharpness * *std::ranges::max_element(view));
-    double sum = 0.0;
-    for (const double value : view) sum += std::exp(model.sharpness * value);
-    evidence.push_back(std::log(sum / static_cast<double>(view.size())));
-  }
-  if (!evidence.empty()) {
-    model.evidence_elsewhere = quantile(evidence, 0.9);
-    model.most_elsewhere = quantile(most, 0.9);
-  }
   return model;
 }
 

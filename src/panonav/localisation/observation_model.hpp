@@ -32,12 +32,6 @@ struct ObservationModel {
   /// Half the inverse square of the deviation of a likeness from its expectation: log-likelihood
   /// for each squared unit of likeness explained.
   double sharpness = 0.0;
-  /// Log-evidence that far places of the memory give to nine of ten views by looking alike: less
-  /// than this does not say that a robot was carried there.
-  double evidence_elsewhere = 0.0;
-  /// Log-likelihood that the far place most alike reaches for nine of ten views; a robot outside
-  /// may find such a place, too.
-  double most_elsewhere = 0.0;
   double heading_width_rad = 0.0;        ///< headings farther off than this do not explain a view
   double explained_difference = 0.5;     ///< a view of the memory's places differs by less from the
                                          ///< best reference (`PlaceModel::threshold`)
