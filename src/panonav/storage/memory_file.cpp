@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <set>
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/storage/chain_tables.hpp"
 #include "panonav/storage/checksum.hpp"
 #include "panonav/storage/memory_file_access.hpp"
 #include "panonav/storage/memory_header.hpp"
@@ -383,6 +385,37 @@ std::optional<std::string> MemoryFile::parameter(std::string_view name) const {
   return *text;
 }
 
+void MemoryFile::save_chain(std::string_view name, const SnapshotChain& chain) {
+  Database& database = implementation_->database;
+  Transaction transaction(database, Transaction::Kind::writing);
+  add_chain_tables(database);
+  write_chain(database, name, chain);
+  transaction.commit();
+}
+
+std::optional<SnapshotChain> MemoryFile::chain(std::string_view name) const {
+  Database& database = implementation_->database;
+  const Transaction reading(database, Transaction::Kind::reading);
+  if (!has_chain_tables(database)) return std::nullopt;
+  return read_chain(database, name);
+}
+
+void MemoryFile::remove_chain(std::string_view name) {
+  Database& database = implementation_->database;
+  Transaction transaction(database, Transaction::Kind::writing);
+  if (!has_chain_tables(database) || !erase_chain(database, name)) {
+    throw ContractError("chain", std::string(name), "a chain of the memory file");
+  }
+  transaction.commit();
+}
+
+std::vector<std::string> MemoryFile::chain_names() const {
+  Database& database = implementation_->database;
+  const Transaction reading(database, Transaction::Kind::reading);
+  if (!has_chain_tables(database)) return {};
+  return panonav::chain_names(database);
+}
+
 VisualMemory MemoryFile::load() const {
   Database& database = implementation_->database;
   const MemoryHeader& header = implementation_->header;
@@ -488,6 +521,10 @@ std::vector<MemoryFault> MemoryFile::verify() const {
       });
     }
   });
+  check(std::nullopt, [&] {
+    if (!has_chain_tables(database)) return;
+    verify_chains(database, [&](const std::function<void()>& part) { check(std::nullopt, part); });
+  });
   return faults;
 }
 
@@ -503,6 +540,7 @@ MemoryFileInfo MemoryFile::info() const {
   info.views_with_heading = count("SELECT count(heading_rad) FROM views");
   info.links = count("SELECT count(*) FROM links");
   info.thumbnails = count("SELECT count(*) FROM thumbnails");
+  if (has_chain_tables(database)) info.chains = count("SELECT count(*) FROM chains");
   info.format_version = static_cast<int>(database.integer("PRAGMA user_version"));
   for (const char* suffix : {"", "-wal"}) {
     std::filesystem::path file = database.path();

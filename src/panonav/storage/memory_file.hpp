@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "panonav/homing/snapshot_chain.hpp"
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav/panorama/picture.hpp"
 #include "panonav/panorama/picture_source.hpp"
@@ -55,6 +56,7 @@ struct MemoryFileInfo {
   std::uint64_t views_with_heading = 0;
   std::uint64_t links = 0;
   std::uint64_t thumbnails = 0;
+  std::uint64_t chains = 0;
   std::uint64_t file_bytes = 0;  ///< with what is still in the write-ahead log
   int format_version = 0;
   friend bool operator==(const MemoryFileInfo&, const MemoryFileInfo&) = default;
@@ -104,6 +106,17 @@ class MemoryFile {
   /// What was learnt from the views (a model of unknown places, weights), by name, as text.
   void set_parameter(std::string_view name, std::string_view value);
   [[nodiscard]] std::optional<std::string> parameter(std::string_view name) const;
+
+  /// Keeps a chain of snapshots under a name, instead of the one that had it. The first chain gives
+  /// the file format version 2, which versions of panonav without chains refuse. Throws
+  /// ContractError on an empty name and as `validate`.
+  void save_chain(std::string_view name, const SnapshotChain& chain);
+  /// The same snapshots, bit for bit; empty when there is no such chain.
+  [[nodiscard]] std::optional<SnapshotChain> chain(std::string_view name) const;
+  /// Throws ContractError when there is no such chain.
+  void remove_chain(std::string_view name);
+  /// Ascending.
+  [[nodiscard]] std::vector<std::string> chain_names() const;
 
   /// All views and links. Checks every view's checksum and throws FileError at the first fault.
   /// 100,000 views of 80 x 15 take about 0.6 s of processor time.

@@ -41,6 +41,21 @@ constexpr std::array<std::pair<const char*, const char*>, 4> tables{{
      "STRICT"},
 }};
 
+// Of version 2; sorted by name they come before the others.
+constexpr std::array<std::pair<const char*, const char*>, 2> chain_tables{{
+    {"chain_snapshots",
+     "CREATE TABLE chain_snapshots(chain TEXT NOT NULL, number INTEGER NOT NULL, travelled_m REAL "
+     "NOT NULL, x_m REAL NOT NULL, y_m REAL NOT NULL, heading_rad REAL NOT NULL, coefficients BLOB "
+     "NOT NULL, checksum INTEGER NOT NULL, PRIMARY KEY(chain, number)) STRICT, WITHOUT ROWID"},
+    {"chains",
+     "CREATE TABLE chains(name TEXT NOT NULL PRIMARY KEY, rows INTEGER NOT NULL, components "
+     "INTEGER "
+     "NOT NULL, elevation_bottom_rad REAL, elevation_top_rad REAL, snapshots INTEGER NOT NULL, "
+     "checksum INTEGER NOT NULL) STRICT, WITHOUT ROWID"},
+}};
+constexpr int first_version = 1;
+constexpr int version_with_chains = 2;
+
 // The second end of a link, so that a view's links are found from either.
 constexpr const char* links_index = "CREATE INDEX links_b ON links(b)";
 
@@ -129,25 +144,41 @@ void require_memory_file(const std::filesystem::path& path) {
                               std::to_string(version) + "; allowed: 1 .. " +
                               std::to_string(memory_format_version));
   }
-  if (version == 0) throw FileError(name, "is damaged: format version is 0; allowed: 1");
+  if (version == 0)
+    throw FileError(name, "is damaged: format version is 0; allowed: 1 .. " +
+                              std::to_string(memory_format_version));
 }
 
 void create_schema(Database& database) {
   database.execute(("PRAGMA application_id=" + std::to_string(memory_application_id)).c_str());
-  database.execute(("PRAGMA user_version=" + std::to_string(memory_format_version)).c_str());
+  database.execute(("PRAGMA user_version=" + std::to_string(first_version)).c_str());
   for (const auto& [name, text] : tables) database.execute(text);
   database.execute(links_index);
+}
+
+bool has_chain_tables(Database& database) {
+  return database.integer("PRAGMA user_version") >= version_with_chains;
+}
+
+void add_chain_tables(Database& database) {
+  if (has_chain_tables(database)) return;
+  for (const auto& [name, text] : chain_tables) database.execute(text);
+  database.execute(("PRAGMA user_version=" + std::to_string(version_with_chains)).c_str());
 }
 
 void require_schema(Database& database) {
   Statement rows(database,
                  "SELECT type, name, sql FROM sqlite_schema WHERE name NOT LIKE 'sqlite\\_%' "
                  "ESCAPE '\\' ORDER BY type <> 'table', name");
-  for (const auto& [name, text] : tables) {
+  const auto require_table = [&](std::string_view name, std::string_view text) {
     if (!rows.step() || rows.text(0) != "table" || rows.text(1) != name || rows.text(2) != text) {
       database.fail_damaged("table " + std::string(name) + " is missing or not as it was made");
     }
+  };
+  if (has_chain_tables(database)) {
+    for (const auto& [name, text] : chain_tables) require_table(name, text);
   }
+  for (const auto& [name, text] : tables) require_table(name, text);
   if (!rows.step() || rows.text(1) != "links_b" || rows.text(2) != links_index || rows.step()) {
     database.fail_damaged("the tables are not as they were made");
   }

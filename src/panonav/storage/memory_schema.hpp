@@ -13,8 +13,10 @@ namespace panonav {
 
 /// "PNAV": marks an SQLite file as a memory file.
 inline constexpr std::uint32_t memory_application_id = 0x504E4156;
-/// Written as user_version. A reader refuses files of a larger one.
-inline constexpr int memory_format_version = 1;
+/// The user_version of files is at most this; a reader refuses files of a larger one. New files
+/// have 1; saving the first chain of snapshots adds its tables and makes it 2, so that who has no
+/// chains can give the file to an older reader.
+inline constexpr int memory_format_version = 2;
 
 /// Looks at the first bytes alone, without SQLite, so that nothing that is not ours is ever opened
 /// for writing. Throws FileError: missing, no SQLite file, of another program, newer.
@@ -22,7 +24,10 @@ void require_memory_file(const std::filesystem::path& path);
 
 /// Makes the tables in an empty database.
 void create_schema(Database& database);
-/// Throws FileError unless the tables are exactly those that `create_schema` makes.
+/// Adds the tables of chains where the file has none yet. Within the caller's transaction.
+void add_chain_tables(Database& database);
+[[nodiscard]] bool has_chain_tables(Database& database);
+/// Throws FileError unless the tables are exactly those of the file's version.
 void require_schema(Database& database);
 
 using SettingValue = std::variant<std::int64_t, double, std::string, std::vector<std::uint8_t>>;
