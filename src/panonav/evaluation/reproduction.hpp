@@ -72,4 +72,24 @@ struct TrackingReproductionOptions {
                                          Executor& executor,
                                          const ReproductionProgress& progress = {});
 
+struct HomingReproductionOptions {
+  std::filesystem::path out;    ///< folder for pictures; made when it is not there
+  int scenes = 5;               ///< variants of the arena, >= 2; figures are of the first
+  int goals_every = 1;          ///< of the first arena's places every so-many-th is a goal, >= 1
+  int goals_every_further = 4;  ///< the same in the others
+  double spacing_m = 0.025;     ///< of the places, 0.01 .. 0.1
+  std::uint64_t seed = 101;     ///< of the first scene; the others follow it
+};
+
+/// The same as a smoke run: two arenas, places 5 cm apart, few goals.
+[[nodiscard]] HomingReproductionOptions quick_run(HomingReproductionOptions options);
+
+/// Visual homing as in [S06] sections 2 to 5: figures 3 and 6 to 16, over all pairs of places of
+/// the toy house arena, recorded twice; Fourier homing as published and as ours, and homing by
+/// expected images. Same options: same rows, but for times (unit us) and what is made of them (unit
+/// x), and same pictures on any number of threads. Throws ContractError, FileError.
+[[nodiscard]] Reproduction reproduce_s06(const HomingReproductionOptions& options,
+                                         Executor& executor,
+                                         const ReproductionProgress& progress = {});
+
 }  // namespace panonav

@@ -106,6 +106,13 @@ Arena record_arena(const ArenaOptions& options, Executor& executor) {
   return arena;
 }
 
+HomingSurveyOptions survey_options(const Arena& arena) {
+  // What S06 used at 2.5 cm.
+  return {.typical_distance_m = 0.5,
+          .longest_step_m = 2.0 * arena.options.spacing_m,
+          .obstacle_m = 0.8 * arena.options.spacing_m};
+}
+
 HomingSurvey survey_arena(const Arena& arena, const HomingRule& rule, Executor& executor,
                           std::size_t every) {
   std::vector<Pose2> goals;
@@ -114,7 +121,8 @@ HomingSurvey survey_arena(const Arena& arena, const HomingRule& rule, Executor& 
   }
   return survey_homing(
       goals, poses_of(arena.currents),
-      [&](std::size_t goal, std::size_t place) { return rule(goal * every, place); }, {}, executor);
+      [&](std::size_t goal, std::size_t place) { return rule(goal * every, place); },
+      survey_options(arena), executor);
 }
 
 HomingSurvey survey_arena(const Arena& arena, const FourierHomingOptions& homing,

@@ -7,7 +7,6 @@
 
 #include "panonav/core/executor.hpp"
 #include "panonav/evaluation/homing_survey.hpp"
-#include "panonav/evaluation/plot.hpp"
 #include "panonav/homing/expected_image_homing.hpp"
 #include "panonav/simulation/free_space.hpp"
 #include "panonav/simulation/renderer.hpp"
@@ -50,13 +49,13 @@ struct ArenaRecording {
   std::vector<std::vector<float>> rows;
 };
 
+/// Goals and places have the same numbers: those of the grid, row by row.
 struct Arena {
   ArenaOptions options;
   Scene scene;
   std::shared_ptr<const FreeSpace> space;
   ArenaRecording homes;     ///< first recording
   ArenaRecording currents;  ///< second, at the same places
-  std::vector<MapLayer> houses;
 };
 
 /// Throws ContractError when nothing is free at the spacing.
@@ -67,6 +66,9 @@ struct Arena {
 [[nodiscard]] std::vector<float> arena_row(const Renderer& renderer, const Scene& scene,
                                            const Pose2& pose, std::uint64_t seed,
                                            Executor& executor);
+
+/// Runs as in [S06 section 4.4], for the spacing of the arena.
+[[nodiscard]] HomingSurveyOptions survey_options(const Arena& arena);
 
 /// Homes of every `every`-th place of the first recording, current views of all places of the
 /// second. `rule` gets the numbers of the places.
