@@ -1,7 +1,10 @@
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <string_view>
 #include <vector>
 
 #include "arguments.hpp"
@@ -148,11 +151,39 @@ std::pair<PaperText, Reproduction> run_m03(const ReproduceArguments& wanted, Ses
   return {text, reproduce_m03(options, session.executor(), progress)};
 }
 
-ExitCode reproduce(const ReproduceArguments& wanted, Session& session) {
-  if (wanted.paper != "m03" && wanted.paper != "m04") {
+std::pair<PaperText, Reproduction> run_s06(const ReproduceArguments& wanted, Session& session,
+                                           const ReproductionProgress& progress) {
+  refuse(wanted.runs.has_value(), "--runs", wanted);
+  refuse(wanted.queries.has_value(), "--queries", wanted);
+  refuse(wanted.rows.has_value(), "--rows", wanted);
+  refuse(wanted.data.has_value(), "--data", wanted);
+  refuse(wanted.only.has_value(), "--only", wanted);
+  HomingReproductionOptions options{.out = wanted.out};
+  if (wanted.quick) options = quick_run(options);
+  if (wanted.seed) options.seed = *wanted.seed;
+  if (wanted.scenes) {
+    options.scenes = *wanted.scenes;
+    if (options.scenes < 2) {
+      throw OptionError("--scenes is '" + std::to_string(options.scenes) +
+                        "'; allowed for s06: from 2");
+    }
+  }
+  const PaperText text{
+      "Visual homing: the experiments of [S06]",
+      "Stürzl, Mallot 2006, run in " + std::to_string(options.scenes) +
+          " simulated toy house arenas, each recorded twice with different noise and slightly "
+          "different light, headings at random; pictures are of the first arena. Published figures "
+          "beside ours."};
+  return {text, reproduce_s06(options, session.executor(), progress)};
+}
+
+constexpr std::array<std::string_view, 3> papers{"m03", "m04", "s06"};
+
+void reproduce_paper(const ReproduceArguments& wanted, Session& session) {
+  if (std::ranges::find(papers, wanted.paper) == papers.end()) {
     throw OptionError("PAPER is '" + wanted.paper +
-                      "'; allowed: m03 (Monte-Carlo localisation), m04 (localisation); f11 s06 "
-                      "y03 are to come");
+                      "'; allowed: m03 (Monte-Carlo localisation), m04 (localisation), s06 "
+                      "(homing), all; f11 y03 are to come");
   }
   Progress progress("reproduce " + wanted.paper, 100);
   std::size_t shown_percent = 0;
@@ -161,8 +192,9 @@ ExitCode reproduce(const ReproduceArguments& wanted, Session& session) {
     if (percent > shown_percent) progress.advance(percent - shown_percent);
     shown_percent = std::max(shown_percent, percent);
   };
-  const auto [text, result] =
-      wanted.paper == "m04" ? run_m04(wanted, session, report) : run_m03(wanted, session, report);
+  const auto [text, result] = wanted.paper == "m04"   ? run_m04(wanted, session, report)
+                              : wanted.paper == "m03" ? run_m03(wanted, session, report)
+                                                      : run_s06(wanted, session, report);
   progress.clear();
   const std::string json = to_json(result.rows);
   const std::filesystem::path out(wanted.out);
@@ -171,7 +203,7 @@ ExitCode reproduce(const ReproduceArguments& wanted, Session& session) {
   write_page(out, text, result);
   if (session.json()) {
     session.print(json.substr(0, json.size() - 1));
-    return ExitCode::done;
+    return;
   }
   std::size_t failed = 0;
   for (const auto& row : result.rows) {
@@ -185,31 +217,52 @@ ExitCode reproduce(const ReproduceArguments& wanted, Session& session) {
   session.print(
       std::to_string(result.rows.size()) + " rows, " + std::to_string(failed) +
       " of them miss their target; pictures and tables: " + (out / "index.html").string());
+}
+
+ExitCode reproduce(const ReproduceArguments& wanted, Session& session) {
+  if (wanted.paper != "all") {
+    reproduce_paper(wanted, session);
+    return ExitCode::done;
+  }
+  refuse(wanted.only.has_value(), "--only", wanted);
+  // One after the other, each in a folder of its own.
+  for (const std::string_view paper : papers) {
+    ReproduceArguments one = wanted;
+    one.paper = paper;
+    one.out = (std::filesystem::path(wanted.out) / paper).string();
+    // What means nothing to a paper.
+    if (paper != "m03") one.runs = std::nullopt;
+    if (paper != "m03") one.data = std::nullopt;
+    if (paper != "m04") one.queries = std::nullopt;
+    if (paper == "s06") one.rows = std::nullopt;
+    reproduce_paper(one, session);
+  }
   return ExitCode::done;
 }
 
 Run declare(Arguments& arguments) {
   auto wanted = std::make_shared<ReproduceArguments>();
-  arguments.positional("PAPER", wanted->paper, "m03 or m04");
+  arguments.positional("PAPER", wanted->paper, "m03, m04, s06 or all");
   arguments.option("-o,--out", wanted->out, "Folder for the report (default: reproduction)");
   arguments.flag("--quick", wanted->quick, "A smoke run: few scenes, few questions or runs");
   const ReproductionOptions m04;
   const TrackingReproductionOptions m03;
-  const auto defaults = [](auto m03_value, auto m04_value) {
+  const HomingReproductionOptions s06;
+  const auto defaults = [](auto m03_value, auto m04_value, auto s06_value) {
     return " (default: " + std::to_string(m03_value) + " for m03, " + std::to_string(m04_value) +
-           " for m04";
+           " for m04, " + std::to_string(s06_value) + " for s06";
   };
   const auto fallback = [](int value) { return " (default: " + std::to_string(value); };
   arguments.option("--seed", wanted->seed,
-                   "First of the scene seeds" + defaults(m03.seed, m04.seed) + ")");
+                   "First of the scene seeds" + defaults(m03.seed, m04.seed, s06.seed) + ")");
   arguments.option("--scenes", wanted->scenes, 1,
-                   "Variants of the office" + defaults(m03.scenes, m04.scenes) + ")");
+                   "Variants of the scene" + defaults(m03.scenes, m04.scenes, s06.scenes) + ")");
   arguments.option("--queries", wanted->queries, 1,
                    "m04: questions in each" + fallback(m04.queries) + "; from 1)");
   arguments.option("--runs", wanted->runs, 2,
                    "m03: runs in each variant of an office" + fallback(m03.runs) + "; from 2)");
   arguments.option("--rows", wanted->rows, 1,
-                   "Rows of the views" + fallback(m03.rows) + "; from 1)");
+                   "m03, m04: rows of the views" + fallback(m03.rows) + "; from 1)");
   arguments.option("--data", wanted->data,
                    "m03: folder with the recordings and Gazebo worlds (default: the environment's "
                    "PANONAV_DATA; without it they are left out)");
@@ -225,7 +278,9 @@ Verb reproduce_verb() {
   return {"reproduce", "Run the experiments of a paper: published figures beside ours",
           "Writes pictures, results.json, results.md and index.html into the folder. The full run "
           "takes some minutes.",
-          "  panonav reproduce m03\n  panonav reproduce m04 --quick --json -o smoke", declare};
+          "  panonav reproduce m03\n  panonav reproduce m04 --quick --json -o smoke\n"
+          "  panonav reproduce s06 -o homing",
+          declare};
 }
 
 }  // namespace panonav::command
