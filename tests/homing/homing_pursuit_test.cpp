@@ -68,7 +68,7 @@ TEST(HomingPursuit, StepIsThatOfThePaper) {
     ASSERT_EQ(decision.state, PursuitState::moving);
     EXPECT_EQ(decision.turn_rad, vector.direction_rad());
     EXPECT_EQ(decision.advance_m, std::min(0.3, 3.0 * vector.length()));
-    EXPECT_FALSE(decision.difference);
+    EXPECT_EQ(decision.difference, image_difference(home, current));
   }
 }
 
@@ -109,7 +109,7 @@ TEST(HomingPursuit, StopsAtOnceAtHomeAndStaysStopped) {
         pursuit.decide(i < 2 ? home : world.seen_from({0.8, 0.2, 1.0}));
     EXPECT_EQ(decision.state, PursuitState::arrived);
     EXPECT_EQ(decision.advance_m, 0.0);
-    ASSERT_TRUE(decision.difference);
+    if (i < 2) EXPECT_NEAR(decision.difference, 0.0, 1e-5);
   }
   EXPECT_EQ(pursuit.steps(), 0);
 }
@@ -120,6 +120,14 @@ TEST(HomingPursuit, GivesUpAfterTheMostSteps) {
   const HomingView stuck = world.seen_from({0.9, 0.0, 0.0});
   for (int i = 0; i < 3; ++i) EXPECT_EQ(pursuit.decide(stuck).state, PursuitState::moving);
   EXPECT_EQ(pursuit.decide(stuck).state, PursuitState::exhausted);
+}
+
+TEST(HomingPursuit, StopsWhereViewsBecomeNoMoreAlike) {
+  const CylinderWorld world(3.0, 10);
+  HomingPursuit pursuit(world.seen_from({}), {.strategy = PursuitStrategy::steady, .patience = 3});
+  const HomingView stuck = world.seen_from({0.9, 0.0, 0.0});
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(pursuit.decide(stuck).state, PursuitState::moving);
+  EXPECT_EQ(pursuit.decide(stuck).state, PursuitState::wrong_place);
 }
 
 TEST(HomingPursuit, CoarseToFineGoesThroughItsStages) {

@@ -63,7 +63,7 @@ HomingRun run_home(const HomingPlace& place, const HomingView& home, const Pose2
     const auto finish = [&](HomingRunEnd end) {
       run.end = end;
       run.end_distance_m = distance(robot.pose().position(), goal.position());
-      run.end_difference = decision.difference.value_or(image_difference(home, view));
+      run.end_difference = decision.difference;
       return run;
     };
     switch (decision.state) {

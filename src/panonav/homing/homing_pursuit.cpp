@@ -58,6 +58,11 @@ void visit_options(HomingPursuitOptions& options, OptionVisitor& visitor) {
                  .high = 100,
                  .low_open = true},
                 options.shortest_step_m);
+  visitor.visit({.name = "patience",
+                 .help = "homing stops when the views became no more alike for so many steps",
+                 .low = 1,
+                 .high = 1e6},
+                options.patience);
   visitor.visit(
       {.name = "most_steps", .help = "steps after which a run ends", .low = 1, .high = 1e6},
       options.most_steps);
@@ -105,6 +110,12 @@ FourierHomingOptions HomingPursuit::vector_of_stage(const HomingView& current) c
 
 PursuitDecision HomingPursuit::decide(const HomingView& current) {
   PursuitDecision decision;
+  decision.difference = image_difference(home_, current);
+  ++steps_since_least_;
+  if (decision.difference < least_difference_) {
+    least_difference_ = decision.difference;
+    steps_since_least_ = 0;
+  }
   for (;;) {
     const FourierHomingOptions options = vector_of_stage(current);
     const HomeVector vector = home_vector(home_, current, options);
@@ -120,8 +131,9 @@ PursuitDecision HomingPursuit::decide(const HomingView& current) {
     decision.turn_rad = vector.direction_rad();
     decision.advance_m =
         gain_ * std::min(options_.longest_step_m, options_.typical_distance_m * vector.length());
-    const bool stops =
-        vector.length() < options_.stop_length || decision.advance_m < options_.shortest_step_m;
+    const bool stops = vector.length() < options_.stop_length ||
+                       decision.advance_m < options_.shortest_step_m ||
+                       steps_since_least_ >= options_.patience;
     if (state_ == PursuitState::moving && !stops && steps_ >= options_.most_steps) {
       state_ = PursuitState::exhausted;
     }
@@ -129,18 +141,18 @@ PursuitDecision HomingPursuit::decide(const HomingView& current) {
       ++steps_;
       return decision;
     }
-    const double difference = image_difference(home_, current);
-    if (state_ == PursuitState::moving && goes_on(difference)) {
+    if (state_ == PursuitState::moving && goes_on(decision.difference)) {
       ++stage_;
+      least_difference_ = decision.difference;
+      steps_since_least_ = 0;
       gain_ = 1.0;
       direction_in_home_rad_.reset();
       continue;
     }
     if (state_ == PursuitState::moving) {
-      state_ = difference <= options_.arrived_difference ? PursuitState::arrived
-                                                         : PursuitState::wrong_place;
+      state_ = decision.difference <= options_.arrived_difference ? PursuitState::arrived
+                                                                  : PursuitState::wrong_place;
     }
-    decision.difference = difference;
     decision.state = state_;
     decision.advance_m = 0.0;
     return decision;

@@ -33,6 +33,9 @@ struct HomingPursuitOptions {
   /// Homing stops as well when the way of a step has become shorter, because successive vectors
   /// pointed against each other.
   double shortest_step_m = 0.01;
+  /// And when the views have not become more alike for so many steps: the robot runs in circles, or
+  /// along an obstacle.
+  int patience = 10;
   int most_steps = 60;
   /// The robot is at home when the views differ by no more where homing stops, by
   /// `image_difference` [S06 section 4.3].
@@ -50,12 +53,11 @@ enum class PursuitState {
 /// What the robot is to do after a view.
 struct PursuitDecision {
   PursuitState state = PursuitState::moving;
-  double turn_rad = 0.0;   ///< direction in which to go, in the current robot frame
-  double advance_m = 0.0;  ///< how far; 0 unless moving
-  HomeVector vector;       ///< on which the decision rests
-  int stage = 0;           ///< counts changes of the frequencies
-  /// Of the views; known where homing stopped.
-  std::optional<double> difference;
+  double turn_rad = 0.0;    ///< direction in which to go, in the current robot frame
+  double advance_m = 0.0;   ///< how far; 0 unless moving
+  HomeVector vector;        ///< on which the decision rests
+  int stage = 0;            ///< counts changes of the frequencies
+  double difference = 1.0;  ///< of the views, by `image_difference`
 };
 
 /// The run home of S06 section 3: one view in, one step out. Direction by the home vector, length
@@ -89,6 +91,8 @@ class HomingPursuit {
   int steps_ = 0;
   double gain_ = 1.0;
   std::optional<double> direction_in_home_rad_;  // of the step before
+  double least_difference_ = 2.0;                // of the stage
+  int steps_since_least_ = 0;
   PursuitState state_ = PursuitState::moving;
 };
 
