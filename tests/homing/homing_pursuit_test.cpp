@@ -109,7 +109,9 @@ TEST(HomingPursuit, StopsAtOnceAtHomeAndStaysStopped) {
         pursuit.decide(i < 2 ? home : world.seen_from({0.8, 0.2, 1.0}));
     EXPECT_EQ(decision.state, PursuitState::arrived);
     EXPECT_EQ(decision.advance_m, 0.0);
-    if (i < 2) EXPECT_NEAR(decision.difference, 0.0, 1e-5);
+    if (i < 2) {
+      EXPECT_NEAR(decision.difference, 0.0, 1e-5);
+    }
   }
   EXPECT_EQ(pursuit.steps(), 0);
 }
