@@ -23,12 +23,12 @@ namespace fs = std::filesystem;
 constexpr std::string_view mark = "made_by_panonav_demo.txt";
 
 /// Everything else that a demo makes.
-constexpr std::array<std::string_view, 13> made{
+constexpr std::array<std::string_view, 15> made{
     "memory_run",     "query_run",          "elsewhere_run",
     "office.panonav", "office.panonav-wal", "office.panonav-shm",
     "mirror.png",     "calibration.png",    "cylinder.png",
     "map.png",        "areas.png",          "similarity.png",
-    "index.html"};
+    "homing.png",     "way_home.png",       "index.html"};
 
 SimulationArguments simulation_of(const DemoOptions& options, int stream) {
   SimulationArguments wanted;
@@ -142,6 +142,7 @@ std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& s
 
   recordings.low = office.world.free_space().low();
   recordings.high = office.world.free_space().high();
+  recordings.office_scene = office.world.scene();
   recordings.office = std::make_shared<const Renderer>(office.world.scene(),
                                                        RendererOptions{.channels = 3}, executor);
   recordings.colour_picture = [renderer = recordings.office, frame = office.world.arguments().frame,

@@ -10,6 +10,7 @@
 #include "panonav/camera/mirror_overlay.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/simulation/renderer.hpp"
+#include "panonav/simulation/scene.hpp"
 #include "session.hpp"
 
 namespace panonav::command {
@@ -21,6 +22,7 @@ struct DemoOptions {
 
   [[nodiscard]] double spacing_m() const noexcept { return quick ? 0.5 : 0.25; }
   [[nodiscard]] int questions() const noexcept { return quick ? 10 : 40; }
+  [[nodiscard]] int runs_home() const noexcept { return quick ? 3 : 12; }
 };
 
 /// What the demonstration works on: pictures of a simulated mirror camera with its sensor's noise,
@@ -32,6 +34,7 @@ struct DemoRecordings {
   MirrorCircle mirror;    ///< what calibration found
   int calibrated_on = 0;  ///< pictures
   Camera true_camera;
+  Scene office_scene;
   std::shared_ptr<const Renderer> office;  ///< in colour
   Point2 low, high;                        ///< corners of the office's floor
   /// What the camera sees at an entry of the office, in colour, for people.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "arguments.hpp"
+#include "demo_homing.hpp"
 #include "demo_pictures.hpp"
 #include "demo_recordings.hpp"
 #include "memorising.hpp"
@@ -199,6 +200,8 @@ void show_what_next(const DemoRecordings& recordings, const fs::path& out, Repor
        "panonav localise " + memory + " " + in_out("elsewhere_run") + "    # another room: unknown",
        "panonav localise " + memory + " " + recordings.query_run.entries.front().path.string() +
            " --areas",
+       "panonav home view_00000.png " + recordings.query_run.entries.front().path.string() +
+           " --memory " + memory + " --report " + in_out("way_home"),
        "panonav unwrap " + recordings.query_run.entries.front().path.string() + " --camera " +
            (recordings.query_run.folder / "camera.toml").string() + " -o panorama.png"});
 }
@@ -237,6 +240,8 @@ ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
       {recordings->high.x_m + margin_m, recordings->high.y_m + margin_m});
   show_answers(memory, plan, asked, own, foreign, wanted.spacing_m(), out, page);
   show_levels(memory, plan, shown_view(asked), wanted.spacing_m(), out, page);
+  const DemoHoming homing = show_homing(recordings->office_scene, plan, wanted.runs_home(),
+                                        wanted.seed, out, session, page);
   show_what_next(*recordings, out, page);
   page.write(out);
 
@@ -255,6 +260,9 @@ ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
         {"known", own.known},
         {"known_elsewhere", foreign.known},
         {"bytes_share", own.bytes_share},
+        {"runs_home", homing.runs.size()},
+        {"arrived_home", homing.arrived},
+        {"home_error_m", median(homing.distances_m)},
         {"seconds",
          seconds}}.dump());
     return ExitCode::done;
@@ -266,6 +274,9 @@ ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
                 "; heading: " + median_text(own.heading_errors_rad, degrees(1.0), 2, "degrees"));
   session.print("  own places recognised: " + percent(own.known) +
                 "; views of another room taken for this one: " + percent(foreign.known));
+  session.print("  home from one metre away: " + std::to_string(homing.arrived) + " of " +
+                std::to_string(homing.runs.size()) + " runs ended within 10 cm; median " +
+                fixed(100.0 * median(homing.distances_m), 1) + " cm");
   session.print("Open " + session.strong((out / "index.html").string()) + " in a browser.");
   return ExitCode::done;
 }

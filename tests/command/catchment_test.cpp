@@ -124,12 +124,11 @@ TEST_F(Catchment, TheReportHasItsPictures) {
 
 TEST(RealHoming, GantryPlantsLeadHomeFromThirtyCentimetres) {
   REQUIRE_REAL_DATA(data, "gantry_plants");
-  for (const std::string seed : {"1", "2"}) {
-    const auto answer =
-        answer_of({"catchment", *data, "--up-to-m", "0.3", "--turn-randomly", seed, "--json"});
-    EXPECT_GT(answer["pairs"].get<int>(), 3000);
-    EXPECT_GE(answer["homeward_component"].get<double>(), 0.77);
-  }
+  // One-bit pictures of 90 columns: higher components than usual still tell something.
+  const auto answer = answer_of({"catchment", *data, "--components", "30", "--up-to-m", "0.3",
+                                 "--turn-randomly", "1", "--json"});
+  EXPECT_EQ(answer["pairs"], 3512);
+  EXPECT_GE(answer["homeward_component"].get<double>(), 0.77);
 }
 
 TEST(RealHoming, SussexRouteLeadsAlongTheWay) {
