@@ -49,7 +49,9 @@ TEST(Demo, TellsTheWholeStoryTwiceAndLeavesAMemoryThatAnswers) {
   EXPECT_LT(said["heading_error_rad"].get<double>(), 0.05);
   EXPECT_GE(said["known"].get<double>(), 0.7);
   EXPECT_LE(said["known_elsewhere"].get<double>(), 0.1);
-  EXPECT_EQ(readable_pictures(out), 6);
+  EXPECT_EQ(said["runs_home"], 3);
+  EXPECT_GE(said["arrived_home"].get<int>(), 2);
+  EXPECT_EQ(readable_pictures(out), 8);
 
   const auto info = run_panonav({"info", out + "/office.panonav", "--json"});
   ASSERT_EQ(info.exit_code, 0) << info.err;
