@@ -85,8 +85,10 @@ struct MonteCarloLocaliser::Implementation {
   [[nodiscard]] PoseBins bins() const { return {.cell_m = model.spacing_m, .headings = 24}; }
 
   Pose2 anywhere(std::optional<double> heading_rad) {
-    const auto sites = likelihood.sites();
-    const auto& site = sites[random.index(sites.size())];
+    return anywhere_around(random.index(likelihood.sites().size()), heading_rad);
+  }
+  Pose2 anywhere_around(std::size_t number, std::optional<double> heading_rad) {
+    const auto& site = likelihood.sites()[number];
     const double half = 0.5 * model.spacing_m;
     const double x = site.position.x_m + random.uniform(-half, half);
     const double y = site.position.y_m + random.uniform(-half, half);
@@ -550,8 +552,15 @@ void MonteCarloLocaliser::start_anywhere(std::optional<double> heading_rad) {
   auto& own = *implementation_;
   own.particles.clear();
   const auto count = static_cast<std::size_t>(own.options.most_particles);
+  // Spread evenly over the references: as many particles as references leave none without one.
+  const std::size_t sites = own.likelihood.sites().size();
+  const double first = own.random.uniform(0.0, 1.0);
   for (std::size_t i = 0; i < count; ++i) {
-    own.particles.push_back({own.anywhere(heading_rad), 1.0 / static_cast<double>(count)});
+    const double share = (static_cast<double>(i) + first) / static_cast<double>(count);
+    const auto site =
+        std::min(sites - 1, static_cast<std::size_t>(share * static_cast<double>(sites)));
+    own.particles.push_back(
+        {own.anywhere_around(site, heading_rad), 1.0 / static_cast<double>(count)});
   }
   own.inside = 0.5;
   own.knows_nothing = true;
