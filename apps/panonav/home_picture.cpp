@@ -42,7 +42,7 @@ void paste(Image& image, const Panorama& panorama, int top) {
   }
 }
 
-/// A triangle whose tip touches the view below it, and one that touches the view above.
+/// A triangle whose tip touches the view below it.
 void mark(Image& image, double azimuth_rad, int top, const Colour& colour) {
   const double share = 0.5 - azimuth_rad / (2.0 * std::numbers::pi);
   const int u = static_cast<int>(std::floor(share * width));
