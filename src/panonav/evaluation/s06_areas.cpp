@@ -16,6 +16,7 @@ namespace {
 
 const std::string coarse_to_fine = "K = 2, 4, 10";
 const std::string reversed = "K = 10, 4, 2";
+const std::string own_vector = "our home vector alone";
 
 constexpr std::array<int, 5> single_highest{1, 2, 3, 5, 10};
 
@@ -32,13 +33,17 @@ double best_single(const CatchmentAreas& areas, std::size_t accepted) {
 CatchmentAreas catchment_areas(ArenaSurveys& surveys) {
   std::vector<HomingStrategy> strategies{
       expected_image_strategy(), own_strategy(), published_strategy({2, 4, 10}),
-      published_strategy({10, 4, 2}), published_strategy(own_strategy().highest)};
+      published_strategy({10, 4, 2}), published_strategy({1, 2, 3, 4, 6, 10})};
   for (const int highest : single_highest) strategies.push_back(published_strategy({highest}));
   CatchmentAreas areas;
   for (const auto& strategy : strategies) {
     const auto values = surveys.areas(strategy, s06_accepted_m);
     std::ranges::copy(values, areas[strategy.label].begin());
   }
+  const HomingSurvey* const alone = &surveys.own(10);
+  const auto values = mean_catchment_areas(surveys.distances(std::span(&alone, 1)),
+                                           alone->goals.size(), s06_accepted_m);
+  std::ranges::copy(values, areas[own_vector].begin());
   return areas;
 }
 
@@ -46,7 +51,7 @@ void compare_catchment_areas(std::span<const CatchmentAreas> arenas, std::uint64
                              Reproduction& result) {
   const std::string own = own_strategy().label;
   const std::string images = expected_image_strategy().label;
-  const std::string same_stages = published_strategy(own_strategy().highest).label;
+  const std::string many_stages = published_strategy({1, 2, 3, 4, 6, 10}).label;
   for (std::size_t i = 0; i < s06_accepted_m.size(); ++i) {
     const std::string id = centimetres_id(s06_accepted_m[i]);
     const std::string within = ", runs that end within " + centimetres(s06_accepted_m[i]);
@@ -96,9 +101,13 @@ void compare_catchment_areas(std::span<const CatchmentAreas> arenas, std::uint64
           coarse_to_fine);
     ratio("own_against_reverse", "mean catchment area, our rule over " + reversed, own, reversed);
     add(
-        "own_against_same_stages",
-        "mean catchment area, our rule over the published one in the same stages", "",
-        [&](const auto& a) { return a.at(own)[i] / a.at(same_stages)[i]; }, std::nullopt);
+        "many_stages_against_expected_images",
+        "mean catchment area, " + many_stages + " over expected images", "",
+        [&](const auto& a) { return a.at(many_stages)[i] / a.at(images)[i]; }, std::nullopt);
+    add(
+        "own_vector_against_expected_images",
+        "mean catchment area, our home vector alone (K = 10) over expected images", "",
+        [&](const auto& a) { return a.at(own_vector)[i] / a.at(images)[i]; }, std::nullopt);
   }
 }
 

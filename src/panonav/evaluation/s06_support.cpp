@@ -6,6 +6,10 @@ namespace panonav {
 
 namespace {
 
+constexpr std::array<int, 6> own_stages{1, 2, 3, 4, 6, 10};
+constexpr int own_rounds = 3;
+constexpr int own_highest = 10;
+
 std::string joined(std::span<const int> numbers) {
   std::string text;
   for (const int number : numbers) {
@@ -22,7 +26,7 @@ HomingStrategy published_strategy(std::vector<int> highest) {
 }
 
 HomingStrategy own_strategy() {
-  return {"our rule", HomingStrategy::Rule::own, {1, 2, 3, 4, 6, 10}};
+  return {"our rule", HomingStrategy::Rule::own, {}};
 }
 
 HomingStrategy expected_image_strategy() {
@@ -54,6 +58,22 @@ const HomingSurvey& ArenaSurveys::own(int highest) {
       .first->second;
 }
 
+const HomingSurvey& ArenaSurveys::own_again(int highest) {
+  const std::string key = "own again " + std::to_string(highest);
+  const auto at = surveys_.find(key);
+  if (at != surveys_.end()) return at->second;
+  const FourierHomingOptions coarse{.highest = highest, .displacement_search = false};
+  const FourierHomingOptions fine{.highest = own_highest, .displacement_search = false};
+  const auto rule = [&](std::size_t goal, std::size_t place) {
+    const HomingView& home = arena_.homes.views[goal].view;
+    const HomingView& current = arena_.currents.views[place].view;
+    const bool alike = image_difference(home, current, own_highest) < s06_alike;
+    return home_vector_unchecked(home, current, alike ? fine : coarse);
+  };
+  return surveys_.emplace(key, survey_arena(arena_, HomingRule(rule), executor_, every_))
+      .first->second;
+}
+
 const HomingSurvey& ArenaSurveys::expected_images() {
   const auto at = surveys_.find("expected images");
   if (at != surveys_.end()) return at->second;
@@ -65,15 +85,23 @@ const HomingSurvey& ArenaSurveys::expected_images() {
 std::vector<const HomingSurvey*> ArenaSurveys::stages(const HomingStrategy& strategy) {
   if (strategy.rule == HomingStrategy::Rule::expected_images) return {&expected_images()};
   std::vector<const HomingSurvey*> stages;
-  for (const int highest : strategy.highest) {
-    stages.push_back(strategy.rule == HomingStrategy::Rule::own ? &own(highest)
-                                                                : &published(highest));
+  if (strategy.rule == HomingStrategy::Rule::own) {
+    stages.push_back(&own(own_highest));
+    for (int round = 0; round < own_rounds; ++round) {
+      for (const int highest : own_stages) stages.push_back(&own_again(highest));
+    }
+    stages.push_back(&own(own_highest));
   }
+  for (const int highest : strategy.highest) stages.push_back(&published(highest));
   return stages;
 }
 
 std::vector<float> ArenaSurveys::distances(const HomingStrategy& strategy) {
   return final_distances(stages(strategy), survey_options(arena_), executor_);
+}
+
+std::vector<float> ArenaSurveys::distances(std::span<const HomingSurvey* const> stages) {
+  return final_distances(stages, survey_options(arena_), executor_);
 }
 
 std::vector<double> ArenaSurveys::areas(const HomingStrategy& strategy,

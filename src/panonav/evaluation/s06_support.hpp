@@ -23,15 +23,20 @@ inline constexpr std::array<double, 3> s06_accepted_m{0.025, 0.05, 0.1};
 /// Iterations of the published rule in the runs: N_it + 1 = 3 [S06 figure 11].
 inline constexpr int s06_iterations = 2;
 
+/// Image difference below which a place looks like home, K = 10.
+inline constexpr double s06_alike = 0.1;
+
 /// A way of homing: rules that follow each other whenever homing stops.
 struct HomingStrategy {
   enum class Rule { published, own, expected_images };
   std::string label;
   Rule rule = Rule::published;
-  std::vector<int> highest;  ///< K of each stage; not for expected images
+  std::vector<int> highest;  ///< K of each stage; not for expected images and our rule
 };
 [[nodiscard]] HomingStrategy published_strategy(std::vector<int> highest);
-/// Default options with rising K. The stages were chosen on arenas of seeds 1 and 2.
+/// Our own: home vectors with default options and K = 10; where runs stop at a place that does not
+/// look like home, coarse to fine without the search of displacements, three times; default options
+/// last. A place looks like home below `s06_alike`. All this was chosen on arenas of seeds 1 to 4.
 [[nodiscard]] HomingStrategy own_strategy();
 [[nodiscard]] HomingStrategy expected_image_strategy();
 
@@ -44,11 +49,15 @@ class ArenaSurveys {
   [[nodiscard]] const Arena& arena() const noexcept { return arena_; }
   [[nodiscard]] std::size_t goals_every() const noexcept { return every_; }
   [[nodiscard]] const HomingSurvey& published(int highest, int iterations = s06_iterations);
+  /// Default options.
   [[nodiscard]] const HomingSurvey& own(int highest);
+  /// Without the search of displacements; K = 10 instead of `highest` where it looks like home.
+  [[nodiscard]] const HomingSurvey& own_again(int highest);
   [[nodiscard]] const HomingSurvey& expected_images();
   [[nodiscard]] std::vector<const HomingSurvey*> stages(const HomingStrategy& strategy);
   /// Goal after goal.
   [[nodiscard]] std::vector<float> distances(const HomingStrategy& strategy);
+  [[nodiscard]] std::vector<float> distances(std::span<const HomingSurvey* const> stages);
   [[nodiscard]] std::vector<double> areas(const HomingStrategy& strategy,
                                           std::span<const double> accepted_m);
 
