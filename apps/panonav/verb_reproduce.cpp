@@ -156,9 +156,8 @@ std::pair<PaperText, Reproduction> run_s06(const ReproduceArguments& wanted, Ses
   refuse(wanted.runs.has_value(), "--runs", wanted);
   refuse(wanted.queries.has_value(), "--queries", wanted);
   refuse(wanted.rows.has_value(), "--rows", wanted);
-  refuse(wanted.data.has_value(), "--data", wanted);
   refuse(wanted.only.has_value(), "--only", wanted);
-  HomingReproductionOptions options{.out = wanted.out};
+  HomingReproductionOptions options{.out = wanted.out, .data = data_folder(wanted)};
   if (wanted.quick) options = quick_run(options);
   if (wanted.seed) options.seed = *wanted.seed;
   if (wanted.scenes) {
@@ -172,8 +171,9 @@ std::pair<PaperText, Reproduction> run_s06(const ReproduceArguments& wanted, Ses
       "Visual homing: the experiments of [S06]",
       "Stürzl, Mallot 2006, run in " + std::to_string(options.scenes) +
           " simulated toy house arenas, each recorded twice with different noise and slightly "
-          "different light, headings at random; pictures are of the first arena. Published figures "
-          "beside ours."};
+          "different light, headings at random; pictures are of the first arena. Runs home and "
+          "chains of "
+          "snapshots in rooms and Gazebo worlds. Published figures beside ours."};
   return {text, reproduce_s06(options, session.executor(), progress)};
 }
 
@@ -232,7 +232,7 @@ ExitCode reproduce(const ReproduceArguments& wanted, Session& session) {
     one.out = (std::filesystem::path(wanted.out) / paper).string();
     // What means nothing to a paper.
     if (paper != "m03") one.runs = std::nullopt;
-    if (paper != "m03") one.data = std::nullopt;
+    if (paper == "m04") one.data = std::nullopt;
     if (paper != "m04") one.queries = std::nullopt;
     if (paper == "s06") one.rows = std::nullopt;
     reproduce_paper(one, session);
@@ -263,9 +263,10 @@ Run declare(Arguments& arguments) {
                    "m03: runs in each variant of an office" + fallback(m03.runs) + "; from 2)");
   arguments.option("--rows", wanted->rows, 1,
                    "m03, m04: rows of the views" + fallback(m03.rows) + "; from 1)");
-  arguments.option("--data", wanted->data,
-                   "m03: folder with the recordings and Gazebo worlds (default: the environment's "
-                   "PANONAV_DATA; without it they are left out)");
+  arguments.option(
+      "--data", wanted->data,
+      "m03, s06: folder with the recordings and Gazebo worlds (default: the environment's "
+      "PANONAV_DATA; without it they are left out)");
   const auto parts = tracking_reproduction_parts();
   arguments.choice("--only", wanted->only, {parts.begin(), parts.end()},
                    "m03: this part of the experiments (default: all)");

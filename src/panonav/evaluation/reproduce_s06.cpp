@@ -5,7 +5,9 @@
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/evaluation/s06_chains.hpp"
 #include "panonav/evaluation/s06_support.hpp"
+#include "panonav/evaluation/s06_worlds.hpp"
 #include "panonav/geometry/angles.hpp"
 
 namespace panonav {
@@ -15,6 +17,7 @@ HomingReproductionOptions quick_run(HomingReproductionOptions options) {
   options.spacing_m = 0.05;
   options.goals_every = 4;
   options.goals_every_further = 8;
+  options.starts = 20;
   return options;
 }
 
@@ -24,6 +27,7 @@ Reproduction reproduce_s06(const HomingReproductionOptions& options, Executor& e
   require(options.goals_every >= 1, "goals_every", options.goals_every, ">= 1");
   require(options.goals_every_further >= 1, "goals_every_further", options.goals_every_further,
           ">= 1");
+  require(options.starts >= 1, "starts", options.starts, ">= 1");
   require(options.spacing_m >= 0.01 && options.spacing_m <= 0.1, "spacing_m", options.spacing_m,
           "0.01 .. 0.1");
   std::error_code error;
@@ -94,6 +98,22 @@ Reproduction reproduce_s06(const HomingReproductionOptions& options, Executor& e
             });
   stages.push_back(
       {"comparison", 0.1, [&] { compare_catchment_areas(areas, options.seed, result); }});
+
+  const int few_starts = (options.starts + 19) / 20;
+  stages.push_back({"runs home", 2.0 * few_starts, [&] {
+                      reproduce_homing_in_scenes(options.seed, few_starts, executor, result);
+                    }});
+  stages.push_back({"chains of snapshots", 10.0,
+                    [&] { reproduce_snapshot_chains(options.seed, 2, executor, result); }});
+  for (const std::string name : {"small_warehouse", "small_house"}) {
+    if (options.data.empty() || !std::filesystem::is_directory(options.data / "scenes" / name)) {
+      continue;
+    }
+    stages.push_back({name, 0.1 * options.starts, [&, name] {
+                        reproduce_homing_in_world(options.data, name, options.out, options.seed,
+                                                  options.starts, executor, result);
+                      }});
+  }
 
   double all = 0.0;
   for (const Stage& stage : stages) all += stage.cost;

@@ -79,6 +79,9 @@ struct HomingReproductionOptions {
   int goals_every_further = 4;  ///< the same in the others
   double spacing_m = 0.025;     ///< of the places, 0.01 .. 0.1
   std::uint64_t seed = 101;     ///< of the first scene; the others follow it
+  int starts = 200;             ///< of runs home in each Gazebo world, >= 1; fewer elsewhere
+  /// Folder of the Gazebo worlds (docs/formats.md); empty: these are left out.
+  std::filesystem::path data;
 };
 
 /// The same as a smoke run: two arenas, places 5 cm apart, few goals.
@@ -86,7 +89,8 @@ struct HomingReproductionOptions {
 
 /// Visual homing as in [S06] sections 2 to 5: figures 3 and 6 to 16, over all pairs of places of
 /// the toy house arena, recorded twice; Fourier homing as published and as ours, and homing by
-/// expected images. Same options: same rows, but for times (unit us) and what is made of them (unit
+/// expected images. Then what S06 leaves to others: closed-loop runs home in built-in scenes, leaning
+/// too, and in Gazebo worlds, and chains of snapshots. Same options: same rows, but for times (unit us) and what is made of them (unit
 /// x), and same pictures on any number of threads. Throws ContractError, FileError.
 [[nodiscard]] Reproduction reproduce_s06(const HomingReproductionOptions& options,
                                          Executor& executor,
