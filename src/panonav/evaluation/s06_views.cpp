@@ -128,7 +128,7 @@ void draw_spectrum(const Arena& arena, const std::filesystem::path& folder, Repr
     // On an axis of logarithms a bar cannot reach 0.
     series.y_low.push_back(std::max(mean_power - deviation, 0.1 * mean_power));
     series.y_high.push_back(mean_power + deviation);
-    // Above, pixels of 5 degrees blur what they see: they leave 60 % of the power at k = 20.
+    // Above, pixels of 5 degrees blur what they see: they leave 77 % of the power at k = 20.
     if (k <= 15) {
       log_k.push_back(std::log(k));
       log_power.push_back(std::log(mean_power));
