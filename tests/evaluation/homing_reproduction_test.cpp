@@ -25,7 +25,8 @@ class HomingReproduction : public ::testing::Test {
                           .goals_every = 8,
                           .goals_every_further = 16,
                           .spacing_m = 0.1,
-                          .seed = 7},
+                          .seed = 7,
+                          .starts = 1},
                          executor);
   }
   std::filesystem::path folder_ = std::filesystem::path(::testing::TempDir()) /

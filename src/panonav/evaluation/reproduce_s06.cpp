@@ -103,8 +103,10 @@ Reproduction reproduce_s06(const HomingReproductionOptions& options, Executor& e
   stages.push_back({"runs home", 2.0 * few_starts, [&] {
                       reproduce_homing_in_scenes(options.seed, few_starts, executor, result);
                     }});
-  stages.push_back({"chains of snapshots", 10.0,
-                    [&] { reproduce_snapshot_chains(options.seed, 2, executor, result); }});
+  stages.push_back({"chains of snapshots", 10.0, [&] {
+                      reproduce_snapshot_chains(options.seed, (options.starts + 99) / 100, executor,
+                                                result);
+                    }});
   for (const std::string name : {"small_warehouse", "small_house"}) {
     if (options.data.empty() || !std::filesystem::is_directory(options.data / "scenes" / name)) {
       continue;
