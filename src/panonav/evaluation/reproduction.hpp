@@ -89,9 +89,10 @@ struct HomingReproductionOptions {
 
 /// Visual homing as in [S06] sections 2 to 5: figures 3 and 6 to 16, over all pairs of places of
 /// the toy house arena, recorded twice; Fourier homing as published and as ours, and homing by
-/// expected images. Then what S06 leaves to others: closed-loop runs home in built-in scenes, leaning
-/// too, and in Gazebo worlds, and chains of snapshots. Same options: same rows, but for times (unit us) and what is made of them (unit
-/// x), and same pictures on any number of threads. Throws ContractError, FileError.
+/// expected images. Then what S06 leaves to others: closed-loop runs home in built-in scenes,
+/// leaning too, and in Gazebo worlds, and chains of snapshots. Same options: same rows, but for
+/// times (unit us) and what is made of them (unit x), and same pictures on any number of threads.
+/// Throws ContractError, FileError.
 [[nodiscard]] Reproduction reproduce_s06(const HomingReproductionOptions& options,
                                          Executor& executor,
                                          const ReproductionProgress& progress = {});
