@@ -336,8 +336,8 @@ void draw_headings(const Arena& arena, const std::filesystem::path& folder, Exec
         values[0] = {std::cos(error), std::sin(error)};
       });
 
-  const auto deviation = [&](const Sums& of, std::size_t bin) {
-    const double length = std::hypot(of.first[bin], of.second[bin]) / pairs[bin];
+  const auto deviation = [&counts = pairs](const Sums& of, std::size_t bin) {
+    const double length = std::hypot(of.first[bin], of.second[bin]) / counts[bin];
     return degrees(std::sqrt(std::max(0.0, -2.0 * std::log(length))));
   };
   LinePlot plot{.title = "Error of the heading",

@@ -40,9 +40,10 @@ struct BestDisplacement {
 };
 
 /// The displacement whose expected image differs least from the home view at its best turn: hs_ei
-/// [S06 section 2.2] in the Fourier domain. `rows` rows of `frequencies` + 1 coefficients each, one
-/// row after the other. Cost: for one row 49 expected images of 8 frequencies, about 15
-/// microseconds; each further row adds as much as a fifth.
+/// [S06 section 2.2] in the Fourier domain; far ones must differ a little less than near ones.
+/// `rows` rows of `frequencies` + 1 coefficients each, one row after the other. Cost: for one row
+/// 49 expected images of 8 frequencies, about 15 microseconds; each further row adds as much as a
+/// fifth.
 [[nodiscard]] BestDisplacement best_displacement(std::span<const float> home_a,
                                                  std::span<const float> home_b,
                                                  std::span<const float> current_a,

@@ -186,6 +186,21 @@ PerFrequency fitted_bell(const PerFrequency& coherences, int highest) {
   return best;
 }
 
+// Weights over amplitudes; their sum stays. `power`: the mean of the powers.
+void over_amplitude(PerFrequency& weights, const PerFrequency& powers, double power, int highest) {
+  if (!(power > 0.0)) return;
+  constexpr double faint = 0.02;  // of the mean: fainter ones are mostly noise
+  double before = 0.0;
+  double after = 0.0;
+  for (int k = 1; k <= highest; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    before += weights[i];
+    weights[i] /= std::sqrt(powers[i] / power + faint);
+    after += weights[i];
+  }
+  for (int k = 1; k <= highest; ++k) weights[static_cast<std::size_t>(k)] *= before / after;
+}
+
 class PairOfViews {
  public:
   PairOfViews(const HomingView& home, const HomingView& current,
@@ -302,14 +317,19 @@ void PairOfViews::turn_home(double turn_rad) {
   }
 }
 
-// By coherence at the present turn: components by a bell as wide as there are coherent ones, rows
-// by their coherence within it.
+// By coherence at the present turn: components by a bell as wide as there are coherent ones, over
+// their amplitude, rows by their coherence within it. The power of views falls with about the
+// square of the frequency [S06 section 4.5], so that without the amplitude the first few would
+// decide alone. What unequal distances leave unexplained is a share of the power, what pixels leave
+// is the same for all frequencies: the amplitude is half way between the two.
 void PairOfViews::weigh() {
   for (int k = 1; k <= highest_; ++k) component_weights_[static_cast<std::size_t>(k)] = 1.0;
   row_weights_.clear();
   if (options_.weights == HomingWeights::equal) return;
 
   PerFrequency coherences{};
+  PerFrequency powers{};
+  double power = 0.0;
   for (int k = 1; k <= highest_; ++k) {
     float common = 0.0F;
     float home = 0.0F;
@@ -325,8 +345,11 @@ void PairOfViews::weigh() {
     }
     const float most = std::sqrt(home) * std::sqrt(current);
     if (most > 0.0F) coherences[static_cast<std::size_t>(k)] = static_cast<double>(common / most);
+    powers[static_cast<std::size_t>(k)] = static_cast<double>(home + current);
+    power += powers[static_cast<std::size_t>(k)] / highest_;
   }
   component_weights_ = fitted_bell(coherences, highest_);
+  over_amplitude(component_weights_, powers, power, highest_);
   if (rows_ == 1) return;
 
   std::vector<double> common(rows_);
