@@ -226,39 +226,39 @@ TEST(FourierHoming, IterationsExplainAFarViewBetter) {
   EXPECT_LT(length_often, length_once);
 }
 
-// Far surroundings: a lean is a rotation of all directions.
+// What a robot sees that pitches: the direction u comes from u - omega x u.
+Panorama leaning(const Panorama& level, double lean) {
+  Panorama result = level;
+  const double row_rad = (band.top_rad - band.bottom_rad) / level.rows();
+  for (int r = 0; r < level.rows(); ++r) {
+    for (int c = 0; c < level.columns(); ++c) {
+      const double phi = level.azimuth_rad(c);
+      const double elevation = level.elevation_rad(r);
+      const double from_row =
+          std::clamp(r + lean * std::cos(phi) / row_rad, 0.0, level.rows() - 1.001);
+      const double from_column =
+          (phi - lean * std::tan(elevation) * std::sin(phi)) * level.columns() / (2.0 * pi) +
+          level.columns();
+      const int r0 = static_cast<int>(from_row);
+      const int c0 = static_cast<int>(std::floor(from_column));
+      const auto fr = static_cast<float>(from_row - r0);
+      const auto fc = static_cast<float>(from_column - c0);
+      const auto at = [&](int row, int column) { return level.at(row, column % level.columns()); };
+      result.at(r, c) = (1 - fr) * ((1 - fc) * at(r0, c0) + fc * at(r0, c0 + 1)) +
+                        fr * ((1 - fc) * at(r0 + 1, c0) + fc * at(r0 + 1, c0 + 1));
+    }
+  }
+  return result;
+}
+
 TEST(FourierHoming, LeanIsToldFromDisplacement) {
   double with = 0.0;
   double without = 0.0;
   for (int trial = 0; trial < 30; ++trial) {
     const Surroundings around = random_surroundings(600 + trial, 6.0);
     const HomingView home = view_of(around.seen_from(0.0, 0.0, 0.0, 40));
-    const Panorama level = around.seen_from(0.05, 0.03, 0.0, 40);
-    // Pitch by 1.5 degrees: the direction u comes from u - omega x u.
-    const double lean = radians(1.5);
-    Panorama leaning = level;
-    for (int r = 0; r < level.rows(); ++r) {
-      for (int c = 0; c < level.columns(); ++c) {
-        const double phi = level.azimuth_rad(c);
-        const double elevation = level.elevation_rad(r);
-        const double row_rad = (band.top_rad - band.bottom_rad) / level.rows();
-        const double from_row =
-            std::clamp(r + lean * std::cos(phi) / row_rad, 0.0, level.rows() - 1.001);
-        const double from_column =
-            (phi - lean * std::tan(elevation) * std::sin(phi)) * level.columns() / (2.0 * pi) +
-            level.columns();
-        const int r0 = static_cast<int>(from_row);
-        const int c0 = static_cast<int>(std::floor(from_column));
-        const auto fr = static_cast<float>(from_row - r0);
-        const auto fc = static_cast<float>(from_column - c0);
-        const auto at = [&](int row, int column) {
-          return level.at(row, column % level.columns());
-        };
-        leaning.at(r, c) = (1 - fr) * ((1 - fc) * at(r0, c0) + fc * at(r0, c0 + 1)) +
-                           fr * ((1 - fc) * at(r0 + 1, c0) + fc * at(r0 + 1, c0 + 1));
-      }
-    }
-    const HomingView current = view_of(leaning);
+    const HomingView current =
+        view_of(leaning(around.seen_from(0.05, 0.03, 0.0, 40), radians(1.5)));
     const auto error = [&](bool solved) {
       const HomeVector v = home_vector(home, current, {.lean = solved});
       return std::hypot(v.xi + 0.05, v.eta + 0.03);
@@ -267,6 +267,25 @@ TEST(FourierHoming, LeanIsToldFromDisplacement) {
     without += error(false);
   }
   EXPECT_LT(with, 0.6 * without);
+}
+
+// A robot that is home looks at home, also where the ground is not even.
+TEST(ImageDifference, LeanIsNotADifference) {
+  double leaning_at_home = 0.0;
+  double flat = 0.0;
+  for (int trial = 0; trial < 30; ++trial) {
+    const Surroundings around = random_surroundings(700 + trial, 6.0);
+    const Panorama level = around.seen_from(0.0, 0.0, 0.0, 40);
+    const Panorama tilted = leaning(level, radians(1.5));
+    leaning_at_home += image_difference(view_of(level), turn(view_of(tilted), 1.0)) / 30;
+    // Without elevations nothing is known of a lean.
+    const auto bare = [](const Panorama& view) {
+      return view_of(Panorama(view.rows(), view.columns(), std::nullopt,
+                              {view.values().begin(), view.values().end()}));
+    };
+    flat += image_difference(bare(level), turn(bare(tilted), 1.0)) / 30;
+  }
+  EXPECT_LT(leaning_at_home, 0.4 * flat);
 }
 
 // A feature off the horizon moves up and down as the robot moves to and from it.

@@ -229,6 +229,7 @@ class PairOfViews {
   }
 
   HomeVector result();
+  [[nodiscard]] double difference();
 
  private:
   void correlate();
@@ -241,6 +242,7 @@ class PairOfViews {
   [[nodiscard]] bool sees_rise() const noexcept {
     return (options_.vertical_motion || options_.lean) && home_.elevations() && rows_ >= 3;
   }
+  void sum_equations();
   [[nodiscard]] Solution solve_at(double turn_rad);
   void move_current(double xi, double eta);
   // Where the least squares start, with the heading that fits there.
@@ -519,9 +521,8 @@ LeanTerms PairOfViews::lean_terms(int k) {
   return terms;
 }
 
-Solution PairOfViews::solve_at(double turn_rad) {
-  turn_home(turn_rad);
-  weigh();
+// At the present turn and with the present weights.
+void PairOfViews::sum_equations() {
   take_slopes();
   normal_ = {};
   for (int k = 1; k <= highest_; ++k) {
@@ -540,6 +541,12 @@ Solution PairOfViews::solve_at(double turn_rad) {
     const double certain = normal_.energy / std::max(1.0, equations) / (usual_rad * usual_rad);
     normal_ = without_lean(normal_, lean, certain);
   }
+}
+
+Solution PairOfViews::solve_at(double turn_rad) {
+  turn_home(turn_rad);
+  weigh();
+  sum_equations();
   return solve(normal_);
 }
 
@@ -702,6 +709,16 @@ HomeVector PairOfViews::result() {
   }
 }
 
+double PairOfViews::difference() {
+  correlate();
+  std::array<float, 1> turn{};
+  if (!(home_energy_ + current_energy_ > 0.0) || highest_turns(correlation_, turn) == 0) return 1.0;
+  turn_home(static_cast<double>(turn[0]));
+  weigh();
+  sum_equations();
+  return std::clamp(normal_.energy / normal_.energy_of_views, 0.0, 2.0);
+}
+
 int highest_used(const HomingView& home, const HomingView& current, int highest) {
   const int common = std::min(home.components(), current.components());
   const int most = std::min(common - 2, TurnCorrelation::most_frequencies);
@@ -789,25 +806,10 @@ HomeVector home_vector_unchecked(const HomingView& home, const HomingView& curre
 
 double image_difference(const HomingView& home, const HomingView& current, int highest) {
   check_pair(home, current, highest);
-  const int used = highest_used(home, current, highest);
-  TurnCorrelation correlation;
-  correlation.highest = used;
-  double energy = 0.0;
-  for (int k = 1; k <= used; ++k) {
-    const auto i = static_cast<std::size_t>(k);
-    for (int y = 0; y < home.rows(); ++y) {
-      const float ha = home.a(y, k);
-      const float hb = home.b(y, k);
-      const float ca = current.a(y, k);
-      const float cb = current.b(y, k);
-      correlation.real[i] += ha * ca + hb * cb;
-      correlation.imaginary[i] += ha * cb - hb * ca;
-      energy += static_cast<double>(ha * ha + hb * hb + ca * ca + cb * cb);
-    }
-  }
-  std::array<float, 1> turn{};
-  if (!(energy > 0.0) || highest_turns(correlation, turn) == 0) return 1.0;
-  return std::max(0.0, 1.0 - 2.0 * static_cast<double>(correlation.at(turn[0])) / energy);
+  FourierHomingOptions options = published_homing(highest);
+  options.gradient = HomingGradient::both;
+  options.lean = true;
+  return PairOfViews(home, current, options, highest_used(home, current, highest)).difference();
 }
 
 }  // namespace panonav

@@ -96,7 +96,8 @@ void visit_options(FourierHomingOptions& options, OptionVisitor& visitor);
 
 /// Sum of squared differences of the first K components at the heading of their best correlation
 /// [S06 eq. 15, 28], relative to the energy of both views: 0 for the same place, about 1 for
-/// unrelated views. Throws ContractError as `home_vector`.
+/// unrelated views. Where elevations are known, a lean of the robot by a few degrees is no
+/// difference: what it explains is left out. Throws ContractError as `home_vector`.
 [[nodiscard]] double image_difference(const HomingView& home, const HomingView& current,
                                       int highest = 0);
 
