@@ -23,6 +23,10 @@ class CylinderWorld {
   }
 
   [[nodiscard]] HomingView seen_from(const Pose2& pose, int components = 14) const {
+    return homing_view(signature_from(pose, components));
+  }
+
+  [[nodiscard]] FourierSignature signature_from(const Pose2& pose, int components = 14) const {
     constexpr int columns = 256;
     Panorama view(1, columns, std::nullopt);
     for (int c = 0; c < columns; ++c) {
@@ -39,7 +43,7 @@ class CylinderWorld {
       }
       view.at(0, c) = static_cast<float>(value);
     }
-    return homing_view(compute_signature(view, components));
+    return compute_signature(view, components);
   }
 
  private:

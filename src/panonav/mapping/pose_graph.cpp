@@ -1,0 +1,280 @@
+#include "panonav/mapping/pose_graph.hpp"
+
+#include <Eigen/Core>
+#include <Eigen/Sparse>
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav {
+
+namespace {
+
+using Triplet = Eigen::Triplet<double>;
+constexpr std::size_t unknowns = 3;  // x, y, heading of each node
+
+bool is_finite(const Pose2& pose) {
+  return std::isfinite(pose.x_m) && std::isfinite(pose.y_m) && std::isfinite(pose.heading_rad);
+}
+
+void check(std::span<const Pose2> nodes, std::span<const PoseEdge> edges) {
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    if (!is_finite(nodes[i])) {
+      throw ContractError("node " + std::to_string(i), "not finite", "a finite pose");
+    }
+  }
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    const PoseEdge& edge = edges[i];
+    const std::string name = "edge " + std::to_string(i);
+    if (edge.a >= nodes.size() || edge.b >= nodes.size() || edge.a == edge.b) {
+      throw ContractError(name, std::to_string(edge.a) + " to " + std::to_string(edge.b),
+                          "two different nodes of " + std::to_string(nodes.size()));
+    }
+    if (!is_finite(edge.a_from_b)) throw ContractError(name, "not finite", "a finite pose");
+    require(std::isfinite(edge.position_deviation_m) && edge.position_deviation_m > 0.0,
+            name + ": position_deviation_m", edge.position_deviation_m, "> 0");
+    require(std::isfinite(edge.heading_deviation_rad) && edge.heading_deviation_rad > 0.0,
+            name + ": heading_deviation_rad", edge.heading_deviation_rad, "> 0");
+  }
+}
+
+struct EdgeError {
+  double x = 0.0;
+  double y = 0.0;
+  double heading = 0.0;
+};
+
+// In the frame of node a, in standard deviations.
+EdgeError error_of(const PoseEdge& edge, const Pose2& a, const Pose2& b) {
+  const Pose2 seen = inverse(a) * b;
+  const double position = 1.0 / edge.position_deviation_m;
+  return {
+      position * (seen.x_m - edge.a_from_b.x_m), position * (seen.y_m - edge.a_from_b.y_m),
+      angle_difference(seen.heading_rad, edge.a_from_b.heading_rad) / edge.heading_deviation_rad};
+}
+
+double square(const EdgeError& error) {
+  return error.x * error.x + error.y * error.y + error.heading * error.heading;
+}
+
+/// The graph with its unknowns, one Gauss-Newton step at a time.
+class Problem {
+ public:
+  Problem(std::span<Pose2> nodes, std::span<const PoseEdge> edges) : nodes_(nodes), edges_(edges) {
+    const auto parts = connected_parts(nodes.size(), edges);
+    fixed_.assign(nodes.size(), false);
+    std::size_t next = 0;
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      if (parts[i] != next) continue;
+      fixed_[i] = true;
+      ++next;
+    }
+    weights_.assign(edges.size(), 1.0);
+  }
+
+  /// Doubtful edges weigh by their errors against `scale` (squared deviations). Returns the largest
+  /// squared error of a doubtful edge.
+  double weigh(double scale) {
+    double largest = 0.0;
+    for (std::size_t i = 0; i < edges_.size(); ++i) {
+      if (!edges_[i].doubtful) continue;
+      const double error = square(edge_error(i));
+      largest = std::max(largest, error);
+      const double root = scale / (scale + error);
+      weights_[i] = std::isfinite(scale) ? root * root : 1.0;
+    }
+    return largest;
+  }
+
+  /// Returns the largest change of a position or, in radians, of a heading.
+  double step() {
+    assemble();
+    if (!analysed_) {
+      solver_.analyzePattern(hessian_);
+      analysed_ = true;
+    }
+    solver_.factorize(hessian_);
+    if (solver_.info() != Eigen::Success) return 0.0;
+    const Eigen::VectorXd change = solver_.solve(-gradient_);
+    double largest = 0.0;
+    for (std::size_t i = 0; i < nodes_.size(); ++i) {
+      if (fixed_[i]) continue;
+      const auto at = static_cast<Eigen::Index>(i * unknowns);
+      // No heading turns by more than half a radian at once, or the linear model means nothing.
+      const double turn = std::clamp(change[at + 2], -0.5, 0.5);
+      nodes_[i] = {nodes_[i].x_m + change[at], nodes_[i].y_m + change[at + 1],
+                   wrap_angle(nodes_[i].heading_rad + turn)};
+      largest = std::max({largest, std::abs(change[at]), std::abs(change[at + 1]), std::abs(turn)});
+    }
+    return largest;
+  }
+
+  [[nodiscard]] double cost() const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < edges_.size(); ++i) sum += weights_[i] * square(edge_error(i));
+    return 0.5 * sum;
+  }
+  [[nodiscard]] const std::vector<double>& weights() const { return weights_; }
+
+ private:
+  [[nodiscard]] EdgeError edge_error(std::size_t i) const {
+    return error_of(edges_[i], nodes_[edges_[i].a], nodes_[edges_[i].b]);
+  }
+
+  void add(std::size_t row, std::size_t column, double value) {
+    // Fixed poses keep their equation x = 0; the pattern stays the same.
+    if (row < column) std::swap(row, column);
+    if (fixed_[row / unknowns] || fixed_[column / unknowns]) value = 0.0;
+    triplets_.emplace_back(static_cast<int>(row), static_cast<int>(column), value);
+  }
+
+  void assemble() {
+    const std::size_t size = nodes_.size() * unknowns;
+    triplets_.clear();
+    gradient_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(size));
+    for (std::size_t i = 0; i < nodes_.size(); ++i) {
+      for (std::size_t u = 0; u < unknowns; ++u) {
+        // A part may hang on nothing but edges whose weight has fallen to almost nothing.
+        const double held = fixed_[i] ? 1.0 : 1e-9;
+        triplets_.emplace_back(static_cast<int>(i * unknowns + u),
+                               static_cast<int>(i * unknowns + u), held);
+      }
+    }
+    for (std::size_t i = 0; i < edges_.size(); ++i) add_edge(i);
+    for (std::size_t i = 0; i < nodes_.size(); ++i) {
+      if (!fixed_[i]) continue;
+      gradient_.segment<3>(static_cast<Eigen::Index>(i * unknowns)).setZero();
+    }
+    hessian_.resize(static_cast<Eigen::Index>(size), static_cast<Eigen::Index>(size));
+    hessian_.setFromTriplets(triplets_.begin(), triplets_.end());
+  }
+
+  void add_edge(std::size_t i) {
+    const PoseEdge& edge = edges_[i];
+    const Pose2& a = nodes_[edge.a];
+    const Pose2& b = nodes_[edge.b];
+    const EdgeError error = error_of(edge, a, b);
+    const double weight = weights_[i];
+    const double p = 1.0 / edge.position_deviation_m;
+    const double h = 1.0 / edge.heading_deviation_rad;
+    const double c = std::cos(a.heading_rad);
+    const double s = std::sin(a.heading_rad);
+    const double dx = b.x_m - a.x_m;
+    const double dy = b.y_m - a.y_m;
+    // Columns: x, y and heading of a, then of b.
+    constexpr std::size_t columns = 6;
+    const std::array<std::array<double, columns>, 3> jacobian{{
+        {-p * c, -p * s, p * (c * dy - s * dx), p * c, p * s, 0.0},
+        {p * s, -p * c, p * (-c * dx - s * dy), -p * s, p * c, 0.0},
+        {0.0, 0.0, -h, 0.0, 0.0, h},
+    }};
+    const std::array<double, 3> residual{error.x, error.y, error.heading};
+    const auto index = [&](std::size_t column) {
+      return column < unknowns ? edge.a * unknowns + column : edge.b * unknowns + column - unknowns;
+    };
+    for (std::size_t m = 0; m < columns; ++m) {
+      double slope = 0.0;
+      for (std::size_t r = 0; r < 3; ++r) slope += jacobian[r][m] * residual[r];
+      gradient_[static_cast<Eigen::Index>(index(m))] += weight * slope;
+      for (std::size_t n = 0; n <= m; ++n) {
+        double sum = 0.0;
+        for (std::size_t r = 0; r < 3; ++r) sum += jacobian[r][m] * jacobian[r][n];
+        add(index(m), index(n), weight * sum);
+      }
+    }
+  }
+
+  std::span<Pose2> nodes_;
+  std::span<const PoseEdge> edges_;
+  std::vector<double> weights_;
+  std::vector<bool> fixed_;
+  bool analysed_ = false;
+  std::vector<Triplet> triplets_;
+  Eigen::SparseMatrix<double> hessian_;
+  Eigen::VectorXd gradient_;
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower> solver_;
+};
+
+}  // namespace
+
+void visit_options(PoseGraphOptions& options, OptionVisitor& visitor) {
+  visitor.visit({.name = "most_iterations", .help = "steps of the solver", .low = 1, .high = 1000},
+                options.most_iterations);
+  visitor.visit({.name = "settled_m",
+                 .help = "solved when no position changes by more",
+                 .low = 0.0,
+                 .high = 1e6,
+                 .low_open = true},
+                options.settled_m);
+  visitor.visit({.name = "doubt_deviations",
+                 .help = "error at which a loop closure loses its weight, in standard deviations",
+                 .low = 0.0,
+                 .high = 1e6,
+                 .low_open = true},
+                options.doubt_deviations);
+}
+
+PoseGraphReport optimise_pose_graph(std::span<Pose2> nodes, std::span<const PoseEdge> edges,
+                                    const PoseGraphOptions& options) {
+  validate(options);
+  check(nodes, edges);
+  PoseGraphReport report;
+  report.edge_weights.assign(edges.size(), 1.0);
+  if (edges.empty()) return report;
+  Problem problem(nodes, edges);
+  const double wanted = options.doubt_deviations * options.doubt_deviations;
+  const bool doubtful = std::ranges::any_of(edges, &PoseEdge::doubtful);
+  // The first steps trust every edge.
+  double scale = doubtful ? std::numeric_limits<double>::infinity() : wanted;
+  report.settled = false;
+  while (report.iterations < options.most_iterations) {
+    ++report.iterations;
+    const double change = problem.step();
+    const bool still = change <= options.settled_m;
+    if (std::isinf(scale)) {
+      if (!still && report.iterations < options.most_iterations / 4) continue;
+      scale = std::max(wanted, problem.weigh(scale));
+    } else if (scale > wanted) {
+      scale = std::max(wanted, 0.25 * scale);
+    } else if (still) {
+      report.settled = true;
+      break;
+    }
+    problem.weigh(scale);
+  }
+  report.cost = problem.cost();
+  report.edge_weights = problem.weights();
+  return report;
+}
+
+std::vector<std::size_t> connected_parts(std::size_t nodes, std::span<const PoseEdge> edges) {
+  std::vector<std::size_t> root(nodes);
+  for (std::size_t i = 0; i < nodes; ++i) root[i] = i;
+  const auto find = [&](std::size_t i) {
+    while (root[i] != i) i = root[i] = root[root[i]];
+    return i;
+  };
+  for (const PoseEdge& edge : edges) {
+    const std::size_t a = find(edge.a);
+    const std::size_t b = find(edge.b);
+    root[std::max(a, b)] = std::min(a, b);
+  }
+  std::vector<std::size_t> part(nodes);
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < nodes; ++i) {
+    const std::size_t first = find(i);
+    part[i] = first == i ? next++ : part[first];
+  }
+  return part;
+}
+
+double edge_tension(const PoseEdge& edge, std::span<const Pose2> nodes) {
+  return std::sqrt(square(error_of(edge, nodes[edge.a], nodes[edge.b])));
+}
+
+}  // namespace panonav

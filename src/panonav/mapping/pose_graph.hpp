@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "panonav/core/options.hpp"
+#include "panonav/geometry/pose2.hpp"
+
+namespace panonav {
+
+/// A measured motion between two nodes of a map.
+struct PoseEdge {
+  std::size_t a = 0;
+  std::size_t b = 0;
+  Pose2 a_from_b;
+  double position_deviation_m = 0.1;    ///< standard deviation of x and of y, > 0
+  double heading_deviation_rad = 0.05;  ///< > 0
+  /// It may be plainly wrong, as a loop closure may: its weight falls where the others contradict.
+  bool doubtful = false;
+  friend bool operator==(const PoseEdge&, const PoseEdge&) = default;
+};
+
+struct PoseGraphOptions {
+  int most_iterations = 40;
+  /// The solution is found when no position changes by more.
+  double settled_m = 1e-4;
+  /// A doubtful edge counts half when its error is so many standard deviations.
+  double doubt_deviations = 5.0;
+};
+void visit_options(PoseGraphOptions& options, OptionVisitor& visitor);
+
+struct PoseGraphReport {
+  int iterations = 0;
+  bool settled = true;
+  double cost = 0.0;                 ///< half the weighted sum of squares in the end
+  std::vector<double> edge_weights;  ///< one per edge, 0 .. 1; 1 for edges that are not doubtful
+};
+
+/// Moves `nodes` to where all edges are contradicted least: Gauss-Newton on the sparse normal
+/// equations. Doubtful edges have a robust cost (Geman and McClure), which is approached from the
+/// quadratic one (graduated non-convexity), so that the drift before the first closure does not
+/// speak against it. Nodes without edges and the first node
+/// of each connected part stay where they are. Deterministic. Throws ContractError on an edge to a
+/// node that is not there or to itself, a value that is not finite or a deviation not above 0;
+/// OptionError. Cost: an iteration is about linear in nodes and edges for maps of paths: 10 ms for
+/// 10,000 nodes.
+PoseGraphReport optimise_pose_graph(std::span<Pose2> nodes, std::span<const PoseEdge> edges,
+                                    const PoseGraphOptions& options = {});
+
+/// The connected part of each node, numbered from 0 in the order of their first nodes.
+[[nodiscard]] std::vector<std::size_t> connected_parts(std::size_t nodes,
+                                                       std::span<const PoseEdge> edges);
+
+/// How far an edge is from what the nodes say, in standard deviations. The edge must be valid.
+[[nodiscard]] double edge_tension(const PoseEdge& edge, std::span<const Pose2> nodes);
+
+}  // namespace panonav

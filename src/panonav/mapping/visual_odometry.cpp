@@ -1,0 +1,136 @@
+#include "panonav/mapping/visual_odometry.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string_view>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/signature/compass.hpp"
+#include "panonav/signature/dissimilarity.hpp"
+
+namespace panonav {
+
+namespace {
+
+// Steps are short: the least squares need no search before them, and the search's own grid of
+// displacements would show in the lengths.
+FourierHomingOptions vector_options(const VisualOdometryOptions& options) {
+  return {.iterations = options.iterations, .displacement_search = false};
+}
+
+std::optional<VisualStep> published_step(const OdometryView& before, const OdometryView& after,
+                                         const VisualOdometryOptions& options) {
+  const auto reading =
+      compass(after.signature, before.signature, {.components = options.turn_components});
+  if (!reading) return std::nullopt;
+  VisualStep step;
+  step.length_in_views =
+      dissimilarity_l2(after.signature, before.signature, options.distance_components);
+  const double length_m = options.scale_m * step.length_in_views;
+  const double middle_rad = 0.5 * reading->heading_rad;
+  step.before_from_after = {length_m * std::cos(middle_rad), length_m * std::sin(middle_rad),
+                            reading->heading_rad};
+  step.correlation = reading->correlation;
+  step.residual = std::clamp(1.0 - reading->correlation, 0.0, 1.0);
+  return step;
+}
+
+std::optional<VisualStep> home_vector_step(const OdometryView& before, const OdometryView& after,
+                                           const VisualOdometryOptions& options) {
+  const HomeVector vector =
+      home_vector(before.coefficients, after.coefficients, vector_options(options));
+  if (!(vector.correlation > 0.0)) return std::nullopt;
+  VisualStep step;
+  step.before_from_after =
+      inverse(Pose2{options.scale_m * vector.xi, options.scale_m * vector.eta, vector.heading_rad});
+  step.length_in_views = vector.length();
+  step.correlation = vector.correlation;
+  step.residual = vector.residual;
+  return step;
+}
+
+}  // namespace
+
+void visit_options(VisualOdometryOptions& options, OptionVisitor& visitor) {
+  constexpr std::array<std::string_view, 2> rules{"published", "home_vector"};
+  int rule = static_cast<int>(options.rule);
+  visitor.visit({.name = "rule", .help = "how the motion between two views is read"}, rules, rule);
+  options.rule = static_cast<StepRule>(rule);
+  visitor.visit({.name = "scale_m",
+                 .help = "metres for each unit of length that the views give",
+                 .low = 0.0,
+                 .high = 1e6,
+                 .low_open = true},
+                options.scale_m);
+  visitor.visit({.name = "distance_components",
+                 .help = "components compared for the distance of the published rule (k1); 0: all",
+                 .low = 0,
+                 .high = 4096},
+                options.distance_components);
+  visitor.visit({.name = "turn_components",
+                 .help = "components compared for the turn of the published rule (k2); 0: all",
+                 .low = 0,
+                 .high = 4096},
+                options.turn_components);
+  visitor.visit(
+      {.name = "iterations", .help = "times that the home vector is refined", .low = 0, .high = 20},
+      options.iterations);
+  visitor.visit({.name = "most_residual",
+                 .help = "share of the views' energy that a step may leave unexplained",
+                 .low = 0.0,
+                 .high = 1.0},
+                options.most_residual);
+}
+
+OdometryView::OdometryView(FourierSignature view)
+    : signature(std::move(view)), coefficients(homing_view(signature)) {
+  require(signature.components() >= 3, "components of a view", signature.components(), ">= 3");
+}
+
+std::optional<VisualStep> visual_step(const OdometryView& before, const OdometryView& after,
+                                      const VisualOdometryOptions& options) {
+  validate(options);
+  auto step = options.rule == StepRule::published ? published_step(before, after, options)
+                                                  : home_vector_step(before, after, options);
+  if (step && step->residual > options.most_residual) return std::nullopt;
+  return step;
+}
+
+std::optional<double> length_scale_m(std::span<const KnownLength> steps) {
+  std::vector<double> ratios;
+  for (const KnownLength& step : steps) {
+    require(std::isfinite(step.length_m) && step.length_m >= 0.0, "length_m", step.length_m,
+            ">= 0");
+    require(std::isfinite(step.length_in_views) && step.length_in_views >= 0.0, "length_in_views",
+            step.length_in_views, ">= 0");
+    if (step.length_m > 0.0 && step.length_in_views > 0.0) {
+      ratios.push_back(step.length_m / step.length_in_views);
+    }
+  }
+  if (ratios.empty()) return std::nullopt;
+  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+  std::nth_element(ratios.begin(), middle, ratios.end());
+  return *middle;
+}
+
+VisualOdometry::VisualOdometry(const VisualOdometryOptions& options) : options_(options) {
+  validate(options);
+}
+
+std::optional<VisualStep> VisualOdometry::add(OdometryView view) {
+  std::optional<VisualStep> step;
+  if (last_) {
+    step = visual_step(*last_, view, options_);
+    if (step) {
+      pose_ = pose_ * step->before_from_after;
+    } else {
+      ++breaks_;
+    }
+  }
+  last_ = std::move(view);
+  return step;
+}
+
+}  // namespace panonav

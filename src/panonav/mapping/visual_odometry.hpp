@@ -1,0 +1,98 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "panonav/core/options.hpp"
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/homing/fourier_homing.hpp"
+#include "panonav/homing/homing_view.hpp"
+#include "panonav/signature/fourier_signature.hpp"
+
+namespace panonav {
+
+/// How the motion between two views is read from them.
+enum class StepRule {
+  /// As published: the distance is that of the signatures [F11 eq. 2], the turn that of the compass
+  /// [F11 section 3.2], and the robot goes the way it faces at the middle of the step.
+  published,
+  /// Ours: the home vector [S06] from the one view to the other gives direction, turn and length.
+  /// So a robot that drives sideways is followed, too, and the turn is freed of what displacement
+  /// does to the phases.
+  home_vector,
+};
+
+struct VisualOdometryOptions {
+  StepRule rule = StepRule::home_vector;
+  /// Metres for each unit of length that the views give: the distance R of things around for
+  /// `home_vector`, the distance of signatures 1 apart for `published`. See `length_scale_m`.
+  double scale_m = 1.5;
+  /// Of `published`: components compared for the distance (k1) and for the turn (k2); 0 takes all.
+  int distance_components = 0;
+  int turn_components = 0;
+  /// Times that the solution of `home_vector` is refined.
+  int iterations = 1;
+  /// A step is not believed when turn and displacement leave more than this share of the energy of
+  /// the views unexplained.
+  double most_residual = 0.5;
+};
+void visit_options(VisualOdometryOptions& options, OptionVisitor& visitor);
+
+/// A view as visual odometry compares it.
+struct OdometryView {
+  FourierSignature signature;
+  HomingView coefficients;
+
+  /// Throws ContractError unless there are three components or more.
+  explicit OdometryView(FourierSignature view);
+};
+
+/// The motion that two views show.
+struct VisualStep {
+  Pose2 before_from_after;
+  double length_in_views = 0.0;  ///< before it is multiplied by the scale
+  double correlation = 0.0;      ///< of the views at the turn found, -1 .. 1
+  double residual = 1.0;         ///< share of the energy of the views left unexplained, 0 .. 1
+};
+
+/// Empty where the views show no motion that can be believed: no structure, or too little in
+/// common. Throws ContractError on views of different shapes; OptionError. Cost: `home_vector`
+/// without the search of displacements, about 60 microseconds for 80 x 15.
+[[nodiscard]] std::optional<VisualStep> visual_step(const OdometryView& before,
+                                                    const OdometryView& after,
+                                                    const VisualOdometryOptions& options = {});
+
+/// A step whose length is known from elsewhere, such as wheels.
+struct KnownLength {
+  double length_in_views = 0.0;
+  double length_m = 0.0;
+};
+
+/// The scale that known steps tell: the median of their ratios, so that single wrong ones do not
+/// count. Steps of no length are left out; empty when none remains. Throws ContractError on a
+/// negative length or one that is not finite.
+[[nodiscard]] std::optional<double> length_scale_m(std::span<const KnownLength> steps);
+
+/// Pose by pose from one view after the other [F11 section 4, eq. 3-5].
+class VisualOdometry {
+ public:
+  /// Throws OptionError.
+  explicit VisualOdometry(const VisualOdometryOptions& options = {});
+
+  /// The step from the view before; empty for the first view and where there is no believable step:
+  /// the pose then stays, and `breaks()` counts. Throws as `visual_step`.
+  std::optional<VisualStep> add(OdometryView view);
+
+  /// start_from_robot.
+  [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }
+  [[nodiscard]] int breaks() const noexcept { return breaks_; }
+
+ private:
+  VisualOdometryOptions options_;
+  std::optional<OdometryView> last_;
+  Pose2 pose_;
+  int breaks_ = 0;
+};
+
+}  // namespace panonav
