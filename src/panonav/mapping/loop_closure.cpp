@@ -1,0 +1,235 @@
+#include "panonav/mapping/loop_closure.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "panonav/core/error.hpp"
+#include "panonav/signature/compass.hpp"
+
+namespace panonav {
+
+namespace {
+
+// Views looked at beyond the candidates: several of each place are found.
+constexpr int views_per_candidate = 4;
+
+double gap(const Pose2& a, const Pose2& b) {
+  return distance(a.position(), b.position());
+}
+
+}  // namespace
+
+void visit_options(LoopClosureOptions& options, OptionVisitor& visitor) {
+  visitor.visit(
+      {.name = "candidates", .help = "places looked at for each view", .low = 1, .high = 1000},
+      options.candidates);
+  visitor.visit({.name = "shortest_loop_m",
+                 .help = "views nearer along the way are no candidates",
+                 .low = 0.0,
+                 .high = 1e6,
+                 .low_open = true},
+                options.shortest_loop_m);
+  visitor.visit({.name = "most_residual",
+                 .help = "share of the views' energy that a closure may leave unexplained",
+                 .low = 0.0,
+                 .high = 1.0},
+                options.most_residual);
+  visitor.visit({.name = "most_length",
+                 .help = "distance between the views of a closure in units of R, at most",
+                 .low = 0.0,
+                 .high = 2.0},
+                options.most_length);
+  visitor.visit({.name = "heading_tolerance_rad",
+                 .help = "by which compass, way there and way back may differ",
+                 .low = 0.0,
+                 .high = 3.2},
+                options.heading_tolerance_rad);
+  visitor.visit({.name = "return_tolerance",
+                 .help = "how far from the start there and back may lead, in units of R",
+                 .low = 0.0,
+                 .high = 2.0},
+                options.return_tolerance);
+  visitor.visit({.name = "distinctness",
+                 .help = "by how much other places must explain the view worse",
+                 .low = 1.0,
+                 .high = 1000.0},
+                options.distinctness);
+  visitor.visit({.name = "reciprocal_rank",
+                 .help = "the search from the candidate leads back among so many views",
+                 .low = 1,
+                 .high = 1000},
+                options.reciprocal_rank);
+  visitor.visit({.name = "sequence",
+                 .help = "successive views whose closures must agree",
+                 .low = 1,
+                 .high = 1000},
+                options.sequence);
+  visitor.visit({.name = "most_drift",
+                 .help = "drift of the odometry for each metre since the last closure",
+                 .low = 0.0,
+                 .high = 100.0},
+                options.most_drift);
+}
+
+LoopClosureFinder::LoopClosureFinder(const VisualMemory& memory, const LoopClosureOptions& options,
+                                     const VisualOdometryOptions& odometry)
+    : memory_(&memory), options_(options), odometry_(odometry) {
+  validate(options);
+  validate(odometry);
+  odometry_.rule = StepRule::home_vector;  // the other gives no direction
+  odometry_.most_residual = options.most_residual;
+}
+
+std::vector<ViewId> LoopClosureFinder::near_on_way(std::span<const PassedNode> nodes,
+                                                   std::size_t node) const {
+  std::vector<ViewId> views;
+  const double here_m = nodes[node].way_m;
+  for (std::size_t i = node;; --i) {
+    if (here_m - nodes[i].way_m > options_.shortest_loop_m) break;
+    views.push_back(nodes[i].view);
+    if (i == 0) break;
+  }
+  for (std::size_t i = node + 1; i < nodes.size(); ++i) {
+    if (nodes[i].way_m - here_m > options_.shortest_loop_m) break;
+    views.push_back(nodes[i].view);
+  }
+  return views;
+}
+
+std::optional<std::size_t> LoopClosureFinder::node_of(std::span<const PassedNode> nodes,
+                                                      ViewId view) const {
+  const auto found = std::ranges::lower_bound(nodes, view, {}, &PassedNode::view);
+  if (found == nodes.end() || found->view != view) return std::nullopt;
+  return static_cast<std::size_t>(found - nodes.begin());
+}
+
+std::optional<LoopClosure> LoopClosureFinder::compare(std::size_t earlier, std::size_t later,
+                                                      const OdometryView& earlier_view,
+                                                      const OdometryView& later_view) const {
+  const auto there = visual_step(earlier_view, later_view, odometry_);
+  if (!there || there->length_in_views > options_.most_length) return std::nullopt;
+  const auto back = visual_step(later_view, earlier_view, odometry_);
+  if (!back) return std::nullopt;
+  const Pose2 round_trip = there->before_from_after * back->before_from_after;
+  if (std::hypot(round_trip.x_m, round_trip.y_m) > options_.return_tolerance * odometry_.scale_m ||
+      std::abs(round_trip.heading_rad) > options_.heading_tolerance_rad) {
+    return std::nullopt;
+  }
+  const auto reading = compass(later_view.signature, earlier_view.signature);
+  if (!reading ||
+      std::abs(angle_difference(reading->heading_rad, there->before_from_after.heading_rad)) >
+          options_.heading_tolerance_rad) {
+    return std::nullopt;
+  }
+  return LoopClosure{earlier, later, there->before_from_after, there->residual};
+}
+
+std::optional<LoopClosure> LoopClosureFinder::best_closure(std::span<const PassedNode> nodes,
+                                                           std::span<const Pose2> poses,
+                                                           const OdometryView& view) const {
+  const std::size_t here = nodes.size() - 1;
+  const auto excluded = near_on_way(nodes, here);
+  const auto found = memory_->search(memory_->packed(nodes[here].view),
+                                     {.top = options_.candidates * views_per_candidate},
+                                     {.excluded_views = excluded});
+  std::vector<std::size_t> looked_at;
+  std::vector<LoopClosure> closures;
+  for (const Match& match : found.matches) {
+    const auto candidate = node_of(nodes, match.view);
+    if (!candidate) continue;
+    // Of neighbours on the way the first, which is the most similar, stands for the place.
+    const bool known = std::ranges::any_of(looked_at, [&](std::size_t i) {
+      return std::abs(nodes[i].way_m - nodes[*candidate].way_m) < 0.25 * options_.shortest_loop_m;
+    });
+    if (known) continue;
+    if (static_cast<int>(looked_at.size()) == options_.candidates) break;
+    looked_at.push_back(*candidate);
+    const auto closure =
+        compare(*candidate, here, OdometryView(memory_->signature(match.view)), view);
+    if (closure) closures.push_back(*closure);
+  }
+  if (closures.empty()) return std::nullopt;
+  const LoopClosure& best = *std::ranges::min_element(closures, {}, &LoopClosure::residual);
+  const Pose2 place = poses[best.earlier] * best.earlier_from_later;
+  const bool ambiguous = std::ranges::any_of(closures, [&](const LoopClosure& other) {
+    // Another passage through the same place speaks for it, not against.
+    return other.residual < options_.distinctness * best.residual &&
+           gap(place, poses[other.earlier] * other.earlier_from_later) >
+               options_.most_length * odometry_.scale_m;
+  });
+  if (ambiguous) return std::nullopt;
+  return best;
+}
+
+bool LoopClosureFinder::is_reciprocal(std::span<const PassedNode> nodes,
+                                      std::span<const Pose2> poses,
+                                      const LoopClosure& closure) const {
+  const auto excluded = near_on_way(nodes, closure.earlier);
+  const auto found =
+      memory_->search(memory_->packed(nodes[closure.earlier].view),
+                      {.top = options_.reciprocal_rank}, {.excluded_views = excluded});
+  return std::ranges::any_of(found.matches, [&](const Match& match) {
+    const auto node = node_of(nodes, match.view);
+    if (!node) return false;
+    return nodes[closure.later].way_m - nodes[*node].way_m < options_.shortest_loop_m ||
+           gap(poses[*node], poses[closure.earlier]) < options_.most_length * odometry_.scale_m;
+  });
+}
+
+bool LoopClosureFinder::is_in_reach(std::span<const PassedNode> nodes, std::span<const Pose2> poses,
+                                    const LoopClosure& closure) const {
+  const double here_m = nodes[closure.later].way_m;
+  const double loop_m = here_m - nodes[closure.earlier].way_m;
+  const double since_m = std::min(loop_m, here_m - closed_way_m_);
+  constexpr double share_within_closed = 0.2;
+  const double allowed_m =
+      odometry_.scale_m +
+      options_.most_drift * (since_m + share_within_closed * (loop_m - since_m));
+  return gap(poses[closure.earlier] * closure.earlier_from_later, poses[closure.later]) < allowed_m;
+}
+
+bool LoopClosureFinder::agree(const LoopClosure& a, const LoopClosure& b,
+                              std::span<const Pose2> poses) const {
+  // From a's later node to b's: along the way, and through the earlier passage.
+  const Pose2 along = inverse(poses[a.later]) * poses[b.later];
+  const Pose2 across = inverse(a.earlier_from_later) *
+                       (inverse(poses[a.earlier]) * poses[b.earlier]) * b.earlier_from_later;
+  const Pose2 difference = inverse(along) * across;
+  // Odometry of a metre or two is right to a tenth.
+  const double allowed_m =
+      options_.return_tolerance * odometry_.scale_m + 0.1 * std::hypot(along.x_m, along.y_m);
+  return std::hypot(difference.x_m, difference.y_m) < allowed_m &&
+         std::abs(difference.heading_rad) < options_.heading_tolerance_rad;
+}
+
+std::vector<LoopClosure> LoopClosureFinder::find(std::span<const PassedNode> nodes,
+                                                 std::span<const Pose2> poses,
+                                                 const OdometryView& view, double scale_m) {
+  require(nodes.size() == poses.size() && !nodes.empty(), "poses",
+          static_cast<double>(poses.size()), "as many as nodes, and at least one");
+  odometry_.scale_m = scale_m;
+  const std::size_t here = nodes.size() - 1;
+  // A view may fail a check within a sequence; two in a row end it.
+  const auto oldest = static_cast<std::size_t>(2 * options_.sequence);
+  while (!pending_.empty() && here - pending_.front().closure.later > oldest) pending_.pop_front();
+  const auto closure = best_closure(nodes, poses, view);
+  if (!closure || !is_in_reach(nodes, poses, *closure) || !is_reciprocal(nodes, poses, *closure)) {
+    return {};
+  }
+  pending_.push_back({*closure, false});
+  std::vector<Pending*> agreeing;
+  for (Pending& pending : pending_) {
+    if (agree(pending.closure, *closure, poses)) agreeing.push_back(&pending);
+  }
+  std::vector<LoopClosure> certain;
+  if (static_cast<int>(agreeing.size()) < options_.sequence) return certain;
+  for (Pending* pending : agreeing) {
+    if (!pending->told) certain.push_back(pending->closure);
+    pending->told = true;
+  }
+  closed_way_m_ = nodes[here].way_m;
+  return certain;
+}
+
+}  // namespace panonav

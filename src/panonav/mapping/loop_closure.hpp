@@ -1,0 +1,107 @@
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <span>
+#include <vector>
+
+#include "panonav/core/options.hpp"
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/mapping/visual_odometry.hpp"
+#include "panonav/memory/visual_memory.hpp"
+
+namespace panonav {
+
+/// When two views are taken for the same place. Wrong closures are worse than missing ones: a
+/// candidate must pass every check.
+struct LoopClosureOptions {
+  /// Places looked at for each view, from the memory's search.
+  int candidates = 5;
+  /// Views nearer than this along the way are no candidates: there is no loop to close.
+  double shortest_loop_m = 3.0;
+  /// The view explains the candidate up to this share of the energy of both.
+  double most_residual = 0.15;
+  /// Farther apart, in units of R, the views tell too little.
+  double most_length = 0.5;
+  /// Compass, the way there and the way back agree on the heading.
+  double heading_tolerance_rad = 0.15;
+  /// The way there and back leave the robot where it was, in units of R.
+  double return_tolerance = 0.1;
+  /// Another place that explains the view nearly as well makes it ambiguous: the residual of the
+  /// best must be smaller by this factor.
+  double distinctness = 1.5;
+  /// The search from the candidate must lead back to here among so many views.
+  int reciprocal_rank = 5;
+  /// So many successive views must have closures that agree with the way between them.
+  int sequence = 3;
+  /// Drift of the odometry, in metres for each metre, beyond which no closure is believed: counted
+  /// from the last closure, and a fifth of it along the rest of the loop. One R comes on top.
+  double most_drift = 0.15;
+};
+void visit_options(LoopClosureOptions& options, OptionVisitor& visitor);
+
+/// A node of the map as the search for closures sees it.
+struct PassedNode {
+  ViewId view;
+  double way_m = 0.0;  ///< along the way of the robot from its first view to here
+};
+
+/// Two nodes that see the same place.
+struct LoopClosure {
+  std::size_t earlier = 0;
+  std::size_t later = 0;
+  Pose2 earlier_from_later;
+  double residual = 0.0;
+  friend bool operator==(const LoopClosure&, const LoopClosure&) = default;
+};
+
+/// Looks for closures while the robot goes on: candidates from the memory's search, then home
+/// vectors in both directions whose turn must be the compass's and which must be each other's
+/// inverse; the reciprocal search, which must lead back from the candidate to here; no other place
+/// that explains the view as well; odometry that may have drifted so far; and a sequence of such
+/// views.
+class LoopClosureFinder {
+ public:
+  /// `memory` must outlive the finder. Throws OptionError.
+  LoopClosureFinder(const VisualMemory& memory, const LoopClosureOptions& options,
+                    const VisualOdometryOptions& odometry);
+
+  /// The last of `nodes` is new and its view is in the memory; `poses` is the map so far, by which
+  /// places are told from each other and the sequence is judged. `scale_m` as of the odometry.
+  /// Returns the closures that have become certain with this view: none, or those of the whole
+  /// sequence. Throws ContractError on different numbers of nodes and poses. Cost: two searches of
+  /// the memory and, where there are candidates, 0.3 ms for each.
+  [[nodiscard]] std::vector<LoopClosure> find(std::span<const PassedNode> nodes,
+                                              std::span<const Pose2> poses,
+                                              const OdometryView& view, double scale_m);
+
+ private:
+  [[nodiscard]] std::optional<LoopClosure> best_closure(std::span<const PassedNode> nodes,
+                                                        std::span<const Pose2> poses,
+                                                        const OdometryView& view) const;
+  [[nodiscard]] std::optional<LoopClosure> compare(std::size_t earlier, std::size_t later,
+                                                   const OdometryView& earlier_view,
+                                                   const OdometryView& later_view) const;
+  [[nodiscard]] bool is_reciprocal(std::span<const PassedNode> nodes, std::span<const Pose2> poses,
+                                   const LoopClosure& closure) const;
+  [[nodiscard]] bool is_in_reach(std::span<const PassedNode> nodes, std::span<const Pose2> poses,
+                                 const LoopClosure& closure) const;
+  [[nodiscard]] bool agree(const LoopClosure& a, const LoopClosure& b,
+                           std::span<const Pose2> poses) const;
+  [[nodiscard]] std::vector<ViewId> near_on_way(std::span<const PassedNode> nodes,
+                                                std::size_t node) const;
+  [[nodiscard]] std::optional<std::size_t> node_of(std::span<const PassedNode> nodes,
+                                                   ViewId view) const;
+
+  const VisualMemory* memory_;
+  LoopClosureOptions options_;
+  VisualOdometryOptions odometry_;
+  double closed_way_m_ = 0.0;  // where the last closure was
+  struct Pending {
+    LoopClosure closure;
+    bool told = false;
+  };
+  std::deque<Pending> pending_;  // of the last views, oldest first
+};
+
+}  // namespace panonav

@@ -1,0 +1,218 @@
+#include "panonav/mapping/topological_map.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/homing/fourier_homing.hpp"
+
+namespace panonav {
+
+namespace {
+
+// Even a robot that stands still has so much error in a step: the noise of the pictures.
+constexpr double least_position_deviation_m = 0.005;
+constexpr double least_heading_deviation_rad = 0.003;
+// Of the position that a closure tells: what the views leave unexplained shortens the way between
+// them; for each unit of residual, in units of R.
+constexpr double closure_deviation = 1.0;
+constexpr double closure_position_deviation_m = 0.02;
+constexpr double closure_turn_deviation = 0.05;
+constexpr double closure_heading_deviation_rad = 0.01;
+// Known steps by which the scale is judged: the latest.
+constexpr std::size_t most_known_lengths = 200;
+constexpr double refuted_weight = 0.1;
+// Closures that are right within so many standard deviations do not pull.
+constexpr double pulling_deviations = 1.0;
+
+double length(const Pose2& step) {
+  return std::hypot(step.x_m, step.y_m);
+}
+
+Pose2 with_length(const Pose2& step, double length_m) {
+  const double now_m = length(step);
+  if (!(now_m > 0.0)) return {length_m, 0.0, step.heading_rad};
+  return {step.x_m * length_m / now_m, step.y_m * length_m / now_m, step.heading_rad};
+}
+
+}  // namespace
+
+std::size_t number_of_parts(const TopologicalMap& map) {
+  std::set<std::size_t> parts;
+  for (const MapNode& node : map.nodes) parts.insert(node.part);
+  return parts.size();
+}
+
+void visit_options(MappingOptions& options, OptionVisitor& visitor) {
+  visitor.visit(
+      {.name = "capture_difference",
+       .help = "a view becomes a node when it differs from the last by more; 0: every view",
+       .low = 0.0,
+       .high = 1.0},
+      options.capture_difference);
+  visitor.visit({.name = "close_loops", .help = "look for places passed before"},
+                options.close_loops);
+  visitor.visit({.name = "wheel_lengths", .help = "take the length of steps from the wheels"},
+                options.wheel_lengths);
+  visitor.visit({.name = "step_deviation",
+                 .help = "deviation of positions read from views, for each metre",
+                 .low = 0.0,
+                 .high = 10.0,
+                 .low_open = true},
+                options.step_deviation);
+  visitor.visit({.name = "turn_deviation",
+                 .help = "deviation of headings read from views (rad), for each metre",
+                 .low = 0.0,
+                 .high = 10.0,
+                 .low_open = true},
+                options.turn_deviation);
+  visitor.visit({.name = "wheel_deviation",
+                 .help = "deviation of positions where wheels tell the length, for each metre",
+                 .low = 0.0,
+                 .high = 10.0,
+                 .low_open = true},
+                options.wheel_deviation);
+}
+
+TopologicalMapper::TopologicalMapper(const VisualMemory& memory, const MappingOptions& options,
+                                     const VisualOdometryOptions& odometry,
+                                     const LoopClosureOptions& closure,
+                                     const PoseGraphOptions& graph)
+    : memory_(&memory),
+      options_(options),
+      odometry_(odometry),
+      graph_(graph),
+      finder_(memory, closure, odometry) {
+  validate(options);
+  validate(graph);
+}
+
+bool TopologicalMapper::is_new(const OdometryView& view) const {
+  if (!last_ || options_.capture_difference == 0.0) return true;
+  return image_difference(last_->coefficients, view.coefficients) > options_.capture_difference;
+}
+
+void TopologicalMapper::add_step(const std::optional<VisualStep>& step,
+                                 const std::optional<Pose2>& moved, MapUpdate& update) {
+  const std::size_t here = nodes_.size() - 1;
+  if (!step && !moved) {
+    // A frame of its own; the way goes on, so that its views are no candidates for each other.
+    update.new_part = true;
+    parts_.push_back(parts_.back() + 1);
+    poses_.emplace_back();
+    nodes_[here].way_m = nodes_[here - 1].way_m;
+    return;
+  }
+  Pose2 motion = step ? step->before_from_after : *moved;
+  const bool wheels = moved && (options_.wheel_lengths || !step);
+  if (step && wheels) motion = with_length(motion, length(*moved));
+  const double length_m = length(motion);
+  const double position = wheels ? options_.wheel_deviation : options_.step_deviation;
+  edges_.push_back({here - 1, here, motion, position * length_m + least_position_deviation_m,
+                    options_.turn_deviation * length_m + least_heading_deviation_rad});
+  weights_.push_back(1.0);
+  poses_.push_back(poses_.back() * motion);
+  parts_.push_back(parts_.back());
+  nodes_[here].way_m = nodes_[here - 1].way_m + length_m;
+}
+
+MapUpdate TopologicalMapper::add(ViewId view, OdometryView seen,
+                                 const std::optional<Pose2>& moved) {
+  if (!memory_->contains(view) || (!nodes_.empty() && view <= nodes_.back().view)) {
+    throw ContractError("view", static_cast<double>(view.value),
+                        "a view of the memory, later than those of the map");
+  }
+  if (moved) {
+    require(
+        std::isfinite(moved->x_m) && std::isfinite(moved->y_m) && std::isfinite(moved->heading_rad),
+        "step of the wheels", length(*moved), "finite");
+  }
+  MapUpdate update;
+  if (last_) update.step = visual_step(*last_, seen, odometry_);
+  nodes_.push_back({view, 0.0});
+  if (nodes_.size() == 1) {
+    poses_.emplace_back();
+    parts_.push_back(0);
+    update.new_part = true;
+  } else {
+    if (moved && update.step && options_.wheel_lengths) {
+      known_lengths_.push_back({update.step->length_in_views, length(*moved)});
+      if (known_lengths_.size() > most_known_lengths) known_lengths_.erase(known_lengths_.begin());
+    }
+    add_step(update.step, moved, update);
+  }
+  if (options_.close_loops) close_loops(seen, update);
+  last_ = std::move(seen);
+  return update;
+}
+
+void TopologicalMapper::close_loops(const OdometryView& seen, MapUpdate& update) {
+  double scale_m = odometry_.scale_m;
+  if (const auto known = length_scale_m(known_lengths_)) scale_m = *known;
+  update.closures = finder_.find(nodes_, poses_, seen, scale_m);
+  for (const LoopClosure& closure : update.closures) {
+    join_parts(closure);
+    const double length_m = length(closure.earlier_from_later);
+    edges_.push_back({closure.earlier, closure.later, closure.earlier_from_later,
+                      closure_deviation * closure.residual * scale_m + closure_position_deviation_m,
+                      closure_turn_deviation * length_m + closure_heading_deviation_rad, true});
+    weights_.push_back(1.0);
+    if (edge_tension(edges_.back(), poses_) > pulling_deviations) pulled_ = true;
+  }
+  if (pulled_ && size() >= optimised_size_ + std::max<std::size_t>(1, optimised_size_ / 100)) {
+    optimise();
+    update.optimised = true;
+  }
+}
+
+void TopologicalMapper::join_parts(const LoopClosure& closure) {
+  const std::size_t kept = parts_[closure.earlier];
+  const std::size_t joined = parts_[closure.later];
+  if (kept == joined) return;
+  const Pose2 kept_from_joined =
+      poses_[closure.earlier] * closure.earlier_from_later * inverse(poses_[closure.later]);
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (parts_[i] != joined) continue;
+    parts_[i] = kept;
+    poses_[i] = kept_from_joined * poses_[i];
+  }
+}
+
+void TopologicalMapper::optimise() {
+  weights_ = optimise_pose_graph(poses_, edges_, graph_).edge_weights;
+  // What the rest of the map refutes is no closure.
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < edges_.size(); ++i) {
+    if (edges_[i].doubtful && weights_[i] < refuted_weight) continue;
+    edges_[kept] = edges_[i];
+    weights_[kept++] = weights_[i];
+  }
+  edges_.resize(kept);
+  weights_.resize(kept);
+  optimised_size_ = size();
+  pulled_ = false;
+}
+
+void TopologicalMapper::finish() {
+  if (pulled_) optimise();
+}
+
+TopologicalMap TopologicalMapper::map() const {
+  TopologicalMap map;
+  std::map<std::size_t, std::size_t> number;
+  for (std::size_t i = 0; i < size(); ++i) {
+    const auto part = number.try_emplace(parts_[i], number.size()).first->second;
+    map.nodes.push_back({nodes_[i].view, poses_[i], part});
+  }
+  for (std::size_t i = 0; i < edges_.size(); ++i) {
+    const PoseEdge& edge = edges_[i];
+    map.edges.push_back({nodes_[edge.a].view, nodes_[edge.b].view, edge.a_from_b,
+                         edge.doubtful ? LinkKind::closure : LinkKind::sequence, weights_[i]});
+  }
+  return map;
+}
+
+}  // namespace panonav

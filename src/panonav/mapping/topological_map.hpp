@@ -1,0 +1,126 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "panonav/core/options.hpp"
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/mapping/loop_closure.hpp"
+#include "panonav/mapping/pose_graph.hpp"
+#include "panonav/mapping/visual_odometry.hpp"
+#include "panonav/memory/visual_memory.hpp"
+
+namespace panonav {
+
+/// A place of the map: a view and where it was taken.
+struct MapNode {
+  ViewId view;
+  Pose2 pose;            ///< in the frame of its part
+  std::size_t part = 0;  ///< nodes of different parts have no common frame
+  friend bool operator==(const MapNode&, const MapNode&) = default;
+};
+
+/// Two nodes and the motion between them.
+struct MapEdge {
+  ViewId a;
+  ViewId b;
+  Pose2 a_from_b;
+  LinkKind kind = LinkKind::sequence;
+  double weight = 1.0;  ///< 0 .. 1: a closure that the rest of the map contradicts has little
+  friend bool operator==(const MapEdge&, const MapEdge&) = default;
+};
+
+/// A map of places [F11 section 4] with closed loops.
+struct TopologicalMap {
+  std::vector<MapNode> nodes;  ///< ascending by view
+  std::vector<MapEdge> edges;
+  friend bool operator==(const TopologicalMap&, const TopologicalMap&) = default;
+};
+
+/// How many parts have no common frame.
+[[nodiscard]] std::size_t number_of_parts(const TopologicalMap& map);
+
+struct MappingOptions {
+  /// A view becomes a node when it differs from the last node by more (`image_difference`, 0 .. 1):
+  /// capture by threshold, as in F11's second set. 0 keeps every view.
+  double capture_difference = 0.0;
+  bool close_loops = true;
+  /// Lengths of steps are taken from the wheels where these are known; turns and directions come
+  /// from the views all the same.
+  bool wheel_lengths = true;
+  /// Standard deviation of the position after a step read from views, for each metre of it.
+  double step_deviation = 0.08;
+  /// The same of the heading (rad).
+  double turn_deviation = 0.02;
+  /// The same of the position where the length comes from wheels.
+  double wheel_deviation = 0.02;
+};
+void visit_options(MappingOptions& options, OptionVisitor& visitor);
+
+/// What became of a view.
+struct MapUpdate {
+  std::optional<VisualStep> step;     ///< from the node before
+  bool new_part = false;              ///< nothing connects the view with the node before
+  std::vector<LoopClosure> closures;  ///< that became certain; numbers of nodes
+  bool optimised = false;             ///< the whole map was
+};
+
+/// Makes a map from one view after the other: a node for each, linked with the one before by visual
+/// odometry; loops closed by `LoopClosureFinder`; the whole optimised as a pose graph when closures
+/// pull at it and it has grown by a hundredth since the last time, so that the cost of a view
+/// stays small however large the map. Where neither views nor wheels tell the step, a part begins
+/// that has its own frame; a closure joins it with the others.
+class TopologicalMapper {
+ public:
+  /// `memory` must outlive the mapper. Throws OptionError.
+  explicit TopologicalMapper(const VisualMemory& memory, const MappingOptions& options = {},
+                             const VisualOdometryOptions& odometry = {},
+                             const LoopClosureOptions& closure = {},
+                             const PoseGraphOptions& graph = {});
+
+  /// Whether the view differs enough from the last node to become one.
+  [[nodiscard]] bool is_new(const OdometryView& view) const;
+
+  /// Adds a node. The view must be the memory's latest; `moved` is what wheels say since the last
+  /// node (robot_old_from_robot_new), empty where there are none. Throws ContractError on a view
+  /// that is not in the memory or not later than those before, on another shape, and on a step that
+  /// is not finite.
+  MapUpdate add(ViewId view, OdometryView seen, const std::optional<Pose2>& moved = std::nullopt);
+
+  /// Optimises what is not yet.
+  void finish();
+
+  [[nodiscard]] std::size_t size() const noexcept { return poses_.size(); }
+  /// Of each node, in the frame of its part.
+  [[nodiscard]] std::span<const Pose2> poses() const noexcept { return poses_; }
+  /// The parts are numbered in the order of their first nodes.
+  [[nodiscard]] TopologicalMap map() const;
+  /// Metres for each unit of length of the views, as the wheels tell or as it was given.
+  [[nodiscard]] double scale_m() const noexcept { return odometry_.scale_m; }
+
+ private:
+  void add_step(const std::optional<VisualStep>& step, const std::optional<Pose2>& moved,
+                MapUpdate& update);
+  void close_loops(const OdometryView& seen, MapUpdate& update);
+  void join_parts(const LoopClosure& closure);
+  void optimise();
+
+  const VisualMemory* memory_;
+  MappingOptions options_;
+  VisualOdometryOptions odometry_;
+  PoseGraphOptions graph_;
+  LoopClosureFinder finder_;
+  std::vector<PassedNode> nodes_;
+  std::vector<Pose2> poses_;
+  std::vector<std::size_t> parts_;
+  std::vector<PoseEdge> edges_;
+  std::vector<double> weights_;
+  std::vector<KnownLength> known_lengths_;
+  std::optional<OdometryView> last_;
+  std::size_t optimised_size_ = 0;  // nodes when the map was last optimised
+  bool pulled_ = false;             // by closures since then
+};
+
+}  // namespace panonav

@@ -1,0 +1,180 @@
+#include "panonav/mapping/topological_map.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "homing/cylinder_world.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/alignment.hpp"
+#include "panonav/motion/odometry.hpp"
+
+namespace panonav {
+namespace {
+
+constexpr double radius_m = 4.0;
+const VisualOdometryOptions in_metres{.scale_m = radius_m};
+
+VisualMemory empty_memory() {
+  return {{1, 14}, 0.5F, std::nullopt};
+}
+
+/// A mapper with the memory that it looks at.
+struct Mapping {
+  VisualMemory memory = empty_memory();
+  TopologicalMapper mapper;
+  explicit Mapping(const MappingOptions& options = {}) : mapper(memory, options, in_metres) {}
+
+  MapUpdate add(const FourierSignature& signature,
+                const std::optional<Pose2>& moved = std::nullopt) {
+    const ViewId view = memory.append(signature, {.name = std::to_string(memory.size())});
+    return mapper.add(view, OdometryView(signature), moved);
+  }
+};
+
+// Rounds of 7.5 m, looking ahead, with a view every 9 cm.
+std::vector<Pose2> rounds(int views) {
+  std::vector<Pose2> poses;
+  for (int i = 0; i < views; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / 80.0;
+    poses.push_back({1.2 * std::sin(angle), 1.2 - 1.2 * std::cos(angle), wrap_angle(angle)});
+  }
+  return poses;
+}
+
+std::vector<Point2> positions(std::span<const Pose2> poses) {
+  std::vector<Point2> points;
+  for (const Pose2& pose : poses) points.push_back(pose.position());
+  return points;
+}
+
+FourierSignature empty_view() {
+  return compute_signature(Panorama(1, 256, std::nullopt), 14);
+}
+
+TEST(TopologicalMapper, ClosesTheLoopOfASecondRound) {
+  const test::CylinderWorld world(radius_m, 5);
+  const auto truth = rounds(120);
+  Mapping open({.close_loops = false});
+  Mapping closed;
+  std::size_t closures = 0;
+  for (const Pose2& pose : truth) {
+    open.add(world.signature_from(pose));
+    for (const LoopClosure& closure : closed.add(world.signature_from(pose)).closures) {
+      const Pose2 error = inverse(inverse(truth[closure.earlier]) * truth[closure.later]) *
+                          closure.earlier_from_later;
+      EXPECT_LT(std::hypot(error.x_m, error.y_m), 0.6);
+      EXPECT_LT(std::abs(error.heading_rad), 0.1);
+      ++closures;
+    }
+  }
+  closed.mapper.finish();
+  EXPECT_GE(closures, 20U);
+  const double before = shape_difference(positions(open.mapper.poses()), positions(truth)).value;
+  const double after = shape_difference(positions(closed.mapper.poses()), positions(truth)).value;
+  EXPECT_LT(after, 0.006);
+  EXPECT_LT(after, before);
+  const TopologicalMap map = closed.mapper.map();
+  EXPECT_EQ(map.nodes.size(), truth.size());
+  EXPECT_EQ(map.edges.size(), truth.size() - 1 + closures);
+  EXPECT_EQ(number_of_parts(map), 1U);
+}
+
+TEST(TopologicalMapper, WheelLengthsSetTheScale) {
+  const test::CylinderWorld world(radius_m, 6);
+  const auto truth = rounds(100);
+  const auto steps = steps_between(truth);
+  Mapping mapping;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    mapping.add(world.signature_from(truth[i]),
+                i == 0 ? std::nullopt : std::optional(steps[i - 1]));
+  }
+  mapping.mapper.finish();
+  EXPECT_LT(align(positions(mapping.mapper.poses()), positions(truth)).rms_m, 0.15);
+}
+
+TEST(TopologicalMapper, SameViewsGiveTheSameBits) {
+  const test::CylinderWorld world(radius_m, 7);
+  Mapping one;
+  Mapping two;
+  for (const Pose2& pose : rounds(100)) {
+    one.add(world.signature_from(pose));
+    two.add(world.signature_from(pose));
+  }
+  EXPECT_EQ(one.mapper.map(), two.mapper.map());
+}
+
+TEST(TopologicalMapper, OneViewTwoViews) {
+  const test::CylinderWorld world(radius_m, 8);
+  Mapping mapping;
+  mapping.mapper.finish();
+  EXPECT_TRUE(mapping.mapper.map().nodes.empty());
+  EXPECT_TRUE(mapping.add(world.signature_from({})).new_part);
+  mapping.mapper.finish();
+  EXPECT_EQ(mapping.mapper.map().nodes.size(), 1U);
+  EXPECT_TRUE(mapping.mapper.map().edges.empty());
+  EXPECT_FALSE(mapping.add(world.signature_from({0.1, 0.0, 0.0})).new_part);
+  EXPECT_EQ(mapping.mapper.map().edges.size(), 1U);
+}
+
+TEST(TopologicalMapper, EqualViewsStayAtOnePlace) {
+  const test::CylinderWorld world(radius_m, 9);
+  Mapping mapping;
+  for (int i = 0; i < 50; ++i) {
+    EXPECT_TRUE(mapping.add(world.signature_from({0.3, 0.1, 0.2})).closures.empty());
+  }
+  for (const Pose2& pose : mapping.mapper.poses()) {
+    EXPECT_NEAR(std::hypot(pose.x_m, pose.y_m), 0.0, 1e-6);
+  }
+  Mapping keeping({.capture_difference = 0.01});
+  keeping.add(world.signature_from({0.3, 0.1, 0.2}));
+  EXPECT_FALSE(keeping.mapper.is_new(OdometryView(world.signature_from({0.3, 0.1, 0.9}))));
+  EXPECT_TRUE(keeping.mapper.is_new(OdometryView(world.signature_from({0.9, 0.1, 0.2}))));
+}
+
+TEST(TopologicalMapper, WhatNothingConnectsBecomesAPartOfItsOwn) {
+  const test::CylinderWorld world(radius_m, 10);
+  const auto truth = rounds(130);
+  Mapping mapping;
+  for (std::size_t i = 0; i < 60; ++i) mapping.add(world.signature_from(truth[i]));
+  EXPECT_TRUE(mapping.add(empty_view()).new_part);
+  EXPECT_TRUE(mapping.add(world.signature_from(truth[60])).new_part);
+  EXPECT_EQ(number_of_parts(mapping.mapper.map()), 3U);
+  EXPECT_EQ(mapping.mapper.map().nodes.back().part, 2U);
+  // Wheels bridge what the views do not show.
+  Mapping with_wheels;
+  with_wheels.add(world.signature_from(truth[0]));
+  EXPECT_FALSE(with_wheels.add(empty_view(), Pose2{0.1, 0.0, 0.0}).new_part);
+  EXPECT_EQ(number_of_parts(with_wheels.mapper.map()), 1U);
+  // The second round joins the parts again.
+  for (std::size_t i = 61; i < truth.size(); ++i) mapping.add(world.signature_from(truth[i]));
+  mapping.mapper.finish();
+  const TopologicalMap map = mapping.mapper.map();
+  EXPECT_EQ(number_of_parts(map), 2U);
+  EXPECT_EQ(map.nodes[0].part, map.nodes.back().part);
+}
+
+TEST(TopologicalMapper, RefusesWhatHasNoMeaning) {
+  const test::CylinderWorld world(radius_m, 11);
+  Mapping mapping;
+  const auto signature = world.signature_from({});
+  mapping.add(signature);
+  const ViewId first = mapping.memory.views().front();
+  EXPECT_THROW(mapping.mapper.add(first, OdometryView(signature)), ContractError);
+  EXPECT_THROW(mapping.mapper.add(ViewId{99}, OdometryView(signature)), ContractError);
+  const ViewId next = mapping.memory.append(signature, {.name = "next"});
+  const Pose2 nan{std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0};
+  EXPECT_THROW(mapping.mapper.add(next, OdometryView(signature), nan), ContractError);
+  const OdometryView two_rows(compute_signature(Panorama(2, 256, std::nullopt), 14));
+  EXPECT_THROW(mapping.mapper.add(next, two_rows), ContractError);
+  EXPECT_EQ(mapping.mapper.size(), 1U);
+  EXPECT_THROW(TopologicalMapper(mapping.memory, {.step_deviation = -1.0}), OptionError);
+  EXPECT_THROW(TopologicalMapper(mapping.memory, {}, {}, {.candidates = 0}), OptionError);
+}
+
+}  // namespace
+}  // namespace panonav
