@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "homing/cylinder_world.hpp"
+#include "mapping/round_room.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/motion/odometry.hpp"
@@ -17,10 +17,11 @@ namespace panonav {
 namespace {
 
 constexpr double radius_m = 4.0;
+constexpr int round = 110;  // views
 const VisualOdometryOptions in_metres{.scale_m = radius_m};
 
 VisualMemory empty_memory() {
-  return {{1, 14}, 0.5F, std::nullopt};
+  return {{test::RoundRoom::rows, test::RoundRoom::components}, 0.1F, std::nullopt};
 }
 
 /// A mapper with the memory that it looks at.
@@ -36,12 +37,12 @@ struct Mapping {
   }
 };
 
-// Rounds of 7.5 m, looking ahead, with a view every 9 cm.
+// Rounds of 10 m, looking ahead, with a view every 9 cm.
 std::vector<Pose2> rounds(int views) {
   std::vector<Pose2> poses;
   for (int i = 0; i < views; ++i) {
-    const double angle = 2.0 * std::numbers::pi * i / 80.0;
-    poses.push_back({1.2 * std::sin(angle), 1.2 - 1.2 * std::cos(angle), wrap_angle(angle)});
+    const double angle = 2.0 * std::numbers::pi * i / round;
+    poses.push_back({1.6 * std::sin(angle), -1.6 * std::cos(angle), wrap_angle(angle)});
   }
   return poses;
 }
@@ -53,18 +54,19 @@ std::vector<Point2> positions(std::span<const Pose2> poses) {
 }
 
 FourierSignature empty_view() {
-  return compute_signature(Panorama(1, 256, std::nullopt), 14);
+  return compute_signature(Panorama(test::RoundRoom::rows, 96, std::nullopt),
+                           test::RoundRoom::components);
 }
 
 TEST(TopologicalMapper, ClosesTheLoopOfASecondRound) {
-  const test::CylinderWorld world(radius_m, 5);
-  const auto truth = rounds(120);
+  const test::RoundRoom world(radius_m, 5);
+  const auto truth = rounds(round + 40);
   Mapping open({.close_loops = false});
   Mapping closed;
   std::size_t closures = 0;
   for (const Pose2& pose : truth) {
-    open.add(world.signature_from(pose));
-    for (const LoopClosure& closure : closed.add(world.signature_from(pose)).closures) {
+    open.add(world.seen_from(pose));
+    for (const LoopClosure& closure : closed.add(world.seen_from(pose)).closures) {
       const Pose2 error = inverse(inverse(truth[closure.earlier]) * truth[closure.later]) *
                           closure.earlier_from_later;
       EXPECT_LT(std::hypot(error.x_m, error.y_m), 0.6);
@@ -80,78 +82,78 @@ TEST(TopologicalMapper, ClosesTheLoopOfASecondRound) {
   EXPECT_LT(after, before);
   const TopologicalMap map = closed.mapper.map();
   EXPECT_EQ(map.nodes.size(), truth.size());
-  EXPECT_EQ(map.edges.size(), truth.size() - 1 + closures);
+  EXPECT_LE(map.edges.size(), truth.size() - 1 + closures);
+  EXPECT_GT(map.edges.size(), truth.size() - 1 + closures / 2);  // most are not refuted
   EXPECT_EQ(number_of_parts(map), 1U);
 }
 
 TEST(TopologicalMapper, WheelLengthsSetTheScale) {
-  const test::CylinderWorld world(radius_m, 6);
-  const auto truth = rounds(100);
+  const test::RoundRoom world(radius_m, 6);
+  const auto truth = rounds(round + 20);
   const auto steps = steps_between(truth);
   Mapping mapping;
   for (std::size_t i = 0; i < truth.size(); ++i) {
-    mapping.add(world.signature_from(truth[i]),
-                i == 0 ? std::nullopt : std::optional(steps[i - 1]));
+    mapping.add(world.seen_from(truth[i]), i == 0 ? std::nullopt : std::optional(steps[i - 1]));
   }
   mapping.mapper.finish();
   EXPECT_LT(align(positions(mapping.mapper.poses()), positions(truth)).rms_m, 0.15);
 }
 
 TEST(TopologicalMapper, SameViewsGiveTheSameBits) {
-  const test::CylinderWorld world(radius_m, 7);
+  const test::RoundRoom world(radius_m, 7);
   Mapping one;
   Mapping two;
-  for (const Pose2& pose : rounds(100)) {
-    one.add(world.signature_from(pose));
-    two.add(world.signature_from(pose));
+  for (const Pose2& pose : rounds(round + 20)) {
+    one.add(world.seen_from(pose));
+    two.add(world.seen_from(pose));
   }
   EXPECT_EQ(one.mapper.map(), two.mapper.map());
 }
 
 TEST(TopologicalMapper, OneViewTwoViews) {
-  const test::CylinderWorld world(radius_m, 8);
+  const test::RoundRoom world(radius_m, 8);
   Mapping mapping;
   mapping.mapper.finish();
   EXPECT_TRUE(mapping.mapper.map().nodes.empty());
-  EXPECT_TRUE(mapping.add(world.signature_from({})).new_part);
+  EXPECT_TRUE(mapping.add(world.seen_from({})).new_part);
   mapping.mapper.finish();
   EXPECT_EQ(mapping.mapper.map().nodes.size(), 1U);
   EXPECT_TRUE(mapping.mapper.map().edges.empty());
-  EXPECT_FALSE(mapping.add(world.signature_from({0.1, 0.0, 0.0})).new_part);
+  EXPECT_FALSE(mapping.add(world.seen_from({0.1, 0.0, 0.0})).new_part);
   EXPECT_EQ(mapping.mapper.map().edges.size(), 1U);
 }
 
 TEST(TopologicalMapper, EqualViewsStayAtOnePlace) {
-  const test::CylinderWorld world(radius_m, 9);
+  const test::RoundRoom world(radius_m, 9);
   Mapping mapping;
   for (int i = 0; i < 50; ++i) {
-    EXPECT_TRUE(mapping.add(world.signature_from({0.3, 0.1, 0.2})).closures.empty());
+    EXPECT_TRUE(mapping.add(world.seen_from({0.3, 0.1, 0.2})).closures.empty());
   }
   for (const Pose2& pose : mapping.mapper.poses()) {
     EXPECT_NEAR(std::hypot(pose.x_m, pose.y_m), 0.0, 1e-6);
   }
   Mapping keeping({.capture_difference = 0.01});
-  keeping.add(world.signature_from({0.3, 0.1, 0.2}));
-  EXPECT_FALSE(keeping.mapper.is_new(OdometryView(world.signature_from({0.3, 0.1, 0.9}))));
-  EXPECT_TRUE(keeping.mapper.is_new(OdometryView(world.signature_from({0.9, 0.1, 0.2}))));
+  keeping.add(world.seen_from({0.3, 0.1, 0.2}));
+  EXPECT_FALSE(keeping.mapper.is_new(OdometryView(world.seen_from({0.3, 0.1, 0.9}))));
+  EXPECT_TRUE(keeping.mapper.is_new(OdometryView(world.seen_from({0.9, 0.1, 0.2}))));
 }
 
 TEST(TopologicalMapper, WhatNothingConnectsBecomesAPartOfItsOwn) {
-  const test::CylinderWorld world(radius_m, 10);
-  const auto truth = rounds(130);
+  const test::RoundRoom world(radius_m, 10);
+  const auto truth = rounds(round + 60);
   Mapping mapping;
-  for (std::size_t i = 0; i < 60; ++i) mapping.add(world.signature_from(truth[i]));
+  for (std::size_t i = 0; i < 60; ++i) mapping.add(world.seen_from(truth[i]));
   EXPECT_TRUE(mapping.add(empty_view()).new_part);
-  EXPECT_TRUE(mapping.add(world.signature_from(truth[60])).new_part);
+  EXPECT_TRUE(mapping.add(world.seen_from(truth[60])).new_part);
   EXPECT_EQ(number_of_parts(mapping.mapper.map()), 3U);
   EXPECT_EQ(mapping.mapper.map().nodes.back().part, 2U);
   // Wheels bridge what the views do not show.
   Mapping with_wheels;
-  with_wheels.add(world.signature_from(truth[0]));
+  with_wheels.add(world.seen_from(truth[0]));
   EXPECT_FALSE(with_wheels.add(empty_view(), Pose2{0.1, 0.0, 0.0}).new_part);
   EXPECT_EQ(number_of_parts(with_wheels.mapper.map()), 1U);
   // The second round joins the parts again.
-  for (std::size_t i = 61; i < truth.size(); ++i) mapping.add(world.signature_from(truth[i]));
+  for (std::size_t i = 61; i < truth.size(); ++i) mapping.add(world.seen_from(truth[i]));
   mapping.mapper.finish();
   const TopologicalMap map = mapping.mapper.map();
   EXPECT_EQ(number_of_parts(map), 2U);
@@ -159,9 +161,9 @@ TEST(TopologicalMapper, WhatNothingConnectsBecomesAPartOfItsOwn) {
 }
 
 TEST(TopologicalMapper, RefusesWhatHasNoMeaning) {
-  const test::CylinderWorld world(radius_m, 11);
+  const test::RoundRoom world(radius_m, 11);
   Mapping mapping;
-  const auto signature = world.signature_from({});
+  const auto signature = world.seen_from({});
   mapping.add(signature);
   const ViewId first = mapping.memory.views().front();
   EXPECT_THROW(mapping.mapper.add(first, OdometryView(signature)), ContractError);

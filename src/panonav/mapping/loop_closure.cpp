@@ -196,9 +196,11 @@ bool LoopClosureFinder::agree(const LoopClosure& a, const LoopClosure& b,
   const Pose2 across = inverse(a.earlier_from_later) *
                        (inverse(poses[a.earlier]) * poses[b.earlier]) * b.earlier_from_later;
   const Pose2 difference = inverse(along) * across;
-  // Odometry of a metre or two is right to a tenth.
+  // What views leave unexplained shortens the way between them; odometry of a metre or two is
+  // right to a tenth.
   const double allowed_m =
-      options_.return_tolerance * odometry_.scale_m + 0.1 * std::hypot(along.x_m, along.y_m);
+      (options_.return_tolerance + a.residual + b.residual) * odometry_.scale_m +
+      0.1 * std::hypot(along.x_m, along.y_m);
   return std::hypot(difference.x_m, difference.y_m) < allowed_m &&
          std::abs(difference.heading_rad) < options_.heading_tolerance_rad;
 }

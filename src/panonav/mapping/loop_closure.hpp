@@ -20,9 +20,9 @@ struct LoopClosureOptions {
   /// Views nearer than this along the way are no candidates: there is no loop to close.
   double shortest_loop_m = 3.0;
   /// The view explains the candidate up to this share of the energy of both.
-  double most_residual = 0.15;
+  double most_residual = 0.2;
   /// Farther apart, in units of R, the views tell too little.
-  double most_length = 0.5;
+  double most_length = 0.3;
   /// Compass, the way there and the way back agree on the heading.
   double heading_tolerance_rad = 0.15;
   /// The way there and back leave the robot where it was, in units of R.
@@ -36,7 +36,7 @@ struct LoopClosureOptions {
   int sequence = 3;
   /// Drift of the odometry, in metres for each metre, beyond which no closure is believed: counted
   /// from the last closure, and a fifth of it along the rest of the loop. One R comes on top.
-  double most_drift = 0.15;
+  double most_drift = 0.1;
 };
 void visit_options(LoopClosureOptions& options, OptionVisitor& visitor);
 
