@@ -34,10 +34,11 @@ std::vector<Pose2> placed(const RecordedViews& views) {
 }
 
 std::vector<PairVector> all_vectors(const RecordedViews& goals, const RecordedViews& places,
-                                    const FourierHomingOptions& homing, Session& session) {
+                                    const FourierHomingOptions& homing, const std::string& title,
+                                    Session& session) {
   const std::size_t count = places.views.size();
   std::vector<PairVector> vectors(goals.views.size() * count);
-  Progress progress("homing", goals.views.size());
+  Progress progress(title, goals.views.size());
   const std::size_t batch = 4 * static_cast<std::size_t>(session.executor().threads());
   for (std::size_t begin = 0; begin < goals.views.size(); begin += batch) {
     const std::size_t many = std::min(batch, goals.views.size() - begin);
@@ -170,7 +171,7 @@ CatchmentResult survey_catchment(const RecordedViews& goals, const RecordedViews
   for (const Pose2& pose : place_poses) positions.push_back(pose.position());
   result.spacing_m = VoronoiCells(positions).spacing_m();
   if (!(result.spacing_m > 0.0)) throw FileError(name, "has no two places that differ");
-  const auto vectors = all_vectors(goals, places, settings.homing, session);
+  const auto vectors = all_vectors(goals, places, settings.homing, "homing", session);
 
   result.run = settings.run;
   const double near_m = 3.0 * result.spacing_m;
@@ -181,18 +182,30 @@ CatchmentResult survey_catchment(const RecordedViews& goals, const RecordedViews
   result.run.typical_distance_m = result.typical_distance_m;
   if (!settings.longest_step_given) result.run.longest_step_m = 2.0 * result.spacing_m;
   if (!settings.obstacle_given) result.run.obstacle_m = 0.8 * result.spacing_m;
-  const HomingRule known = [&](std::size_t goal, std::size_t place) {
-    const PairVector& found = vectors[goal * place_poses.size() + place];
-    HomeVector vector;
-    vector.xi = static_cast<double>(found.xi);
-    vector.eta = static_cast<double>(found.eta);
-    return vector;
+  const auto surveyed = [&](const std::vector<PairVector>& all) {
+    const HomingRule known = [&](std::size_t goal, std::size_t place) {
+      const PairVector& found = all[goal * place_poses.size() + place];
+      HomeVector vector;
+      vector.xi = static_cast<double>(found.xi);
+      vector.eta = static_cast<double>(found.eta);
+      return vector;
+    };
+    return survey_homing(goal_poses, place_poses, known, result.run, session.executor());
   };
-  result.survey = survey_homing(goal_poses, place_poses, known, result.run, session.executor());
+  result.survey = surveyed(vectors);
   count_pairs(vectors, settings, result);
 
-  const HomingSurvey* const stage = &result.survey;
-  result.final_m = final_distances({&stage, 1}, result.run, session.executor());
+  std::vector<HomingSurvey> staged;
+  for (const int highest : settings.stages) {
+    FourierHomingOptions stage = settings.homing;
+    stage.highest = highest;
+    staged.push_back(surveyed(
+        all_vectors(goals, places, stage, "stage K = " + std::to_string(highest), session)));
+  }
+  std::vector<const HomingSurvey*> stages;
+  for (const HomingSurvey& stage : staged) stages.push_back(&stage);
+  if (stages.empty()) stages.push_back(&result.survey);
+  result.final_m = final_distances(stages, result.run, session.executor());
   for (const double many : {0.0, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0}) {
     result.accepted_m.push_back(many * result.spacing_m);
   }

@@ -28,6 +28,9 @@ struct RecordedViews {
 /// What is asked of two recordings.
 struct CatchmentSettings {
   FourierHomingOptions homing;
+  /// Highest frequency of each stage of a run, which goes on with the next where one stops [S06
+  /// section 5]; empty: one stage, as `homing` says. Averages are always those of `homing`.
+  std::vector<int> stages;
   HomingSurveyOptions run;
   bool typical_distance_given = false;  ///< else learnt from the pairs
   bool longest_step_given = false;      ///< else twice the spacing, as [S06 section 4.4]

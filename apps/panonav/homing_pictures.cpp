@@ -19,8 +19,9 @@ FourierHomingOptions homing_options(const Arguments& arguments, const HomingArgu
                                     int components) {
   FourierHomingOptions options = wanted.homing;
   if (wanted.published) {
-    for (const auto* name : {"highest", "rising", "turn", "gradient", "weights",
-                             "starting_estimates", "vertical_motion"}) {
+    for (const auto* name :
+         {"highest", "rising", "turn", "gradient", "weights", "starting_estimates",
+          "displacement_search", "vertical_motion", "lean"}) {
       if (!arguments.given("homing", name)) continue;
       throw UsageError("--published sets '" + std::string(name) +
                        "' itself; leave one of them out");

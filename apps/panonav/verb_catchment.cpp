@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -23,6 +24,7 @@ struct CatchmentArguments {
   PictureArguments pictures;
   HomingArguments homing;
   CatchmentSettings settings;
+  std::optional<std::string> stages;
   std::optional<std::uint64_t> turn_seed;
   std::optional<int> ahead;
   std::optional<std::string> goal;
@@ -44,6 +46,7 @@ ordered_json as_json(const CatchmentArguments& wanted, const RecordedViews& goal
                     {"up_to_m", wanted.settings.up_to_m ? ordered_json(*wanted.settings.up_to_m)
                                                         : ordered_json()},
                     {"pairs", result.pairs},
+                    {"stages", wanted.stages ? ordered_json(*wanted.stages) : ordered_json()},
                     {"homeward_component", number(result.component)},
                     {"orientation_error_rad", number(result.orientation_error_rad)}};
   auto bins = ordered_json::array();
@@ -182,6 +185,23 @@ std::size_t shown_goal(const CatchmentArguments& wanted, const RecordedViews& go
   return best;
 }
 
+/// Numbers between commas.
+std::vector<int> read_stages(const std::string& text, int most) {
+  std::vector<int> stages;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    int value = 0;
+    const auto [last, error] = std::from_chars(text.data() + begin, text.data() + end, value);
+    if (error != std::errc() || last != text.data() + end || value < 1 || value > most) {
+      throw UsageError("--stages is '" + text + "'; allowed: numbers from 1 to " +
+                       std::to_string(most) + ", components less two, with commas between them");
+    }
+    stages.push_back(value);
+    begin = end + 1;
+  }
+  return stages;
+}
+
 ExitCode catchment(const Arguments& arguments, const CatchmentArguments& wanted, Session& session) {
   if (wanted.ahead && (wanted.current || wanted.report || wanted.goal)) {
     throw UsageError(
@@ -196,6 +216,11 @@ ExitCode catchment(const Arguments& arguments, const CatchmentArguments& wanted,
   }
   CatchmentSettings settings = wanted.settings;
   settings.homing = homing_options(arguments, wanted.homing, wanted.homing.signature.components);
+  if (wanted.stages) {
+    if (wanted.ahead) throw UsageError("--stages are stages of runs, and --ahead makes none");
+    settings.stages =
+        read_stages(*wanted.stages, std::min(62, wanted.homing.signature.components - 2));
+  }
   settings.typical_distance_given = arguments.given("run", "typical_distance_m");
   settings.longest_step_given = arguments.given("run", "longest_step_m");
   settings.obstacle_given = arguments.given("run", "obstacle_m");
@@ -250,6 +275,9 @@ Run declare(Arguments& arguments) {
   arguments.option("--turn-randomly", wanted->turn_seed,
                    "Turn the robot before each current view by a random number of whole columns. "
                    "SEED");
+  arguments.option(
+      "--stages", wanted->stages,
+      "Runs go from coarse to fine: the highest frequency of each stage, as in 2,4,10");
   arguments.option("--ahead", wanted->ahead, 1,
                    "Only compare each view with the one N pictures later: the direction of travel "
                    "where the camera looks along it. Needs no positions");
@@ -273,6 +301,7 @@ Verb catchment_verb() {
           "end within 0.8 of it, and the typical distance of things is learnt from near pairs.",
           "  panonav catchment grid_run --up-to-m 0.3 --turn-randomly 1 --report catchment\n"
           "  panonav catchment monday_run --current tuesday_run --published 5 --json\n"
+          "  panonav catchment grid_run --published 10 --stages 2,4,10\n"
           "  panonav catchment walk_run --ahead 20",
           declare};
 }

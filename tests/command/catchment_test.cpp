@@ -61,6 +61,24 @@ TEST_F(Catchment, CountsAllPairsAndKeepsItsBooks) {
   EXPECT_GE(areas[0]["places"].get<double>(), 1.0) << "who is at home stays there";
 }
 
+TEST_F(Catchment, OneStageIsTheRuleItselfAndStagesAreRunOneAfterTheOther) {
+  const auto plain = answer_of({"catchment", run, "--published", "5", "--json"});
+  const auto one = answer_of({"catchment", run, "--published", "5", "--stages", "5", "--json"});
+  EXPECT_EQ(plain["catchment_areas"], one["catchment_areas"]);
+  const auto coarse = answer_of({"catchment", run, "--published", "1", "--json"});
+  const auto two = answer_of({"catchment", run, "--published", "1", "--stages", "1,5", "--json"});
+  EXPECT_EQ(coarse["homeward_component"], two["homeward_component"]);
+  EXPECT_NE(coarse["catchment_areas"], two["catchment_areas"]);
+}
+
+TEST_F(Catchment, RefusesStagesThatAreNoFrequencies) {
+  for (const std::string wrong : {"", "0", "2,", "a", "2,99", "2;4"}) {
+    const auto result = run_panonav({"catchment", run, "--stages", wrong});
+    EXPECT_EQ(result.exit_code, 2) << wrong;
+    EXPECT_NE(result.err.find("--stages"), std::string::npos) << result.err;
+  }
+}
+
 TEST_F(Catchment, NearPairsOnly) {
   const auto answer = answer_of({"catchment", run, "--up-to-m", "0.1", "--json"});
   EXPECT_EQ(answer["pairs"], 2 * (2 * 5 * 4));
