@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <string>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -39,6 +40,36 @@ Pose2 with_length(const Pose2& step, double length_m) {
 }
 
 }  // namespace
+
+void validate(const TopologicalMap& map) {
+  const auto is_finite = [](const Pose2& pose) {
+    return std::isfinite(pose.x_m) && std::isfinite(pose.y_m) && std::isfinite(pose.heading_rad);
+  };
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+    const MapNode& node = map.nodes[i];
+    if (i > 0 && node.view <= map.nodes[i - 1].view) {
+      throw ContractError("view of node " + std::to_string(i), static_cast<double>(node.view.value),
+                          "larger than that of the node before");
+    }
+    if (!is_finite(node.pose)) {
+      throw ContractError("node " + std::to_string(i), "not finite", "a finite pose");
+    }
+  }
+  for (std::size_t i = 0; i < map.edges.size(); ++i) {
+    const MapEdge& edge = map.edges[i];
+    const std::string name = "edge " + std::to_string(i);
+    const auto is_node = [&](ViewId view) {
+      return std::ranges::binary_search(map.nodes, view, {}, &MapNode::view);
+    };
+    if (edge.a == edge.b || !is_node(edge.a) || !is_node(edge.b)) {
+      throw ContractError(name,
+                          std::to_string(edge.a.value) + " to " + std::to_string(edge.b.value),
+                          "views of two different nodes");
+    }
+    if (!is_finite(edge.a_from_b)) throw ContractError(name, "not finite", "a finite pose");
+    require(edge.weight >= 0.0 && edge.weight <= 1.0, name + ": weight", edge.weight, "0 .. 1");
+  }
+}
 
 std::size_t number_of_parts(const TopologicalMap& map) {
   std::set<std::size_t> parts;

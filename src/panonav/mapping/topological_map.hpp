@@ -39,6 +39,10 @@ struct TopologicalMap {
   friend bool operator==(const TopologicalMap&, const TopologicalMap&) = default;
 };
 
+/// Throws ContractError unless nodes ascend by view, edges join two different nodes of the map, all
+/// poses are finite and weights lie in 0 .. 1.
+void validate(const TopologicalMap& map);
+
 /// How many parts have no common frame.
 [[nodiscard]] std::size_t number_of_parts(const TopologicalMap& map);
 

@@ -11,6 +11,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/storage/chain_tables.hpp"
 #include "panonav/storage/checksum.hpp"
+#include "panonav/storage/map_tables.hpp"
 #include "panonav/storage/memory_file_access.hpp"
 #include "panonav/storage/memory_header.hpp"
 #include "panonav/storage/memory_schema.hpp"
@@ -285,6 +286,7 @@ void MemoryFile::remove(std::span<const ViewId> views) {
       static_cast<void>(statement->bind(1, std::int64_t{view.value}).run());
     }
   }
+  if (has_map_table(database)) forget_in_maps(database, views);
   transaction.commit();
 }
 
@@ -416,6 +418,40 @@ std::vector<std::string> MemoryFile::chain_names() const {
   return panonav::chain_names(database);
 }
 
+void MemoryFile::save_map(std::string_view name, const TopologicalMap& map) {
+  Database& database = implementation_->database;
+  Transaction transaction(database, Transaction::Kind::writing);
+  for (const MapNode& node : map.nodes) {
+    if (!implementation_->contains(node.view)) refuse_view(node.view);
+  }
+  add_map_table(database);
+  write_map(database, name, map);
+  transaction.commit();
+}
+
+std::optional<TopologicalMap> MemoryFile::map(std::string_view name) const {
+  Database& database = implementation_->database;
+  const Transaction reading(database, Transaction::Kind::reading);
+  if (!has_map_table(database)) return std::nullopt;
+  return read_map(database, name);
+}
+
+void MemoryFile::remove_map(std::string_view name) {
+  Database& database = implementation_->database;
+  Transaction transaction(database, Transaction::Kind::writing);
+  if (!has_map_table(database) || !erase_map(database, name)) {
+    throw ContractError("map", std::string(name), "a map of the memory file");
+  }
+  transaction.commit();
+}
+
+std::vector<std::string> MemoryFile::map_names() const {
+  Database& database = implementation_->database;
+  const Transaction reading(database, Transaction::Kind::reading);
+  if (!has_map_table(database)) return {};
+  return panonav::map_names(database);
+}
+
 VisualMemory MemoryFile::load() const {
   Database& database = implementation_->database;
   const MemoryHeader& header = implementation_->header;
@@ -525,6 +561,12 @@ std::vector<MemoryFault> MemoryFile::verify() const {
     if (!has_chain_tables(database)) return;
     verify_chains(database, [&](const std::function<void()>& part) { check(std::nullopt, part); });
   });
+  check(std::nullopt, [&] {
+    if (!has_map_table(database)) return;
+    verify_maps(
+        database, [&](ViewId view) { return views.contains(view); },
+        [&](const std::function<void()>& part) { check(std::nullopt, part); });
+  });
   return faults;
 }
 
@@ -541,6 +583,7 @@ MemoryFileInfo MemoryFile::info() const {
   info.links = count("SELECT count(*) FROM links");
   info.thumbnails = count("SELECT count(*) FROM thumbnails");
   if (has_chain_tables(database)) info.chains = count("SELECT count(*) FROM chains");
+  if (has_map_table(database)) info.maps = count("SELECT count(*) FROM maps");
   info.format_version = static_cast<int>(database.integer("PRAGMA user_version"));
   for (const char* suffix : {"", "-wal"}) {
     std::filesystem::path file = database.path();

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "panonav/homing/snapshot_chain.hpp"
+#include "panonav/mapping/topological_map.hpp"
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav/panorama/picture.hpp"
 #include "panonav/panorama/picture_source.hpp"
@@ -57,6 +58,7 @@ struct MemoryFileInfo {
   std::uint64_t links = 0;
   std::uint64_t thumbnails = 0;
   std::uint64_t chains = 0;
+  std::uint64_t maps = 0;
   std::uint64_t file_bytes = 0;  ///< with what is still in the write-ahead log
   int format_version = 0;
   friend bool operator==(const MemoryFileInfo&, const MemoryFileInfo&) = default;
@@ -89,8 +91,8 @@ class MemoryFile {
   ViewId append(const NewView& view);
   /// All views in one transaction: all or none. Much faster than one by one.
   std::vector<ViewId> append(std::span<const NewView> views);
-  /// Also drops the view's links and thumbnail, in one transaction for all. Throws ContractError
-  /// when there is no such view; then nothing is removed.
+  /// Also drops the view's links and thumbnail and its node in maps, in one transaction for all.
+  /// Throws ContractError when there is no such view; then nothing is removed.
   void remove(std::span<const ViewId> views);
   void set_pose(ViewId view, const std::optional<ReferencePose>& pose);
   /// A second link of the same two views replaces the first. All links in one transaction.
@@ -117,6 +119,17 @@ class MemoryFile {
   void remove_chain(std::string_view name);
   /// Ascending.
   [[nodiscard]] std::vector<std::string> chain_names() const;
+
+  /// Keeps a map under a name, instead of the one that had it. The first map gives the file format
+  /// version 3. Throws ContractError on an empty name, a view that is not in the file, and as
+  /// `validate`.
+  void save_map(std::string_view name, const TopologicalMap& map);
+  /// The same bits; empty when there is no such map.
+  [[nodiscard]] std::optional<TopologicalMap> map(std::string_view name) const;
+  /// Throws ContractError when there is no such map.
+  void remove_map(std::string_view name);
+  /// Ascending.
+  [[nodiscard]] std::vector<std::string> map_names() const;
 
   /// All views and links. Checks every view's checksum and throws FileError at the first fault.
   /// 100,000 views of 80 x 15 take about 0.6 s of processor time.

@@ -53,8 +53,14 @@ constexpr std::array<std::pair<const char*, const char*>, 2> chain_tables{{
      "NOT NULL, elevation_bottom_rad REAL, elevation_top_rad REAL, snapshots INTEGER NOT NULL, "
      "checksum INTEGER NOT NULL) STRICT, WITHOUT ROWID"},
 }};
+// Of version 3; sorted by name it comes after the links.
+constexpr const char* map_table_name = "maps";
+constexpr const char* map_table =
+    "CREATE TABLE maps(name TEXT NOT NULL PRIMARY KEY, nodes BLOB NOT NULL, edges BLOB NOT NULL, "
+    "checksum INTEGER NOT NULL) STRICT, WITHOUT ROWID";
 constexpr int first_version = 1;
 constexpr int version_with_chains = 2;
+constexpr int version_with_maps = 3;
 
 // The second end of a link, so that a view's links are found from either.
 constexpr const char* links_index = "CREATE INDEX links_b ON links(b)";
@@ -166,6 +172,17 @@ void add_chain_tables(Database& database) {
   database.execute(("PRAGMA user_version=" + std::to_string(version_with_chains)).c_str());
 }
 
+bool has_map_table(Database& database) {
+  return database.integer("PRAGMA user_version") >= version_with_maps;
+}
+
+void add_map_table(Database& database) {
+  if (has_map_table(database)) return;
+  add_chain_tables(database);
+  database.execute(map_table);
+  database.execute(("PRAGMA user_version=" + std::to_string(version_with_maps)).c_str());
+}
+
 void require_schema(Database& database) {
   Statement rows(database,
                  "SELECT type, name, sql FROM sqlite_schema WHERE name NOT LIKE 'sqlite\\_%' "
@@ -178,7 +195,11 @@ void require_schema(Database& database) {
   if (has_chain_tables(database)) {
     for (const auto& [name, text] : chain_tables) require_table(name, text);
   }
-  for (const auto& [name, text] : tables) require_table(name, text);
+  const bool maps = has_map_table(database);
+  for (const auto& [name, text] : tables) {
+    if (maps && std::string_view(name) == "settings") require_table(map_table_name, map_table);
+    require_table(name, text);
+  }
   if (!rows.step() || rows.text(1) != "links_b" || rows.text(2) != links_index || rows.step()) {
     database.fail_damaged("the tables are not as they were made");
   }
