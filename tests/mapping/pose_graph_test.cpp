@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <numbers>
 #include <vector>
@@ -133,6 +134,19 @@ TEST(PoseGraph, PartsWithoutAnEdgeBetweenThemStayApart) {
   EXPECT_EQ(nodes[3], (Pose2{5, 5, 0}));
   EXPECT_NEAR(nodes[4].x_m, 6.0, 1e-4);
   EXPECT_NEAR(nodes[4].y_m, 5.0, 1e-4);
+}
+
+TEST(PoseGraph, FixedNodesStay) {
+  const std::vector<PoseEdge> edges{{0, 1, {1.0, 0.0, 0.0}}, {1, 2, {1.0, 0.0, 0.0}}};
+  std::vector<Pose2> nodes{{0, 0, 0}, {5, 1, 0}, {2, 0, 0}};
+  const std::vector<std::uint8_t> fixed{1, 0, 1};
+  optimise_pose_graph(nodes, edges, {}, fixed);
+  EXPECT_EQ(nodes[0], (Pose2{0, 0, 0}));
+  EXPECT_EQ(nodes[2], (Pose2{2, 0, 0}));
+  EXPECT_NEAR(nodes[1].x_m, 1.0, 1e-3);
+  EXPECT_NEAR(nodes[1].y_m, 0.0, 1e-3);
+  const std::vector<std::uint8_t> too_few{1};
+  EXPECT_THROW(optimise_pose_graph(nodes, edges, {}, too_few), ContractError);
 }
 
 TEST(PoseGraph, NothingToDo) {

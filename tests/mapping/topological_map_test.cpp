@@ -75,7 +75,7 @@ TEST(TopologicalMapper, ClosesTheLoopOfASecondRound) {
     }
   }
   closed.mapper.finish();
-  EXPECT_GE(closures, 20U);
+  EXPECT_GE(closures, 8U);
   const double before = shape_difference(positions(open.mapper.poses()), positions(truth)).value;
   const double after = shape_difference(positions(closed.mapper.poses()), positions(truth)).value;
   EXPECT_LT(after, 0.006);

@@ -65,6 +65,9 @@ void visit_options(LoopClosureOptions& options, OptionVisitor& visitor) {
                  .low = 1,
                  .high = 1000},
                 options.sequence);
+  visitor.visit(
+      {.name = "spacing_m", .help = "way between closures that are told", .low = 0.0, .high = 1e6},
+      options.spacing_m);
   visitor.visit({.name = "most_drift",
                  .help = "drift of the odometry for each metre since the last closure",
                  .low = 0.0,
@@ -212,13 +215,14 @@ std::vector<LoopClosure> LoopClosureFinder::find(std::span<const PassedNode> nod
           static_cast<double>(poses.size()), "as many as nodes, and at least one");
   odometry_.scale_m = scale_m;
   const std::size_t here = nodes.size() - 1;
-  // A view may fail a check within a sequence; two in a row end it.
+  // Views may fail a check within a sequence.
   const auto oldest = static_cast<std::size_t>(2 * options_.sequence);
   while (!pending_.empty() && here - pending_.front().closure.later > oldest) pending_.pop_front();
   const auto closure = best_closure(nodes, poses, view);
   if (!closure || !is_in_reach(nodes, poses, *closure) || !is_reciprocal(nodes, poses, *closure)) {
     return {};
   }
+  const bool goes_on = std::ranges::any_of(pending_, &Pending::told);
   pending_.push_back({*closure, false});
   std::vector<Pending*> agreeing;
   for (Pending& pending : pending_) {
@@ -226,11 +230,15 @@ std::vector<LoopClosure> LoopClosureFinder::find(std::span<const PassedNode> nod
   }
   std::vector<LoopClosure> certain;
   if (static_cast<int>(agreeing.size()) < options_.sequence) return certain;
+  const double here_m = nodes[here].way_m;
+  if (goes_on && here_m - closed_way_m_ < options_.spacing_m) return certain;
+  // Where a passage begins, every view of the sequence counts; later the latest does.
   for (Pending* pending : agreeing) {
-    if (!pending->told) certain.push_back(pending->closure);
+    if (goes_on && pending != agreeing.back()) continue;
+    certain.push_back(pending->closure);
     pending->told = true;
   }
-  closed_way_m_ = nodes[here].way_m;
+  closed_way_m_ = here_m;
   return certain;
 }
 

@@ -34,6 +34,8 @@ struct LoopClosureOptions {
   int reciprocal_rank = 5;
   /// So many successive views must have closures that agree with the way between them.
   int sequence = 3;
+  /// Way between closures that are told: closer ones would say nothing new and cost time.
+  double spacing_m = 0.5;
   /// Drift of the odometry, in metres for each metre, beyond which no closure is believed: counted
   /// from the last closure, and a fifth of it along the rest of the loop. One R comes on top.
   double most_drift = 0.1;

@@ -65,14 +65,18 @@ double square(const EdgeError& error) {
 /// The graph with its unknowns, one Gauss-Newton step at a time.
 class Problem {
  public:
-  Problem(std::span<Pose2> nodes, std::span<const PoseEdge> edges) : nodes_(nodes), edges_(edges) {
+  Problem(std::span<Pose2> nodes, std::span<const PoseEdge> edges,
+          std::span<const std::uint8_t> fixed)
+      : nodes_(nodes), edges_(edges) {
+    fixed_.assign(nodes.size(), 0);
+    std::ranges::copy(fixed, fixed_.begin());
     const auto parts = connected_parts(nodes.size(), edges);
-    fixed_.assign(nodes.size(), false);
-    std::size_t next = 0;
-    for (std::size_t i = 0; i < parts.size(); ++i) {
-      if (parts[i] != next) continue;
-      fixed_[i] = true;
-      ++next;
+    std::vector<std::uint8_t> held(nodes.size(), 0);  // by part
+    for (std::size_t i = 0; i < nodes.size(); ++i) held[parts[i]] |= fixed_[i];
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      if (held[parts[i]] != 0) continue;
+      fixed_[i] = 1;
+      held[parts[i]] = 1;
     }
     weights_.assign(edges.size(), 1.0);
   }
@@ -103,7 +107,7 @@ class Problem {
     const Eigen::VectorXd change = solver_.solve(-gradient_);
     double largest = 0.0;
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
-      if (fixed_[i]) continue;
+      if (fixed_[i] != 0) continue;
       const auto at = static_cast<Eigen::Index>(i * unknowns);
       // No heading turns by more than half a radian at once, or the linear model means nothing.
       const double turn = std::clamp(change[at + 2], -0.5, 0.5);
@@ -129,7 +133,7 @@ class Problem {
   void add(std::size_t row, std::size_t column, double value) {
     // Fixed poses keep their equation x = 0; the pattern stays the same.
     if (row < column) std::swap(row, column);
-    if (fixed_[row / unknowns] || fixed_[column / unknowns]) value = 0.0;
+    if (fixed_[row / unknowns] != 0 || fixed_[column / unknowns] != 0) value = 0.0;
     triplets_.emplace_back(static_cast<int>(row), static_cast<int>(column), value);
   }
 
@@ -140,14 +144,14 @@ class Problem {
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
       for (std::size_t u = 0; u < unknowns; ++u) {
         // A part may hang on nothing but edges whose weight has fallen to almost nothing.
-        const double held = fixed_[i] ? 1.0 : 1e-9;
+        const double held = fixed_[i] != 0 ? 1.0 : 1e-9;
         triplets_.emplace_back(static_cast<int>(i * unknowns + u),
                                static_cast<int>(i * unknowns + u), held);
       }
     }
     for (std::size_t i = 0; i < edges_.size(); ++i) add_edge(i);
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
-      if (!fixed_[i]) continue;
+      if (fixed_[i] == 0) continue;
       gradient_.segment<3>(static_cast<Eigen::Index>(i * unknowns)).setZero();
     }
     hessian_.resize(static_cast<Eigen::Index>(size), static_cast<Eigen::Index>(size));
@@ -192,7 +196,7 @@ class Problem {
   std::span<Pose2> nodes_;
   std::span<const PoseEdge> edges_;
   std::vector<double> weights_;
-  std::vector<bool> fixed_;
+  std::vector<std::uint8_t> fixed_;
   bool analysed_ = false;
   std::vector<Triplet> triplets_;
   Eigen::SparseMatrix<double> hessian_;
@@ -220,13 +224,16 @@ void visit_options(PoseGraphOptions& options, OptionVisitor& visitor) {
 }
 
 PoseGraphReport optimise_pose_graph(std::span<Pose2> nodes, std::span<const PoseEdge> edges,
-                                    const PoseGraphOptions& options) {
+                                    const PoseGraphOptions& options,
+                                    std::span<const std::uint8_t> fixed) {
   validate(options);
   check(nodes, edges);
+  require(fixed.empty() || fixed.size() == nodes.size(), "entries of fixed",
+          static_cast<double>(fixed.size()), "none, or as many as nodes");
   PoseGraphReport report;
   report.edge_weights.assign(edges.size(), 1.0);
   if (edges.empty()) return report;
-  Problem problem(nodes, edges);
+  Problem problem(nodes, edges, fixed);
   const double wanted = options.doubt_deviations * options.doubt_deviations;
   const bool doubtful = std::ranges::any_of(edges, &PoseEdge::doubtful);
   // The first steps trust every edge.
@@ -237,7 +244,9 @@ PoseGraphReport optimise_pose_graph(std::span<Pose2> nodes, std::span<const Pose
     const double change = problem.step();
     const bool still = change <= options.settled_m;
     if (std::isinf(scale)) {
-      if (!still && report.iterations < options.most_iterations / 4) continue;
+      // Where edges lose their weight, positions need not be exact.
+      constexpr double nearly_m = 0.05;
+      if (change > nearly_m && report.iterations < options.most_iterations / 4) continue;
       scale = std::max(wanted, problem.weigh(scale));
     } else if (scale > wanted) {
       scale = std::max(wanted, 0.25 * scale);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -24,7 +25,7 @@ struct PoseEdge {
 struct PoseGraphOptions {
   int most_iterations = 40;
   /// The solution is found when no position changes by more.
-  double settled_m = 1e-4;
+  double settled_m = 1e-3;
   /// A doubtful edge counts half when its error is so many standard deviations.
   double doubt_deviations = 5.0;
 };
@@ -40,13 +41,15 @@ struct PoseGraphReport {
 /// Moves `nodes` to where all edges are contradicted least: Gauss-Newton on the sparse normal
 /// equations. Doubtful edges have a robust cost (Geman and McClure), which is approached from the
 /// quadratic one (graduated non-convexity), so that the drift before the first closure does not
-/// speak against it. Nodes without edges and the first node
-/// of each connected part stay where they are. Deterministic. Throws ContractError on an edge to a
+/// speak against it. Nodes without edges, those whose
+/// entry in `fixed` is not 0, and the first node of each connected part without a fixed one stay
+/// where they are. Deterministic. Throws ContractError on an edge to a
 /// node that is not there or to itself, a value that is not finite or a deviation not above 0;
-/// OptionError. Cost: an iteration is about linear in nodes and edges for maps of paths: 10 ms for
-/// 10,000 nodes.
+/// a number of entries in `fixed` that is neither 0 nor that of the nodes; OptionError. Cost: an
+/// iteration is about linear in nodes and edges for maps of paths: 10 ms for 10,000 nodes.
 PoseGraphReport optimise_pose_graph(std::span<Pose2> nodes, std::span<const PoseEdge> edges,
-                                    const PoseGraphOptions& options = {});
+                                    const PoseGraphOptions& options = {},
+                                    std::span<const std::uint8_t> fixed = {});
 
 /// The connected part of each node, numbered from 0 in the order of their first nodes.
 [[nodiscard]] std::vector<std::size_t> connected_parts(std::size_t nodes,

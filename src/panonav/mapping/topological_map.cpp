@@ -27,7 +27,7 @@ constexpr double closure_heading_deviation_rad = 0.01;
 constexpr std::size_t most_known_lengths = 200;
 constexpr double refuted_weight = 0.1;
 // Closures that are right within so many standard deviations do not pull.
-constexpr double pulling_deviations = 1.0;
+constexpr double pulling_deviations = 3.0;
 
 double length(const Pose2& step) {
   return std::hypot(step.x_m, step.y_m);
@@ -191,12 +191,44 @@ void TopologicalMapper::close_loops(const OdometryView& seen, MapUpdate& update)
                       closure_deviation * closure.residual * scale_m + closure_position_deviation_m,
                       closure_turn_deviation * length_m + closure_heading_deviation_rad, true});
     weights_.push_back(1.0);
-    if (edge_tension(edges_.back(), poses_) > pulling_deviations) pulled_ = true;
+  }
+  if (update.closures.empty()) return;
+  changed_ = true;
+  optimise_latest();
+  for (std::size_t i = edges_.size() - update.closures.size(); i < edges_.size(); ++i) {
+    if (edge_tension(edges_[i], poses_) > pulling_deviations) pulled_ = true;
   }
   if (pulled_ && size() >= optimised_size_ + std::max<std::size_t>(1, optimised_size_ / 100)) {
     optimise();
     update.optimised = true;
   }
+}
+
+// Nodes since the closure before move; edges at the end of the list are theirs.
+void TopologicalMapper::optimise_latest() {
+  const std::size_t first = anchored_ + 1;
+  anchored_ = size() - 1;
+  if (first >= size()) return;
+  std::map<std::size_t, std::size_t> number;  // of nodes in the small graph
+  std::vector<Pose2> poses;
+  std::vector<std::uint8_t> fixed;
+  const auto number_of = [&](std::size_t node) {
+    const auto [found, added] = number.try_emplace(node, poses.size());
+    if (added) {
+      poses.push_back(poses_[node]);
+      fixed.push_back(node < first ? 1 : 0);
+    }
+    return found->second;
+  };
+  std::vector<PoseEdge> edges;
+  for (std::size_t i = edges_.size(); i-- > 0 && std::max(edges_[i].a, edges_[i].b) >= first;) {
+    PoseEdge edge = edges_[i];
+    edge.a = number_of(edge.a);
+    edge.b = number_of(edge.b);
+    edges.push_back(edge);
+  }
+  static_cast<void>(optimise_pose_graph(poses, edges, graph_, fixed));
+  for (const auto& [node, at] : number) poses_[node] = poses[at];
 }
 
 void TopologicalMapper::join_parts(const LoopClosure& closure) {
@@ -224,11 +256,12 @@ void TopologicalMapper::optimise() {
   edges_.resize(kept);
   weights_.resize(kept);
   optimised_size_ = size();
+  changed_ = false;
   pulled_ = false;
 }
 
 void TopologicalMapper::finish() {
-  if (pulled_) optimise();
+  if (changed_) optimise();
 }
 
 TopologicalMap TopologicalMapper::map() const {

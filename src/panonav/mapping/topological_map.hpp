@@ -72,9 +72,10 @@ struct MapUpdate {
 };
 
 /// Makes a map from one view after the other: a node for each, linked with the one before by visual
-/// odometry; loops closed by `LoopClosureFinder`; the whole optimised as a pose graph when closures
-/// pull at it and it has grown by a hundredth since the last time, so that the cost of a view
-/// stays small however large the map. Where neither views nor wheels tell the step, a part begins
+/// odometry; loops closed by `LoopClosureFinder`. A closure moves what came since the closure
+/// before to where it fits the older map; where that leaves it contradicted, the whole is optimised
+/// as a pose graph, if it has grown by a hundredth since the last time: so the cost of a view stays
+/// small however large the map. Where neither views nor wheels tell the step, a part begins
 /// that has its own frame; a closure joins it with the others.
 class TopologicalMapper {
  public:
@@ -109,6 +110,7 @@ class TopologicalMapper {
                 MapUpdate& update);
   void close_loops(const OdometryView& seen, MapUpdate& update);
   void join_parts(const LoopClosure& closure);
+  void optimise_latest();
   void optimise();
 
   const VisualMemory* memory_;
@@ -124,7 +126,9 @@ class TopologicalMapper {
   std::vector<KnownLength> known_lengths_;
   std::optional<OdometryView> last_;
   std::size_t optimised_size_ = 0;  // nodes when the map was last optimised
-  bool pulled_ = false;             // by closures since then
+  std::size_t anchored_ = 0;        // the latest node of the closures so far
+  bool changed_ = false;            // by closures since then
+  bool pulled_ = false;             // so much that the latest nodes alone cannot give way
 };
 
 }  // namespace panonav
