@@ -207,7 +207,7 @@ void reproduce_goal_figures(ArenaSurveys& surveys, const std::filesystem::path& 
                             of.shaded(differences, difference_limits),
                             of.vectors(published_homing(highest, s06_iterations)), of.goal_mark(),
                             of.most_alike(differences)));
-    panels.push_back(map_of(k + ": where runs end; yellow: at the goal, black: beyond 40 cm",
+    panels.push_back(map_of(k + ": where runs end; yellow: at the goal, dark: beyond 40 cm",
                             of.shaded(ends, distance_limits), of.border(within(ends, reached_m)),
                             of.goal_mark()));
     along_x.series.push_back(transect(arena, of.position(), differences, true, k));
@@ -233,7 +233,7 @@ void reproduce_goal_figures(ArenaSurveys& surveys, const std::filesystem::path& 
   result.pictures.push_back(
       {"figure_15_areas.png",
        "[S06] figure 15: where runs to this goal end, coarse to fine, by our rule and by expected "
-       "images. Yellow: at the goal; black: beyond 40 cm; orange: the area within 10 cm."});
+       "images. Yellow: at the goal; dark: beyond 40 cm; orange: the area within 10 cm."});
 
   write_plot(folder / "figure_16_transect_x.png", along_x);
   write_plot(folder / "figure_16_transect_y.png", along_y);
