@@ -355,6 +355,38 @@ TEST(FourierHoming, DifferenceIsZeroAtHomeAndGrowsWithTheDistance) {
   EXPECT_EQ(image_difference(home, view_of(Panorama(1, 64, std::nullopt))), 1.0);
 }
 
+// Surroundings that look alike after a quarter turn, but for a little.
+TEST(FourierHoming, ATurnKnownCoarselyTellsAlikeTurnsApart) {
+  int told_apart = 0;
+  for (int trial = 0; trial < 20; ++trial) {
+    Random random(900 + trial);
+    Surroundings around;
+    for (int k = 1; k <= 12; ++k) {
+      around.waves.push_back(
+          {k, 0.0, k % 4 == 0 ? random.uniform(0.05, 0.1) : 0.004, random.uniform(-pi, pi)});
+    }
+    const HomingView home = view_of(around.seen_from(0.0, 0.0, 0.0, 1));
+    const HomingView current = view_of(around.seen_from(0.05, 0.02, 0.3, 1));
+    for (int quarter = -1; quarter <= 2; ++quarter) {
+      const double middle = -0.3 + quarter * 0.5 * pi;
+      const HomeVector near = home_vector_near(home, current, middle, 0.25 * pi);
+      if (near.residual >= 1.0) continue;
+      EXPECT_NEAR(angle_difference(near.heading_rad, middle), 0.0, 0.25 * pi + 0.1);
+      ++told_apart;
+    }
+    const HomeVector right = home_vector_near(home, current, 0.0, 0.25 * pi);
+    EXPECT_NEAR(right.heading_rad, -0.3, 0.1);
+    // Without bounds it is what `home_vector` finds.
+    EXPECT_EQ(home_vector_near(home, current, 1.0, pi).heading_rad,
+              home_vector(home, current).heading_rad);
+  }
+  EXPECT_GE(told_apart, 60);
+  const HomingView one = view_of(random_surroundings(1).seen_from(0, 0, 0, 1));
+  EXPECT_THROW((void)home_vector_near(one, one, NAN, 1.0), ContractError);
+  EXPECT_THROW((void)home_vector_near(one, one, 0.0, 0.0), ContractError);
+  EXPECT_THROW((void)home_vector_near(one, one, 0.0, 1.0, published_homing(3)), ContractError);
+}
+
 TEST(FourierHoming, RefusesViewsThatDoNotFit) {
   const HomingView one = view_of(random_surroundings(1).seen_from(0, 0, 0, 1));
   const HomingView four = view_of(random_surroundings(1).seen_from(0, 0, 0, 4));

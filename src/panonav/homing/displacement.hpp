@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <span>
 
+#include "panonav/homing/turn_correlation.hpp"
+
 namespace panonav {
 
 /// One of the displacements that are tried before the least squares: the present place, or one of
@@ -39,15 +41,15 @@ struct BestDisplacement {
   float turn_rad = 0.0F;  ///< heading of home minus heading of the current view
 };
 
-/// The displacement whose expected image differs least from the home view at its best turn: hs_ei
-/// [S06 section 2.2] in the Fourier domain; far ones must differ a little less than near ones.
-/// `rows` rows of `frequencies` + 1 coefficients each, one row after the other. Cost: for one row
-/// 49 expected images of 8 frequencies, about 15 microseconds; each further row adds as much as a
-/// fifth.
+/// The displacement whose expected image differs least from the home view at its best turn within
+/// the window: hs_ei [S06 section 2.2] in the Fourier domain; far ones must differ a little less
+/// than near ones. `rows` rows of `frequencies` + 1 coefficients each, one row after the other.
+/// Cost: for one row 49 expected images of 8 frequencies, about 15 microseconds; each further row
+/// adds as much as a fifth.
 [[nodiscard]] BestDisplacement best_displacement(std::span<const float> home_a,
                                                  std::span<const float> home_b,
                                                  std::span<const float> current_a,
                                                  std::span<const float> current_b, int rows,
-                                                 int frequencies);
+                                                 int frequencies, const TurnWindow& window = {});
 
 }  // namespace panonav

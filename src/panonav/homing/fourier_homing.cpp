@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <optional>
 #include <span>
 #include <string>
@@ -204,10 +205,11 @@ void over_amplitude(PerFrequency& weights, const PerFrequency& powers, double po
 class PairOfViews {
  public:
   PairOfViews(const HomingView& home, const HomingView& current,
-              const FourierHomingOptions& options, int highest)
+              const FourierHomingOptions& options, int highest, const TurnWindow& window = {})
       : home_(home),
         current_(current),
         options_(options),
+        window_(window),
         rows_(static_cast<std::size_t>(home.rows())),
         highest_(highest),
         // Iterations need one frequency more each [S06 eq. 23-26].
@@ -257,6 +259,7 @@ class PairOfViews {
   const HomingView& home_;
   const HomingView& current_;
   const FourierHomingOptions& options_;
+  TurnWindow window_;
   std::size_t rows_;
   int highest_;
   int known_;
@@ -607,8 +610,9 @@ PairOfViews::Start PairOfViews::search() const {
     turn_row(part(2).subspan(band * stride, stride), part(3).subspan(band * stride, stride),
              ahead_rad);
   }
-  const BestDisplacement best =
-      best_displacement(part(0), part(1), part(2), part(3), static_cast<int>(bands), frequencies);
+  const BestDisplacement best = best_displacement(
+      part(0), part(1), part(2), part(3), static_cast<int>(bands), frequencies,
+      {window_.middle_rad - static_cast<float>(ahead_rad), window_.half_width_rad});
   return {best.displacement, ahead_rad, static_cast<double>(best.turn_rad) + ahead_rad};
 }
 
@@ -667,7 +671,7 @@ HomeVector PairOfViews::result() {
     } else {
       starts = highest_turns(
           correlation_,
-          std::span(turns).first(static_cast<std::size_t>(options_.starting_estimates)));
+          std::span(turns).first(static_cast<std::size_t>(options_.starting_estimates)), window_);
       if (starts == 0) return {};
     }
     Solution best;
@@ -797,6 +801,20 @@ HomeVector home_vector(const HomingView& home, const HomingView& current,
   validate(options);
   check_pair(home, current, options.highest);
   return home_vector_unchecked(home, current, options);
+}
+
+HomeVector home_vector_near(const HomingView& home, const HomingView& current, double heading_rad,
+                            double within_rad, const FourierHomingOptions& options) {
+  validate(options);
+  check_pair(home, current, options.highest);
+  require(std::isfinite(heading_rad), "heading", heading_rad, "finite");
+  require(within_rad > 0.0 && within_rad <= std::numbers::pi, "within", within_rad,
+          "> 0 and <= pi");
+  require(options.turn == TurnEstimate::global, "turn estimate", static_cast<double>(options.turn),
+          "global");
+  return PairOfViews(home, current, options, highest_used(home, current, options.highest),
+                     {static_cast<float>(heading_rad), static_cast<float>(within_rad)})
+      .result();
 }
 
 HomeVector home_vector_unchecked(const HomingView& home, const HomingView& current,

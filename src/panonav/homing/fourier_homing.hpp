@@ -90,6 +90,15 @@ void visit_options(FourierHomingOptions& options, OptionVisitor& visitor);
 [[nodiscard]] HomeVector home_vector(const HomingView& home, const HomingView& current,
                                      const FourierHomingOptions& options = {});
 
+/// The same, but only headings within `within_rad` of `heading_rad` are considered, before least
+/// squares correct them: where something else has told the turn coarsely, as in places that look
+/// alike when turned by a quarter. No heading there that fits better than its neighbours: all zeros
+/// and residual 1. Throws ContractError also unless 0 < within_rad <= pi and the turn estimate is
+/// global.
+[[nodiscard]] HomeVector home_vector_near(const HomingView& home, const HomingView& current,
+                                          double heading_rad, double within_rad,
+                                          const FourierHomingOptions& options = {});
+
 /// The same with options already checked, for loops.
 [[nodiscard]] HomeVector home_vector_unchecked(const HomingView& home, const HomingView& current,
                                                const FourierHomingOptions& options);

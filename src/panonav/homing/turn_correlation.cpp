@@ -108,7 +108,8 @@ float sequential_turn(const TurnCorrelation& correlation) noexcept {
   return correlation.at(opposite) > correlation.at(first) ? opposite : first;
 }
 
-int highest_turns(const TurnCorrelation& correlation, std::span<float> turns) noexcept {
+int highest_turns(const TurnCorrelation& correlation, std::span<float> turns,
+                  const TurnWindow& window) noexcept {
   std::size_t count = 16;
   while (count < 8 * static_cast<std::size_t>(correlation.highest)) count *= 2;
   const std::size_t stride = most_points / count;
@@ -141,6 +142,7 @@ int highest_turns(const TurnCorrelation& correlation, std::span<float> turns) no
   for (std::size_t i = 0; i < count; ++i) {
     const float value = real[i];
     if (!(value > real[(i + count - 1) % count] && value >= real[(i + 1) % count])) continue;
+    if (!window.contains(2.0F * pi * static_cast<float>(i) / static_cast<float>(count))) continue;
     std::size_t at = std::min(found, wanted);
     while (at > 0 && peaks[at - 1].value < value) --at;
     if (at >= wanted) continue;

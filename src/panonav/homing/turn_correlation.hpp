@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <span>
 
 namespace panonav {
@@ -16,15 +17,25 @@ struct TurnCorrelation {
   [[nodiscard]] float at(float turn_rad) const noexcept;
 };
 
+/// The headings that count: within `half_width_rad` of `middle_rad`; all by default.
+struct TurnWindow {
+  float middle_rad = 0.0F;
+  float half_width_rad = 4.0F;
+
+  [[nodiscard]] bool contains(float turn_rad) const noexcept {
+    return std::abs(std::remainder(turn_rad - middle_rad, 6.2831853F)) <= half_width_rad;
+  }
+};
+
 /// The heading of S06's sequential rule [S06 eq. 40-43, sign of eq. 41 corrected; with the second
 /// start at the opposite heading where the first weight is below a tenth of the mean]. In radians,
 /// not wrapped.
 [[nodiscard]] float sequential_turn(const TurnCorrelation& correlation) noexcept;
 
-/// Fills `turns` with the headings of the highest local maxima, highest first, and returns how many
-/// there are; 0 when the correlation is zero everywhere. Eight points per period of the highest
-/// frequency are evaluated and the best refined by Newton's rule.
-[[nodiscard]] int highest_turns(const TurnCorrelation& correlation,
-                                std::span<float> turns) noexcept;
+/// Fills `turns` with the headings of the highest local maxima within the window, highest first,
+/// and returns how many there are; 0 when the correlation is zero everywhere. Eight points per
+/// period of the highest frequency are evaluated and the best refined by Newton's rule.
+[[nodiscard]] int highest_turns(const TurnCorrelation& correlation, std::span<float> turns,
+                                const TurnWindow& window = {}) noexcept;
 
 }  // namespace panonav

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace panonav {
+
+/// What a pair of views says of the curve: how different they look, and how far apart they lie in
+/// the arrangement so far.
+struct DissimilarityAtDistance {
+  double dissimilarity = 0.0;
+  double distance = 0.0;
+};
+
+/// Distance between two places read from the dissimilarity of their views, with its error [M04
+/// figures 7 and 12]. Distances are in the unit of the arrangement that it was fitted to.
+/// Invariant: rising (not strictly) with the dissimilarity, nowhere negative.
+class DissimilarityCurve {
+ public:
+  /// Proportional: distance = dissimilarity * slope, known without error and without end. What one
+  /// starts with, before there is an arrangement. Throws ContractError unless slope is finite and >
+  /// 0.
+  explicit DissimilarityCurve(double slope);
+
+  /// The mean distance of pairs that look so different, by isotonic regression over groups of
+  /// pairs of about equal dissimilarity, and the root mean square of what it misses there. Below
+  /// the first group the curve is straight down to zero at dissimilarity 0. `level`: dissimilarity
+  /// of far views, where the curve is flat; correlation ends at 95 % of it. Throws ContractError on
+  /// no pairs, or values that are not finite and >= 0. Cost: n log n.
+  DissimilarityCurve(std::span<const DissimilarityAtDistance> pairs, double level);
+
+  [[nodiscard]] double distance(double dissimilarity) const;
+  /// E of [M04 eq. 5]: root mean square error of a distance read as `distance`; rising with it.
+  [[nodiscard]] double error(double distance) const;
+  /// x_1 of [M04 eq. 5]: the largest distance that can be read. Views that look more different than
+  /// `largest_dissimilarity` have nothing to do with each other.
+  [[nodiscard]] double range() const noexcept { return range_; }
+  [[nodiscard]] double largest_dissimilarity() const noexcept { return largest_dissimilarity_; }
+  /// K of [M04 eq. 5]: stiffness of a spring of this rest length, 1 .. 0 and 0.1 at `range`.
+  [[nodiscard]] double stiffness(double distance) const;
+
+  /// For pictures: dissimilarity, distance and error at the knots.
+  struct Knot {
+    double dissimilarity = 0.0;
+    double distance = 0.0;
+    double error = 0.0;
+  };
+  [[nodiscard]] std::span<const Knot> knots() const& noexcept { return knots_; }
+  std::span<const Knot> knots() const&& = delete;  // would dangle
+
+ private:
+  std::vector<Knot> knots_;  // ascending in all three; the first one is 0
+  double range_ = 0.0;
+  double largest_dissimilarity_ = 0.0;
+};
+
+}  // namespace panonav

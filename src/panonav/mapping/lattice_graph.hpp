@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "panonav/geometry/pose2.hpp"
+
+namespace panonav {
+
+/// A way between two nodes, usable both ways.
+struct GraphEdge {
+  std::size_t a = 0;
+  std::size_t b = 0;
+  double length = 1.0;  ///< >= 0
+};
+
+/// Nodes with their edges, for walking along them.
+class LatticeGraph {
+ public:
+  /// Throws ContractError on a node that is not below `nodes` or a length below 0.
+  LatticeGraph(std::size_t nodes, std::span<const GraphEdge> edges);
+
+  struct Neighbour {
+    std::size_t node;
+    std::size_t edge;  ///< its place among the edges given
+    double length;
+  };
+  [[nodiscard]] std::size_t size() const noexcept { return begins_.size() - 1; }
+  [[nodiscard]] std::span<const Neighbour> neighbours(std::size_t node) const {
+    return std::span(neighbours_).subspan(begins_[node], begins_[node + 1] - begins_[node]);
+  }
+
+  /// Number of each node's part: nodes that edges connect. Parts are numbered by size, the largest
+  /// first, then by their first node.
+  [[nodiscard]] std::vector<std::size_t> parts() const;
+
+  /// Length of the shortest way from `from` to every node, infinite where there is none (Dijkstra).
+  [[nodiscard]] std::vector<double> shortest_ways(std::size_t from) const;
+
+ private:
+  std::vector<std::size_t> begins_;
+  std::vector<Neighbour> neighbours_;
+};
+
+/// For each of `points` the `count` nearest other ones, nearest first, ties by index. Points that
+/// are not in the same `group` do not count. Cost: n sqrt(n) count for points in a square.
+[[nodiscard]] std::vector<std::vector<std::size_t>> nearest_points(
+    std::span<const Point2> points, std::span<const std::size_t> group, std::size_t count);
+
+}  // namespace panonav

@@ -1,0 +1,120 @@
+#include "panonav/mapping/lattice_springs.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "panonav/geometry/angles.hpp"
+#include "panonav/mapping/lattice_graph.hpp"
+#include "panonav/signature/dissimilarity.hpp"
+
+namespace panonav {
+
+namespace {
+
+// Answers of two views that differ by more say nothing. Unrelated views agree so well in direction
+// and turn by chance once in 16 times.
+constexpr double kAgreement = 0.25 * std::numbers::pi;
+// Three turns that should cancel; three displacements, relative to the longest.
+constexpr double kTurnsCancel = 10.0 * std::numbers::pi / 180.0;
+constexpr double kWaysCancel = 0.5;
+
+/// Displacement and turn of the spring from one of its ends.
+Pose2 step_from(std::size_t from, const LatticeSpring& spring) {
+  const PhaseReading& phases = *spring.phases;
+  const bool forward = from == spring.a;
+  const double direction = forward ? phases.direction_a_rad : phases.direction_b_rad;
+  return {spring.length * std::cos(direction), spring.length * std::sin(direction),
+          forward ? phases.turn_rad : wrap_angle(-phases.turn_rad)};
+}
+
+bool has_direction(const LatticeSpring& spring) {
+  return spring.phases && spring.phases->points;
+}
+
+}  // namespace
+
+SpringViews::SpringViews(const VisualMemory& memory, const LatticeOptions& options)
+    : memory_(&memory), components_(options.components) {
+  for (const ViewId view : memory.views()) {
+    packed_.push_back(memory.packed(view));
+    if (!options.phases) continue;
+    const HomingView seen = homing_view(memory.signature(view));
+    homing_.push_back(components_ > 0 ? first_components(seen, components_) : seen);
+  }
+}
+
+std::vector<NodePair> SpringViews::most_alike(const LatticeOptions& options,
+                                              Executor& executor) const {
+  const auto views = memory_->views();
+  std::vector<std::vector<NodePair>> found(views.size());
+  executor.for_chunks(views.size(), 16, [&](std::size_t begin, std::size_t end, std::size_t) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto answer = memory_->search(packed_[i], {options.neighbours, components_},
+                                          {.excluded_views = views.subspan(i, 1)});
+      for (const Match& match : answer.matches) {
+        const auto j =
+            static_cast<std::size_t>(std::ranges::lower_bound(views, match.view) - views.begin());
+        found[i].push_back(std::minmax(i, j));
+      }
+    }
+  });
+  std::vector<NodePair> pairs;
+  for (const auto& some : found) pairs.insert(pairs.end(), some.begin(), some.end());
+  std::ranges::sort(pairs);
+  pairs.erase(std::ranges::unique(pairs).begin(), pairs.end());
+  return pairs;
+}
+
+double SpringViews::dissimilarity(NodePair pair) const {
+  return dissimilarity_packed(packed_[pair.first], packed_[pair.second], components_);
+}
+
+LatticeSpring SpringViews::measure(NodePair pair, const std::optional<TurnHint>& hint) const {
+  LatticeSpring spring{.a = pair.first, .b = pair.second, .dissimilarity = dissimilarity(pair)};
+  if (!homing_.empty()) spring.phases = read_phases(homing_[spring.a], homing_[spring.b], hint);
+  return spring;
+}
+
+bool agrees(const LatticeSpring& spring) {
+  if (!spring.phases) return true;
+  return spring.phases->disagreement_rad <= kAgreement &&
+         spring.phases->turn_disagreement_rad <= kAgreement;
+}
+
+std::vector<unsigned char> closes_triangle(std::size_t nodes,
+                                           std::span<const LatticeSpring> springs) {
+  std::vector<GraphEdge> edges;
+  for (const auto& spring : springs) edges.push_back({spring.a, spring.b, spring.length});
+  const LatticeGraph graph(nodes, edges);
+  std::vector<unsigned char> closes(springs.size());
+  std::vector<std::size_t> spring_to(nodes, springs.size());  // from the node at hand
+  for (std::size_t a = 0; a < nodes; ++a) {
+    for (const auto& n : graph.neighbours(a)) spring_to[n.node] = n.edge;
+    for (const auto& n : graph.neighbours(a)) {
+      const LatticeSpring& ab = springs[n.edge];
+      if (n.node < a || !has_direction(ab) || closes[n.edge] != 0) continue;
+      const Pose2 to_b = step_from(a, ab);
+      for (const auto& m : graph.neighbours(n.node)) {
+        if (m.node == a || spring_to[m.node] == springs.size()) continue;
+        const LatticeSpring& bc = springs[m.edge];
+        const LatticeSpring& ac = springs[spring_to[m.node]];
+        if (!has_direction(bc) || !has_direction(ac)) continue;
+        const Pose2 by_b = to_b * step_from(n.node, bc);
+        const Pose2 straight = step_from(a, ac);
+        const double longest = std::max({ab.length, bc.length, ac.length});
+        if (std::abs(angle_difference(by_b.heading_rad, straight.heading_rad)) <= kTurnsCancel &&
+            distance(by_b.position(), straight.position()) <= kWaysCancel * longest) {
+          closes[n.edge] = 1;
+          closes[m.edge] = 1;
+          closes[spring_to[m.node]] = 1;
+          break;
+        }
+      }
+    }
+    for (const auto& n : graph.neighbours(a)) spring_to[n.node] = springs.size();
+  }
+  return closes;
+}
+
+}  // namespace panonav

@@ -1,0 +1,240 @@
+// The parts of the lattice: curve, graph, solver.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/geometry/alignment.hpp"
+#include "panonav/mapping/dissimilarity_curve.hpp"
+#include "panonav/mapping/lattice_graph.hpp"
+#include "panonav/mapping/lattice_solver.hpp"
+
+namespace panonav {
+namespace {
+
+TEST(DissimilarityCurve, FindsTheCurveThatPairsFollow) {
+  Random random(1);
+  std::vector<DissimilarityAtDistance> pairs;
+  const auto truth = [](double distance) { return 100.0 * (1.0 - std::exp(-distance)); };
+  for (int i = 0; i < 4000; ++i) {
+    const double distance = random.uniform(0.0, 2.0);
+    pairs.push_back({truth(distance), distance});
+  }
+  const DissimilarityCurve curve(pairs, 80.0);
+  for (const double distance : {0.1, 0.5, 1.0, 1.8}) {
+    EXPECT_NEAR(curve.distance(truth(distance)), distance, 0.02) << distance;
+  }
+  EXPECT_NEAR(curve.largest_dissimilarity(), 76.0, 1e-9);
+  EXPECT_NEAR(curve.range(), -std::log(0.24), 0.02);
+  EXPECT_EQ(curve.distance(0.0), 0.0);
+}
+
+TEST(DissimilarityCurve, RisesWithErrorAndStiffnessAsInEquation5) {
+  Random random(2);
+  std::vector<DissimilarityAtDistance> pairs;
+  for (int i = 0; i < 3000; ++i) {
+    const double distance = random.uniform(0.0, 3.0);
+    pairs.push_back(
+        {std::max(0.0, distance + random.normal(0.0, 0.05 + 0.2 * distance)), distance});
+  }
+  const DissimilarityCurve curve(pairs, 2.5);
+  double distance = 0.0;
+  double error = 0.0;
+  double stiffness = 1.0;
+  for (double d = 0.0; d < 4.0; d += 0.05) {
+    EXPECT_GE(curve.distance(d), distance);
+    distance = curve.distance(d);
+    EXPECT_GE(curve.error(distance), error);
+    error = curve.error(distance);
+    EXPECT_LE(curve.stiffness(distance), stiffness);
+    stiffness = curve.stiffness(distance);
+    EXPECT_NEAR(stiffness, std::exp(std::log(0.1) * error / curve.error(curve.range())), 1e-12);
+  }
+  EXPECT_NEAR(curve.stiffness(curve.range()), 0.1, 1e-12);
+  EXPECT_EQ(curve.stiffness(0.0), 1.0);
+}
+
+TEST(DissimilarityCurve, TakesWhatHasNoExtent) {
+  const std::vector<DissimilarityAtDistance> equal(5, DissimilarityAtDistance{0.0, 0.0});
+  const DissimilarityCurve curve(equal, 0.0);
+  EXPECT_EQ(curve.distance(0.0), 0.0);
+  EXPECT_EQ(curve.stiffness(0.0), 1.0);
+  EXPECT_NEAR(DissimilarityCurve(0.5).distance(3.0), 1.5, 1e-9);
+}
+
+TEST(DissimilarityCurve, RefusesWhatIsNoNumber) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW((void)DissimilarityCurve({}, 1.0), ContractError);
+  EXPECT_THROW((void)DissimilarityCurve{0.0}, ContractError);
+  EXPECT_THROW((void)DissimilarityCurve{nan}, ContractError);
+  const std::vector<DissimilarityAtDistance> wrong{{nan, 1.0}};
+  EXPECT_THROW((void)DissimilarityCurve(wrong, 1.0), ContractError);
+}
+
+TEST(LatticeGraph, PartsAndWays) {
+  const std::vector<GraphEdge> edges{{5, 6, 1.0}, {0, 1, 1.0}, {1, 2, 2.0}, {0, 2, 4.0}};
+  const LatticeGraph graph(7, edges);
+  EXPECT_EQ(graph.parts(), (std::vector<std::size_t>{0, 0, 0, 2, 3, 1, 1}));
+  const auto ways = graph.shortest_ways(0);
+  EXPECT_EQ(ways[2], 3.0);
+  EXPECT_TRUE(std::isinf(ways[5]));
+  EXPECT_THROW(LatticeGraph(2, edges), ContractError);
+}
+
+TEST(LatticeGraph, NearestPointsAreThoseOfAFullScan) {
+  Random random(3);
+  std::vector<Point2> points;
+  std::vector<std::size_t> group;
+  for (int i = 0; i < 200; ++i) {
+    points.push_back({random.uniform(0.0, 3.0), random.uniform(0.0, 2.0)});
+    group.push_back(random.index(3));
+  }
+  points.push_back(points.front());  // one twice
+  group.push_back(group.front());
+  const auto found = nearest_points(points, group, 5);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    std::vector<std::pair<double, std::size_t>> all;
+    for (std::size_t j = 0; j < points.size(); ++j) {
+      if (j != i && group[j] == group[i]) all.emplace_back(distance(points[i], points[j]), j);
+    }
+    std::ranges::sort(all);
+    ASSERT_EQ(found[i].size(), 5U);
+    for (std::size_t k = 0; k < 5; ++k) EXPECT_EQ(found[i][k], all[k].second);
+  }
+}
+
+struct World {
+  std::vector<Pose2> truth;
+  std::vector<SpringTerm> springs;
+};
+
+/// Poses at random, with exact springs between all that are near.
+World random_world(std::uint64_t seed, bool directions) {
+  Random random(seed);
+  World world;
+  for (int i = 0; i < 40; ++i) {
+    world.truth.push_back({random.uniform(0.0, 4.0), random.uniform(0.0, 3.0),
+                           random.uniform(-std::numbers::pi, std::numbers::pi)});
+  }
+  for (std::size_t a = 0; a < world.truth.size(); ++a) {
+    for (std::size_t b = a + 1; b < world.truth.size(); ++b) {
+      const Pose2 step = inverse(world.truth[a]) * world.truth[b];
+      const Pose2 back = inverse(world.truth[b]) * world.truth[a];
+      const double length = std::hypot(step.x_m, step.y_m);
+      if (length > 1.5) continue;
+      SpringTerm spring{.a = a, .b = b, .length = length, .length_deviation = 0.05};
+      if (directions) {
+        spring.direction =
+            SpringDirection{std::atan2(step.y_m, step.x_m), std::atan2(back.y_m, back.x_m), 0.05};
+        spring.turn = SpringTurn{step.heading_rad, 0.02};
+      }
+      world.springs.push_back(spring);
+    }
+  }
+  return world;
+}
+
+std::vector<Pose2> shaken(const World& world, std::uint64_t seed, double by) {
+  Random random(seed);
+  auto poses = world.truth;
+  for (Pose2& pose : poses) {
+    pose.x_m += random.normal(0.0, by);
+    pose.y_m += random.normal(0.0, by);
+    pose.heading_rad = wrap_angle(pose.heading_rad + random.normal(0.0, by));
+  }
+  return poses;
+}
+
+double rms_to_truth(const World& world, const std::vector<Pose2>& poses) {
+  std::vector<Point2> truth;
+  std::vector<Point2> found;
+  for (const Pose2& pose : world.truth) truth.push_back(pose.position());
+  for (const Pose2& pose : poses) found.push_back(pose.position());
+  return align(found, truth).rms_m;
+}
+
+TEST(LatticeSolver, ExactSpringsGiveTheTruth) {
+  for (const bool directions : {false, true}) {
+    const World world = random_world(4, directions);
+    ASSERT_GT(world.springs.size(), 100U);
+    auto poses = shaken(world, 5, 0.1);
+    ASSERT_GT(rms_to_truth(world, poses), 0.05);
+    const auto solution = solve_lattice(world.springs, poses);
+    EXPECT_LT(rms_to_truth(world, poses), 1e-4);
+    EXPECT_LT(solution.energy, 1e-3);
+    for (const double weight : solution.weights) EXPECT_GT(weight, 0.99);
+  }
+}
+
+TEST(LatticeSolver, GivesUpSpringsThatContradictTheOthers) {
+  World world = random_world(6, true);
+  const std::size_t right = world.springs.size();
+  Random random(7);
+  for (int i = 0; i < 60; ++i) {
+    const auto a = static_cast<std::size_t>(random.index(20));
+    const auto b = 20 + static_cast<std::size_t>(random.index(20));
+    if (distance(world.truth[a].position(), world.truth[b].position()) < 1.5) continue;
+    world.springs.push_back(
+        {.a = a,
+         .b = b,
+         .length = 0.3,
+         .length_deviation = 0.05,
+         .direction = SpringDirection{random.uniform(-3.0, 3.0), random.uniform(-3.0, 3.0), 0.05},
+         .turn = SpringTurn{random.uniform(-3.0, 3.0), 0.02}});
+  }
+  ASSERT_GT(world.springs.size(), right + 20);
+  auto poses = shaken(world, 8, 0.1);
+  const auto solution = solve_lattice(world.springs, poses);
+  EXPECT_LT(rms_to_truth(world, poses), 0.01);
+  for (std::size_t s = 0; s < world.springs.size(); ++s) {
+    if (s < right) {
+      EXPECT_GT(solution.weights[s], 0.9);
+    } else {
+      EXPECT_LT(solution.weights[s], 0.1);
+    }
+  }
+}
+
+TEST(LatticeSolver, PosesThatMayNotMoveStay) {
+  const World world = random_world(9, true);
+  auto poses = shaken(world, 10, 0.05);
+  std::vector<unsigned char> moving(poses.size(), 0);
+  moving[3] = 1;
+  auto fixed = world.truth;
+  fixed[3] = poses[3];
+  static_cast<void>(solve_lattice(world.springs, fixed, moving));
+  for (std::size_t i = 0; i < fixed.size(); ++i) {
+    EXPECT_NEAR(distance(fixed[i].position(), world.truth[i].position()), 0.0, i == 3 ? 1e-5 : 0.0);
+  }
+}
+
+TEST(LatticeSolver, SpringsWithoutLengthOrOnTheSpotDoNoHarm) {
+  std::vector<Pose2> poses(3);
+  const std::vector<SpringTerm> springs{{.a = 0, .b = 1, .length = 0.0, .length_deviation = 0.1},
+                                        {.a = 1, .b = 2, .length = 1.0, .length_deviation = 0.1}};
+  static_cast<void>(solve_lattice(springs, poses));
+  EXPECT_NEAR(distance(poses[0].position(), poses[1].position()), 0.0, 1e-4);
+  EXPECT_NEAR(distance(poses[1].position(), poses[2].position()), 1.0, 1e-4);
+}
+
+TEST(LatticeSolver, RefusesWhatIsOutOfRange) {
+  std::vector<Pose2> poses(2);
+  const auto refused = [&](const SpringTerm& spring) {
+    EXPECT_THROW((void)solve_lattice(std::vector{spring}, poses), ContractError);
+  };
+  refused({.a = 0, .b = 2});
+  refused({.a = 1, .b = 1});
+  refused({.a = 0, .b = 1, .length = -1.0});
+  refused({.a = 0, .b = 1, .length_deviation = 0.0});
+  refused({.a = 0, .b = 1, .turn = SpringTurn{std::nan(""), 0.1}});
+  poses[0].x_m = std::nan("");
+  EXPECT_THROW((void)solve_lattice({}, poses), ContractError);
+}
+
+}  // namespace
+}  // namespace panonav

@@ -1,0 +1,274 @@
+#include "panonav/mapping/lattice.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "localisation/ray_cast_room.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/alignment.hpp"
+#include "panonav/geometry/angles.hpp"
+
+namespace panonav {
+namespace {
+
+constexpr testing::RoomKind kRoom{.width_m = 6.0, .depth_m = 5.0, .boxes = 3, .contrast = 0.2};
+
+/// A memory of every free place of a grid in the middle of a room, in random headings.
+struct Place {
+  testing::Room room;
+  std::vector<Pose2> poses;
+  VisualMemory memory;
+
+  Place(std::uint64_t seed, double step_m) : room(seed, kRoom), memory(remember(seed, step_m)) {}
+
+ private:
+  VisualMemory remember(std::uint64_t seed, double step_m) {
+    Random random(seed, 1);
+    std::vector<FourierSignature> signatures;
+    std::vector<std::optional<ReferencePose>> known;
+    for (double x = 1.5; x < 4.6; x += step_m) {
+      for (double y = 1.3; y < 3.8; y += step_m) {
+        if (!room.is_free({x, y})) continue;
+        poses.push_back({x, y, random.uniform(-std::numbers::pi, std::numbers::pi)});
+        signatures.push_back(compute_signature(room.see(poses.back(), 24, 128)));
+        known.push_back(ReferencePose{x, y, poses.back().heading_rad});
+      }
+    }
+    return testing::make_memory(signatures, known);
+  }
+};
+
+std::vector<Point2> positions_of(const Lattice& lattice) {
+  std::vector<Point2> points;
+  for (const auto& node : lattice.nodes) points.push_back(node.pose.position());
+  return points;
+}
+
+std::vector<Point2> true_positions(const VisualMemory& memory) {
+  std::vector<Point2> points;
+  for (const ViewId view : memory.views()) points.push_back(memory.info(view).pose->position());
+  return points;
+}
+
+Lattice arrange(const VisualMemory& memory, const LatticeOptions& options = {},
+                const std::vector<CoarseMotion>& motion = {}, int threads = 1) {
+  Executor executor(threads);
+  return panonav::arrange(memory, options, motion, executor);
+}
+
+/// Views of some of the room's places, once more from scratch.
+VisualMemory memory_of(const std::vector<FourierSignature>& signatures) {
+  return testing::make_memory(
+      signatures, std::vector<std::optional<ReferencePose>>(signatures.size(), std::nullopt));
+}
+
+FourierSignature seen(const testing::Room& room, const Pose2& pose) {
+  return compute_signature(room.see(pose, 24, 128));
+}
+
+std::vector<Point2> inner_grid(const testing::Room& room, double step_m) {
+  std::vector<Point2> points;
+  for (const Point2 p : room.grid(step_m)) {
+    if (p.x_m > 1.2 && p.x_m < 4.8 && p.y_m > 1.2 && p.y_m < 3.8) points.push_back(p);
+  }
+  return points;
+}
+
+double median_of(std::vector<double> values) {
+  std::ranges::sort(values);
+  return values.at(values.size() / 2);
+}
+
+TEST(Lattice, UnorderedViewsArrangeThemselvesLikeTheirRoom) {
+  std::vector<double> differences;
+  std::vector<double> heading_errors;
+  for (const std::uint64_t seed : {1U, 2U, 3U, 4U, 5U}) {
+    const Place place(seed, 0.3);
+    ASSERT_GT(place.memory.size(), 60U);
+    const Lattice lattice = arrange(place.memory);
+    ASSERT_EQ(lattice.nodes.size(), place.memory.size());
+    ASSERT_EQ(lattice.parts.size(), 1U);
+    EXPECT_TRUE(lattice.parts[0].handedness_known);
+    EXPECT_FALSE(lattice.metric);
+    // No mirror image is allowed: directions tell which one it is.
+    const auto truth = true_positions(place.memory);
+    differences.push_back(shape_difference(positions_of(lattice), truth).value);
+    // Headings come with it, up to the frame.
+    const Alignment turned = align(positions_of(lattice), truth, {.allow_scale = true});
+    std::vector<double> errors;
+    for (const auto& node : lattice.nodes) {
+      errors.push_back(std::abs(angle_difference(node.pose.heading_rad + turned.rotation_rad,
+                                                 *place.memory.info(node.view).pose->heading_rad)));
+    }
+    heading_errors.push_back(median_of(errors));
+  }
+  EXPECT_LT(median_of(differences), 0.02);
+  EXPECT_LT(median_of(heading_errors), radians(5.0));
+}
+
+TEST(Lattice, OrderOfViewsAndTheirPosesDoNotMatter) {
+  const Place place(4, 0.4);
+  std::vector<FourierSignature> signatures;
+  std::vector<Point2> truth;
+  for (const ViewId view : place.memory.views()) {
+    signatures.push_back(place.memory.signature(view));
+    truth.push_back(place.memory.info(view).pose->position());
+  }
+  std::ranges::reverse(signatures);
+  std::ranges::reverse(truth);
+  const Lattice lattice = arrange(memory_of(signatures));
+  EXPECT_LT(shape_difference(positions_of(lattice), truth).value, 0.03);
+}
+
+TEST(Lattice, SameBitsOnAnyNumberOfThreads) {
+  const Place place(5, 0.5);
+  const Lattice one = arrange(place.memory);
+  const Lattice three = arrange(place.memory, {}, {}, 3);
+  ASSERT_EQ(one.nodes.size(), three.nodes.size());
+  for (std::size_t i = 0; i < one.nodes.size(); ++i) {
+    EXPECT_EQ(one.nodes[i].pose, three.nodes[i].pose);
+  }
+  EXPECT_EQ(one.energy, three.energy);
+}
+
+TEST(Lattice, WithoutPhasesHandednessIsUnknown) {
+  const Place place(6, 0.4);
+  const Lattice lattice = arrange(place.memory, {.phases = false});
+  ASSERT_FALSE(lattice.parts.empty());
+  for (const auto& part : lattice.parts) EXPECT_FALSE(part.handedness_known);
+  for (const auto& spring : lattice.springs) EXPECT_FALSE(spring.phases.has_value());
+  // Worse than with phases.
+  const auto difference =
+      shape_difference(positions_of(lattice), true_positions(place.memory)).with_reflection;
+  EXPECT_LT(difference, 0.8);
+  EXPECT_GT(
+      difference,
+      shape_difference(positions_of(arrange(place.memory)), true_positions(place.memory)).value);
+}
+
+TEST(Lattice, SpringsGrowWithTheViewsNotWithTheirPairs) {
+  const Place place(7, 0.25);
+  const LatticeOptions options{.neighbours = 8, .rounds = 2};
+  const Lattice lattice = arrange(place.memory, options);
+  const std::size_t views = place.memory.size();
+  ASSERT_GT(views, 80U);
+  EXPECT_LE(lattice.springs.size(),
+            views * static_cast<std::size_t>(options.neighbours * options.rounds));
+  EXPECT_GE(lattice.springs.size(), views);
+}
+
+TEST(Lattice, CoarseMotionGivesMetres) {
+  const Place place(8, 0.4);
+  Random random(9);
+  std::vector<CoarseMotion> motion;
+  const auto views = place.memory.views();
+  for (std::size_t i = 0; i + 1 < views.size(); ++i) {
+    const auto& a = *place.memory.info(views[i]).pose;
+    const auto& b = *place.memory.info(views[i + 1]).pose;
+    Pose2 step = inverse(Pose2{a.x_m, a.y_m, *a.heading_rad}) * Pose2{b.x_m, b.y_m, *b.heading_rad};
+    const double travel = std::hypot(step.x_m, step.y_m);
+    step.x_m += random.normal(0.0, 0.1 * travel);
+    step.y_m += random.normal(0.0, 0.1 * travel);
+    step.heading_rad = wrap_angle(step.heading_rad + random.normal(0.0, 0.1));
+    motion.push_back({.from = views[i],
+                      .to = views[i + 1],
+                      .step = step,
+                      .distance_deviation_m = 0.1 * travel,
+                      .direction_deviation_rad = 0.1,
+                      .turn_deviation_rad = 0.1});
+  }
+  const Lattice lattice = arrange(place.memory, {}, motion);
+  EXPECT_TRUE(lattice.metric);
+  ASSERT_EQ(lattice.parts.size(), 1U);
+  const auto fit =
+      align(positions_of(lattice), true_positions(place.memory), {.allow_scale = true});
+  EXPECT_NEAR(fit.scale, 1.0, 0.2);
+  EXPECT_LT(fit.rms_m, 0.2);
+}
+
+TEST(Lattice, DisconnectedGroupsStayParts) {
+  const testing::Room one(21, kRoom);
+  const testing::Room other(22, kRoom);
+  std::vector<FourierSignature> signatures;
+  std::vector<int> room_of;
+  for (const auto& [room, number] : {std::pair{&one, 0}, std::pair{&other, 1}}) {
+    for (const Point2 p : inner_grid(*room, 0.4)) {
+      signatures.push_back(seen(*room, {p.x_m, p.y_m, 0.3}));
+      room_of.push_back(number);
+    }
+  }
+  const Lattice lattice = arrange(memory_of(signatures));
+  ASSERT_GE(lattice.parts.size(), 2U);
+  for (const auto& spring : lattice.springs) EXPECT_EQ(room_of[spring.a], room_of[spring.b]);
+  std::size_t counted = 0;
+  for (const auto& part : lattice.parts) counted += part.views;
+  EXPECT_EQ(counted, signatures.size());
+  EXPECT_GE(lattice.parts[1].views, 20U);
+}
+
+TEST(Lattice, DegenerateMemories) {
+  const testing::Room room(31, kRoom);
+  const VisualMemory none({24, 15}, 1.0F, std::nullopt);
+  EXPECT_TRUE(arrange(none).nodes.empty());
+
+  const FourierSignature here = seen(room, {1.0, 1.0, 0.0});
+  const Lattice one = arrange(memory_of({here}));
+  ASSERT_EQ(one.nodes.size(), 1U);
+  EXPECT_EQ(one.nodes[0].pose, Pose2{});
+  EXPECT_EQ(one.parts.size(), 1U);
+
+  const FourierSignature there = seen(room, {1.2, 1.0, 0.5});
+  const Lattice two = arrange(memory_of({here, there}));
+  ASSERT_EQ(two.parts.size(), 1U);
+  EXPECT_NEAR(distance(two.nodes[0].pose.position(), two.nodes[1].pose.position()), 1.0, 1e-3);
+  EXPECT_NEAR(two.nodes[1].pose.heading_rad, 0.5, radians(5.0));
+  EXPECT_NEAR(std::atan2(two.nodes[1].pose.y_m, two.nodes[1].pose.x_m), 0.0, radians(20.0));
+
+  const Lattice equal = arrange(memory_of(std::vector<FourierSignature>(5, here)));
+  for (const auto& node : equal.nodes) {
+    EXPECT_NEAR(distance(node.pose.position(), {}), 0.0, 1e-3);
+  }
+
+  // No structure at all: no phases, no difference.
+  const Panorama grey(24, 128, std::nullopt);
+  const Lattice empty =
+      arrange(memory_of(std::vector<FourierSignature>(3, compute_signature(grey))));
+  EXPECT_EQ(empty.nodes.size(), 3U);
+  for (const auto& node : empty.nodes) EXPECT_TRUE(std::isfinite(node.pose.x_m));
+}
+
+TEST(Lattice, AViewTwiceLiesAtOnePlace) {
+  const testing::Room room(32, kRoom);
+  std::vector<FourierSignature> signatures;
+  for (const Point2 p : inner_grid(room, 0.4))
+    signatures.push_back(seen(room, {p.x_m, p.y_m, 0.0}));
+  signatures.push_back(turn(signatures[7], 0.7));
+  const Lattice lattice = arrange(memory_of(signatures));
+  ASSERT_EQ(lattice.nodes[7].part, lattice.nodes.back().part);
+  const Pose2& first = lattice.nodes[7].pose;
+  const Pose2& again = lattice.nodes.back().pose;
+  EXPECT_LT(distance(first.position(), again.position()), 0.15);
+  EXPECT_NEAR(angle_difference(again.heading_rad, first.heading_rad), 0.7, radians(3.0));
+}
+
+TEST(Lattice, RefusesMotionsThatAreNone) {
+  const Place place(33, 0.6);
+  const auto views = place.memory.views();
+  const auto refused = [&](const CoarseMotion& motion) {
+    EXPECT_THROW((void)arrange(place.memory, {}, {motion}), ContractError);
+  };
+  refused({.from = views[0], .to = ViewId{9999}});
+  refused({.from = views[0], .to = views[1], .step = {std::nan(""), 0.0, 0.0}});
+  refused({.from = views[0], .to = views[1], .turn_deviation_rad = 0.0});
+  refused({.from = views[0],
+           .to = views[1],
+           .distance_deviation_m = std::numeric_limits<double>::infinity()});
+  EXPECT_THROW((void)arrange(place.memory, {.neighbours = 0}), OptionError);
+}
+
+}  // namespace
+}  // namespace panonav
