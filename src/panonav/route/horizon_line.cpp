@@ -1,0 +1,87 @@
+#include "panonav/route/horizon_line.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+
+namespace panonav {
+
+namespace {
+
+// One row of as many columns as the panorama has.
+std::vector<float> mean_row(const Panorama& panorama, double half_band_rad) {
+  std::vector<double> sum(static_cast<std::size_t>(panorama.columns()));
+  double weights = 0.0;
+  const auto add = [&](int y, double weight) {
+    const auto row = panorama.row(y);
+    for (std::size_t c = 0; c < sum.size(); ++c) sum[c] += weight * static_cast<double>(row[c]);
+    weights += weight;
+  };
+  for (int y = 0; y < panorama.rows(); ++y) {
+    if (!panorama.elevations() || std::abs(panorama.elevation_rad(y)) <= half_band_rad) add(y, 1.0);
+  }
+  if (weights == 0.0) {
+    const auto near = panorama.horizon_row();
+    if (!near) {
+      const auto band = *panorama.elevations();
+      throw ContractError(
+          "elevations of the panorama",
+          to_text(degrees(band.bottom_rad)) + " .. " + to_text(degrees(band.top_rad)) + " degrees",
+          "a band that holds the horizon");
+    }
+    // Rows go down: the next one on the other side of the horizon.
+    const double elevation = panorama.elevation_rad(*near);
+    const int other = std::clamp(elevation > 0.0 ? *near + 1 : *near - 1, 0, panorama.rows() - 1);
+    const double beyond = panorama.elevation_rad(other);
+    const double share = other == *near ? 0.0 : elevation / (elevation - beyond);
+    add(*near, 1.0 - share);
+    if (share > 0.0) add(other, share);
+  }
+  std::vector<float> row(sum.size());
+  for (std::size_t c = 0; c < sum.size(); ++c) row[c] = static_cast<float>(sum[c] / weights);
+  return row;
+}
+
+}  // namespace
+
+void visit_options(HorizonLineOptions& options, OptionVisitor& visitor) {
+  visitor.visit({.name = "columns", .help = "values of a line", .low = 16, .high = 16384},
+                options.columns);
+  visitor.visit({.name = "half_band_rad",
+                 .help = "rows so near to the horizon are averaged",
+                 .low = 0,
+                 .high = 0.5},
+                options.half_band_rad);
+}
+
+std::vector<float> horizon_line(const Panorama& panorama, const HorizonLineOptions& options) {
+  validate(options);
+  const auto row = mean_row(panorama, options.half_band_rad);
+  const auto from = static_cast<double>(row.size());
+  const auto count = static_cast<std::size_t>(options.columns);
+  const double step = from / static_cast<double>(count);
+  std::vector<float> line(count);
+  if (step == 1.0) return row;
+  const auto at = [&](long long c) {
+    const auto size = static_cast<long long>(row.size());
+    return static_cast<double>(row[static_cast<std::size_t>(((c % size) + size) % size)]);
+  };
+  // A pixel reaches half a step to either side of its middle, or half a pixel of the panorama.
+  const double half = 0.5 * std::max(1.0, step);
+  for (std::size_t c = 0; c < count; ++c) {
+    const double low = static_cast<double>(c) * step - half + 0.5;
+    const double high = low + 2.0 * half;
+    double sum = 0.0;
+    for (auto i = static_cast<long long>(std::floor(low)); static_cast<double>(i) < high; ++i) {
+      const double begin = std::max(low, static_cast<double>(i));
+      const double end = std::min(high, static_cast<double>(i) + 1.0);
+      if (end > begin) sum += (end - begin) * at(i);
+    }
+    line[c] = static_cast<float>(sum / (high - low));
+  }
+  return line;
+}
+
+}  // namespace panonav

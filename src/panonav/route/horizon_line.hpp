@@ -1,0 +1,27 @@
+#pragma once
+
+#include <vector>
+
+#include "panonav/core/options.hpp"
+#include "panonav/panorama/panorama.hpp"
+
+namespace panonav {
+
+struct HorizonLineOptions {
+  int columns = 360;  ///< of the line: a byte a degree, as [Y03 section 2.2]
+  /// Rows whose middle lies so near to the horizon are averaged. Light in the plane of the horizon
+  /// goes straight from place to place, light above and below does not: keep it narrow.
+  double half_band_rad = 0.0131;
+  friend bool operator==(const HorizonLineOptions&, const HorizonLineOptions&) = default;
+};
+void visit_options(HorizonLineOptions& options, OptionVisitor& visitor);
+
+/// What a robot sees in the plane of its camera [Y03 section 2.2]: `columns` values from column 0,
+/// straight ahead, counter-clockwise. Rows within the band are averaged, or the two next to the
+/// horizon interpolated where the band holds none; without elevations all rows count as on the
+/// horizon. Columns are averaged where the panorama has more than asked for, interpolated where it
+/// has fewer. Throws OptionError, and ContractError when the horizon lies outside the panorama.
+[[nodiscard]] std::vector<float> horizon_line(const Panorama& panorama,
+                                              const HorizonLineOptions& options = {});
+
+}  // namespace panonav

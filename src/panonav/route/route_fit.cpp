@@ -1,0 +1,315 @@
+#include "panonav/route/route_fit.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <string>
+
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/motion/path.hpp"
+#include "panonav/route/line_sampling.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+// Unknowns: x, y, heading, gain, offset.
+using Matrix = Eigen::Matrix<double, 5, 5>;
+using Vector = Eigen::Matrix<double, 5, 1>;
+
+// Things are a few metres away; smoothing by an angle is smoothing by this over it along the path.
+constexpr double usual_distance_m = 2.0;
+
+// With fewer directions three numbers are not worth asking for.
+constexpr std::size_t fewest_directions = 16;
+
+float median(std::vector<float>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace
+
+// One direction: what the route shows there, what the line shows, and how both change.
+struct RouteLines::Term {
+  float shown = 0.0F;
+  float shown_x = 0.0F;  // per metre
+  float shown_y = 0.0F;
+  float seen = 0.0F;
+  float seen_turn = 0.0F;  // per radian of heading, with the sign of the residual
+  std::uint32_t direction = 0;
+};
+
+struct RouteLines::Linearised {
+  Matrix matrix = Matrix::Zero();
+  Vector right = Vector::Zero();
+  double gain = 1.0;
+  double offset = 0.0;
+  double variance = 0.0;   // of a difference, robust
+  double deviation = 0.0;  // of what the route shows
+  double correlation = 0.0;
+};
+
+void visit_options(RouteFitOptions& options, OptionVisitor& visitor) {
+  visitor.visit({.name = "coarse_deg",
+                 .help = "smoothing of the lines where a fit starts",
+                 .low = 0,
+                 .high = 45},
+                options.coarse_deg);
+  visitor.visit({.name = "levels", .help = "from coarse to fine", .low = 1, .high = 8},
+                options.levels);
+  visitor.visit({.name = "most_steps", .help = "steps at each level", .low = 1, .high = 100},
+                options.most_steps);
+  visitor.visit({.name = "reach_m",
+                 .help = "lines farther from the prediction are not looked at",
+                 .low = 0.1,
+                 .high = 1000},
+                options.reach_m);
+  visitor.visit({.name = "robust", .help = "changed parts of the scene count less"},
+                options.robust);
+}
+
+RouteLines::RouteLines(const RoutePanorama& route, const RouteFitOptions& options)
+    : columns_(route.columns()),
+      options_(options),
+      poses_(route.poses().begin(), route.poses().end()),
+      directions_(equal_directions(static_cast<std::size_t>(route.columns()))) {
+  validate(options);
+  if (route.size() < 2) {
+    throw ContractError("lines of the route", static_cast<double>(route.size()), "2 or more");
+  }
+  const double spacing_m = route.length_m() / static_cast<double>(route.size() - 1);
+  for (int i = 0; i < options.levels; ++i) {
+    Level level;
+    // Each a third as smooth as the one before, the last not at all.
+    if (i + 1 < options.levels) {
+      level.sigma = options.coarse_deg * columns_ / 360.0 / std::pow(3.0, i);
+    }
+    const double sigma_rad = level.sigma * 2.0 * pi / columns_;
+    level.half_slope =
+        static_cast<std::size_t>(std::lround(usual_distance_m * sigma_rad / (2.0 * spacing_m)));
+    levels_.push_back(std::move(level));
+  }
+  std::vector<float> line(static_cast<std::size_t>(columns_));
+  std::vector<float> turned(line.size());
+  for (std::size_t i = 0; i < route.size(); ++i) {
+    const auto bytes = route.line(i);
+    for (std::size_t c = 0; c < line.size(); ++c) line[c] = static_cast<float>(bytes[c]) / 255.0F;
+    const double turn = poses_[i].heading_rad * columns_ / (2.0 * pi);
+    for (std::size_t c = 0; c < line.size(); ++c) {
+      turned[c] = sample_line(line, static_cast<double>(c) - turn).value;
+    }
+    for (Level& level : levels_) {
+      const auto smooth = smoothed_line(turned, level.sigma);
+      level.values.insert(level.values.end(), smooth.begin(), smooth.end());
+    }
+  }
+}
+
+std::optional<RouteLines::Window> RouteLines::window(Point2 position) const {
+  std::size_t nearest = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < poses_.size(); ++i) {
+    const double off = distance(poses_[i].position(), position);
+    if (off < least) {
+      least = off;
+      nearest = i;
+    }
+  }
+  if (!(least < options_.reach_m)) return std::nullopt;
+  const auto in_reach = [&](std::size_t i) {
+    return distance(poses_[i].position(), position) < options_.reach_m;
+  };
+  Window found{nearest, nearest + 1};
+  while (found.begin > 0 && in_reach(found.begin - 1)) --found.begin;
+  while (found.end < poses_.size() && in_reach(found.end)) ++found.end;
+  if (found.end - found.begin < 2) return std::nullopt;
+  return found;
+}
+
+bool RouteLines::collect(const Level& level, std::span<const float> seen, const Pose2& pose,
+                         const Window& window, std::vector<RouteCrossing>& crossings,
+                         std::vector<Term>& terms) const {
+  cross_route(std::span(poses_).subspan(window.begin, window.end - window.begin), window.begin,
+              pose.position(), directions_, crossings);
+  const double columns_per_rad = columns_ / (2.0 * pi);
+  const double turn = pose.heading_rad * columns_per_rad;
+  const auto row = [&](std::size_t line) {
+    return level.values.data() + line * static_cast<std::size_t>(columns_);
+  };
+  terms.clear();
+  for (std::size_t c = 0; c < crossings.size(); ++c) {
+    const RouteCrossing& crossing = crossings[c];
+    if (crossing.along < 0.0F) continue;
+    const auto before = std::min(static_cast<std::size_t>(crossing.along), poses_.size() - 2);
+    const float share = crossing.along - static_cast<float>(before);
+    const float first = row(before)[c];
+    const float second = row(before + 1)[c];
+    const std::size_t low = before >= level.half_slope ? before - level.half_slope : 0;
+    const std::size_t high = std::min(before + 1 + level.half_slope, poses_.size() - 1);
+    const float along = (row(high)[c] - row(low)[c]) / static_cast<float>(high - low);
+    const LineSample at = sample_line(seen, static_cast<double>(c) - turn);
+    terms.push_back(
+        {first + share * (second - first), along * crossing.along_by_x, along * crossing.along_by_y,
+         at.value, at.slope * static_cast<float>(columns_per_rad), static_cast<std::uint32_t>(c)});
+  }
+  return terms.size() >= fewest_directions;
+}
+
+// Differences are what the route shows less gain times what is seen less offset.
+std::optional<RouteLines::Linearised> RouteLines::linearise(const std::vector<Term>& terms,
+                                                            std::vector<float>& scratch) const {
+  Linearised result;
+  const auto n = static_cast<double>(terms.size());
+  double seen = 0.0;
+  double shown = 0.0;
+  for (const Term& term : terms) {
+    seen += static_cast<double>(term.seen) / n;
+    shown += static_cast<double>(term.shown) / n;
+  }
+  double seen_square = 0.0;
+  double shown_square = 0.0;
+  double product = 0.0;
+  for (const Term& term : terms) {
+    const double x = static_cast<double>(term.seen) - seen;
+    const double y = static_cast<double>(term.shown) - shown;
+    seen_square += x * x / n;
+    shown_square += y * y / n;
+    product += x * y / n;
+  }
+  constexpr double least_variance = 1e-8;
+  if (seen_square < least_variance || shown_square < least_variance) return std::nullopt;
+  // Another light is a factor of a few at most, and never turns black into white.
+  result.gain = std::clamp(product / seen_square, 0.2, 5.0);
+  result.offset = shown - result.gain * seen;
+  result.correlation = product / std::sqrt(seen_square * shown_square);
+  result.deviation = std::sqrt(shown_square);
+  const auto difference = [&](const Term& term) {
+    return static_cast<double>(term.shown) - result.gain * static_cast<double>(term.seen) -
+           result.offset;
+  };
+  scratch.clear();
+  for (const Term& term : terms) scratch.push_back(std::abs(static_cast<float>(difference(term))));
+  // A grey level at least: lines are bytes.
+  constexpr double least_noise = 1.0 / 255.0;
+  const double noise = std::max(least_noise, 1.4826 * static_cast<double>(median(scratch)));
+  double left = 0.0;
+  double weights = 0.0;
+  for (const Term& term : terms) {
+    const double off = difference(term);
+    // Cauchy's weight; three deviations are usual, more are likely a change of the scene.
+    const double ratio = off / (3.0 * noise);
+    const double weight = options_.robust ? 1.0 / (1.0 + ratio * ratio) : 1.0;
+    Vector slope;
+    slope << static_cast<double>(term.shown_x), static_cast<double>(term.shown_y),
+        result.gain * static_cast<double>(term.seen_turn), -static_cast<double>(term.seen), -1.0;
+    result.matrix.selfadjointView<Eigen::Lower>().rankUpdate(slope, weight);
+    result.right -= weight * off * slope;
+    left += weight * off * off;
+    weights += weight;
+  }
+  result.matrix.triangularView<Eigen::StrictlyUpper>() = result.matrix.transpose();
+  result.variance = std::max(left / weights, least_noise * least_noise / 12.0);
+  return result;
+}
+
+std::optional<RouteFix> RouteLines::fit(std::span<const float> line, const Pose2& predicted) const {
+  if (line.size() != static_cast<std::size_t>(columns_)) {
+    throw ContractError("values of the line", static_cast<double>(line.size()),
+                        std::to_string(columns_));
+  }
+  const auto near = window(predicted.position());
+  if (!near) return std::nullopt;
+  RouteFix fix;
+  fix.pose = predicted;
+  std::vector<RouteCrossing> crossings(line.size());
+  std::vector<Term> terms;
+  std::vector<float> scratch;
+  terms.reserve(line.size());
+  scratch.reserve(line.size());
+  std::vector<float> seen;
+  std::optional<Linearised> normal;
+  for (const Level& level : levels_) {
+    seen = smoothed_line(line, level.sigma);
+    const bool last = &level == &levels_.back();
+    const double near_enough_m =
+        last ? 1e-4 : 0.05 * usual_distance_m * level.sigma * 2.0 * pi / columns_;
+    for (int step = 0; step < options_.most_steps; ++step) {
+      if (!collect(level, seen, fix.pose, *near, crossings, terms)) return std::nullopt;
+      normal = linearise(terms, scratch);
+      if (!normal) return std::nullopt;
+      // A little damping: directions in which nothing changes stay where they are.
+      Matrix damped = normal->matrix;
+      damped.diagonal() *= 1.0 + 1e-3;
+      const Vector change = damped.ldlt().solve(normal->right);
+      if (!change.allFinite()) return std::nullopt;
+      // No step is longer than what smoothing lets it see.
+      const double length_m = std::hypot(change[0], change[1]);
+      const double scale = std::min(
+          {1.0, 0.25 / std::max(1e-12, length_m), 0.2 / std::max(1e-12, std::abs(change[2]))});
+      fix.pose.x_m += scale * change[0];
+      fix.pose.y_m += scale * change[1];
+      fix.pose.heading_rad = wrap_angle(fix.pose.heading_rad + scale * change[2]);
+      if (length_m < near_enough_m && std::abs(change[2]) < near_enough_m) break;
+    }
+  }
+  if (!collect(levels_.back(), seen, fix.pose, *near, crossings, terms)) return std::nullopt;
+  normal = linearise(terms, scratch);
+  if (!normal) return std::nullopt;
+  fix.columns = static_cast<int>(terms.size());
+  fix.correlation = normal->correlation;
+  fix.residual = std::sqrt(normal->variance) / normal->deviation;
+  const Matrix inverse = normal->matrix.ldlt().solve(Matrix::Identity());
+  if (!inverse.allFinite()) return std::nullopt;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      fix.covariance[3 * i + j] =
+          normal->variance * inverse(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+    }
+  }
+  fix.unexplained.assign(line.size(), std::numeric_limits<float>::quiet_NaN());
+  const double turn = fix.pose.heading_rad * columns_ / (2.0 * pi);
+  for (const Term& term : terms) {
+    const auto size = static_cast<long long>(line.size());
+    const long long c =
+        (std::llround(static_cast<double>(term.direction) - turn) % size + size) % size;
+    fix.unexplained[static_cast<std::size_t>(c)] = static_cast<float>(
+        std::abs(static_cast<double>(term.shown) - normal->gain * static_cast<double>(term.seen) -
+                 normal->offset));
+  }
+  return fix;
+}
+
+std::vector<float> RouteLines::synthesise(const Pose2& pose) const {
+  const float nothing = std::numeric_limits<float>::quiet_NaN();
+  std::vector<float> line(static_cast<std::size_t>(columns_), nothing);
+  const auto near = window(pose.position());
+  if (!near) return line;
+  std::vector<RouteCrossing> crossings(line.size());
+  cross_route(std::span(poses_).subspan(near->begin, near->end - near->begin), near->begin,
+              pose.position(), directions_, crossings);
+  std::vector<float> world(line.size(), nothing);
+  const float* const values = levels_.back().values.data();
+  for (std::size_t c = 0; c < line.size(); ++c) {
+    if (crossings[c].along < 0.0F) continue;
+    const auto before = std::min(static_cast<std::size_t>(crossings[c].along), poses_.size() - 2);
+    const float share = crossings[c].along - static_cast<float>(before);
+    const float first = values[before * line.size() + c];
+    world[c] = first + share * (values[(before + 1) * line.size() + c] - first);
+  }
+  const double turn = pose.heading_rad * columns_ / (2.0 * pi);
+  for (std::size_t c = 0; c < line.size(); ++c) {
+    line[c] = sample_line(world, static_cast<double>(c) + turn).value;
+  }
+  return line;
+}
+
+}  // namespace panonav

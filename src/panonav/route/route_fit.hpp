@@ -1,0 +1,92 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "panonav/core/options.hpp"
+#include "panonav/route/route_crossing.hpp"
+#include "panonav/route/route_panorama.hpp"
+
+namespace panonav {
+
+/// How a line is fitted into a route panorama.
+struct RouteFitOptions {
+  double coarse_deg = 8.0;  ///< standard deviation of the smoothing where a fit starts, in azimuth
+  int levels = 3;           ///< from coarse to not smoothed at all
+  int most_steps = 8;       ///< Gauss-Newton steps at each level
+  double reach_m = 6.0;     ///< lines farther from the prediction are not looked at
+  bool robust = true;       ///< changed parts of the scene count less
+  friend bool operator==(const RouteFitOptions&, const RouteFitOptions&) = default;
+};
+void visit_options(RouteFitOptions& options, OptionVisitor& visitor);
+
+/// Where a line was seen from.
+struct RouteFix {
+  Pose2 pose;
+  /// Of x, y and heading in metres and radians, row-major, as far as the noise of the lines goes.
+  std::array<double, 9> covariance{};
+  /// Root mean square of what the fit leaves over the deviation of what the route shows; robust.
+  double residual = 1.0;
+  double correlation = 0.0;  ///< of the line and what the route shows from there, -1 .. 1
+  int columns = 0;           ///< directions in which the line of sight crosses the path
+  /// By column of the line: what the fit leaves there, 0 .. 1; NaN where nothing is crossed.
+  std::vector<float> unexplained;
+};
+
+/// A route panorama made ready for fits: lines turned into the world's frame and smoothed.
+/// Immutable; several threads may use one.
+class RouteLines {
+ public:
+  /// Copies what it needs: 4 bytes a value and level. Throws OptionError, and ContractError on a
+  /// route of fewer than two lines.
+  explicit RouteLines(const RoutePanorama& route, const RouteFitOptions& options = {});
+
+  /// The pose from which the path shows what `line` shows: least squares of all directions at once
+  /// over x, y and heading, gain and offset of the light, from coarse to fine, starting at
+  /// `predicted`. No contour is needed: the intensities themselves are fitted. Empty where the
+  /// prediction is out of reach of the path or the line has no structure. A fit far from the truth
+  /// ends somewhere, too: judge it by its correlation. Throws ContractError on a wrong length.
+  /// Cost: some ten steps of O(columns + lines in reach).
+  [[nodiscard]] std::optional<RouteFix> fit(std::span<const float> line,
+                                            const Pose2& predicted) const;
+
+  /// What a robot sees from `pose` by the route panorama [Y03 section 3], in its frame; NaN where
+  /// no line of sight crosses the path.
+  [[nodiscard]] std::vector<float> synthesise(const Pose2& pose) const;
+
+  [[nodiscard]] std::span<const Pose2> poses() const& noexcept { return poses_; }
+  std::span<const Pose2> poses() const&& = delete;  // would dangle
+  [[nodiscard]] int columns() const noexcept { return columns_; }
+  [[nodiscard]] const RouteFitOptions& options() const noexcept { return options_; }
+
+ private:
+  struct Level {
+    double sigma = 0.0;          // of the smoothing, in columns
+    std::size_t half_slope = 0;  // lines to either side between which the slope is taken
+    std::vector<float> values;   // line by line, in the world's frame
+  };
+  // Lines first .. last are in reach.
+  struct Window {
+    std::size_t begin = 0;
+    std::size_t end = 0;
+  };
+  struct Term;
+  struct Linearised;
+  [[nodiscard]] std::optional<Window> window(Point2 position) const;
+  [[nodiscard]] bool collect(const Level& level, std::span<const float> seen, const Pose2& pose,
+                             const Window& window, std::vector<RouteCrossing>& crossings,
+                             std::vector<Term>& terms) const;
+  [[nodiscard]] std::optional<Linearised> linearise(const std::vector<Term>& terms,
+                                                    std::vector<float>& scratch) const;
+
+  int columns_;
+  RouteFitOptions options_;
+  std::vector<Pose2> poses_;
+  std::vector<Direction2> directions_;
+  std::vector<Level> levels_;  // coarse first
+};
+
+}  // namespace panonav

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "panonav/geometry/pose2.hpp"
+
+namespace panonav {
+
+/// An omnidirectional route panorama: what a robot saw in the plane of its camera from the places
+/// along a route, one line a place [Y03 section 2.2]. A line has `columns` bytes, from straight
+/// ahead counter-clockwise; the heading of its pose tells how it lies in the world.
+/// Invariant: all poses finite, no two neighbours at the same place, all lines of one length.
+class RoutePanorama {
+ public:
+  /// Throws ContractError unless columns is 16 .. 16384.
+  explicit RoutePanorama(int columns = 360);
+
+  /// `line` as from `horizon_line`, 0 .. 1, clamped and rounded to bytes. False, and nothing is
+  /// stored, where the robot has not moved by a millimetre since the last line. Throws
+  /// ContractError on a wrong length or a value that is not finite.
+  bool append(const Pose2& pose, std::span<const float> line);
+  /// The same for a line that is bytes already.
+  bool append(const Pose2& pose, std::span<const std::uint8_t> line);
+
+  [[nodiscard]] int columns() const noexcept { return columns_; }
+  [[nodiscard]] std::size_t size() const noexcept { return poses_.size(); }
+  [[nodiscard]] bool empty() const noexcept { return poses_.empty(); }
+  [[nodiscard]] std::span<const Pose2> poses() const& noexcept { return poses_; }
+  std::span<const Pose2> poses() const&& = delete;  // would dangle
+  [[nodiscard]] std::span<const std::uint8_t> line(std::size_t i) const& noexcept {
+    return std::span(bytes_).subspan(i * static_cast<std::size_t>(columns_),
+                                     static_cast<std::size_t>(columns_));
+  }
+  std::span<const std::uint8_t> line(std::size_t i) const&& = delete;  // would dangle
+  [[nodiscard]] double length_m() const;  ///< of the way through all places
+
+  friend bool operator==(const RoutePanorama&, const RoutePanorama&) = default;
+
+ private:
+  int columns_;
+  std::vector<Pose2> poses_;
+  std::vector<std::uint8_t> bytes_;
+};
+
+}  // namespace panonav
