@@ -190,7 +190,6 @@ std::optional<RouteLines::Linearised> RouteLines::linearise(const std::vector<Te
   // Another light is a factor of a few at most, and never turns black into white.
   result.gain = std::clamp(product / seen_square, 0.2, 5.0);
   result.offset = shown - result.gain * seen;
-  result.correlation = product / std::sqrt(seen_square * shown_square);
   result.deviation = std::sqrt(shown_square);
   const auto difference = [&](const Term& term) {
     return static_cast<double>(term.shown) - result.gain * static_cast<double>(term.seen) -
@@ -203,6 +202,11 @@ std::optional<RouteLines::Linearised> RouteLines::linearise(const std::vector<Te
   const double noise = std::max(least_noise, 1.4826 * static_cast<double>(median(scratch)));
   double left = 0.0;
   double weights = 0.0;
+  double x = 0.0;
+  double y = 0.0;
+  double xx = 0.0;
+  double yy = 0.0;
+  double xy = 0.0;
   for (const Term& term : terms) {
     const double off = difference(term);
     // Cauchy's weight; three deviations are usual, more are likely a change of the scene.
@@ -215,7 +219,16 @@ std::optional<RouteLines::Linearised> RouteLines::linearise(const std::vector<Te
     result.right -= weight * off * slope;
     left += weight * off * off;
     weights += weight;
+    const double a = static_cast<double>(term.seen) - seen;
+    const double b = static_cast<double>(term.shown) - shown;
+    x += weight * a;
+    y += weight * b;
+    xx += weight * a * a;
+    yy += weight * b * b;
+    xy += weight * a * b;
   }
+  const double within = (xx - x * x / weights) * (yy - y * y / weights);
+  result.correlation = within > 0.0 ? (xy - x * y / weights) / std::sqrt(within) : 0.0;
   result.matrix.triangularView<Eigen::StrictlyUpper>() = result.matrix.transpose();
   result.variance = std::max(left / weights, least_noise * least_noise / 12.0);
   return result;

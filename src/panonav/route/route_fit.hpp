@@ -30,8 +30,9 @@ struct RouteFix {
   std::array<double, 9> covariance{};
   /// Root mean square of what the fit leaves over the deviation of what the route shows; robust.
   double residual = 1.0;
-  double correlation = 0.0;  ///< of the line and what the route shows from there, -1 .. 1
-  int columns = 0;           ///< directions in which the line of sight crosses the path
+  /// Of the line and what the route shows from there, -1 .. 1; changed parts count less, too.
+  double correlation = 0.0;
+  int columns = 0;  ///< directions in which the line of sight crosses the path
   /// By column of the line: what the fit leaves there, 0 .. 1; NaN where nothing is crossed.
   std::vector<float> unexplained;
 };
@@ -56,6 +57,20 @@ class RouteLines {
   /// What a robot sees from `pose` by the route panorama [Y03 section 3], in its frame; NaN where
   /// no line of sight crosses the path.
   [[nodiscard]] std::vector<float> synthesise(const Pose2& pose) const;
+
+  /// Where a line may have been seen from.
+  struct Candidate {
+    Pose2 pose;
+    double correlation = 0.0;  ///< at the coarsest level
+  };
+  /// Correlation of the coarsest level of a line with what the route shows from `position`, at the
+  /// heading where it is highest. Empty where the line of sight crosses the path in fewer than half
+  /// of all directions. Throws ContractError unless `coarse_line` comes from `coarse`. Cost:
+  /// O(lines in reach + columns) and some thousand multiplications.
+  [[nodiscard]] std::optional<Candidate> candidate(std::span<const float> coarse_line,
+                                                   Point2 position) const;
+  /// `line` as `candidate` wants it.
+  [[nodiscard]] std::vector<float> coarse(std::span<const float> line) const;
 
   [[nodiscard]] std::span<const Pose2> poses() const& noexcept { return poses_; }
   std::span<const Pose2> poses() const&& = delete;  // would dangle

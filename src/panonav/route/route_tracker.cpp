@@ -1,0 +1,206 @@
+#include "panonav/route/route_tracker.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "panonav/geometry/angles.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+// As a robot reads it from its camera.
+std::vector<float> line_of(const RoutePanorama& route, std::size_t i) {
+  const auto bytes = route.line(i);
+  std::vector<float> line(bytes.size());
+  for (std::size_t c = 0; c < line.size(); ++c) line[c] = static_cast<float>(bytes[c]) / 255.0F;
+  return line;
+}
+
+double quantile(std::vector<double> values, double share) {
+  std::ranges::sort(values);
+  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+}
+
+}  // namespace
+
+void visit_options(RouteTrackerOptions& options, OptionVisitor& visitor) {
+  visitor.visit({.name = "search_step_m",
+                 .help = "between the places along the path that a search tries",
+                 .low = 0.01,
+                 .high = 100},
+                options.search_step_m);
+  visitor.visit({.name = "search_lateral_m",
+                 .help = "between the places beside the path that a search tries",
+                 .low = 0.01,
+                 .high = 100},
+                options.search_lateral_m);
+  visitor.visit({.name = "search_sides",
+                 .help = "places that a search tries to either side of the path",
+                 .low = 0,
+                 .high = 100},
+                options.search_sides);
+  visitor.visit(
+      {.name = "most_candidates", .help = "places that a search fits", .low = 1, .high = 1000},
+      options.most_candidates);
+  visitor.visit(
+      {.name = "recovery_m", .help = "by which a prediction may be off", .low = 0, .high = 100},
+      options.recovery_m);
+  visitor.visit({.name = "least_correlation",
+                 .help = "from which on a fit is believed; 0: learnt from the route",
+                 .low = 0,
+                 .high = 1},
+                options.least_correlation);
+}
+
+RouteTracker::RouteTracker(const RoutePanorama& route, const RouteTrackerOptions& options,
+                           const RouteFitOptions& fit)
+    : options_(options), lines_(route, fit) {
+  validate(options);
+  least_correlation_ = options.least_correlation;
+  if (least_correlation_ == 0.0) least_correlation_ = learnt_correlation(route, fit);
+}
+
+double RouteTracker::learnt_correlation(const RoutePanorama& route,
+                                        const RouteFitOptions& options) const {
+  // Where nothing can be learnt: half of the variance is explained.
+  constexpr double usual = 0.7071;
+  constexpr std::size_t samples = 40;
+  if (route.size() < 6) return usual;
+  RoutePanorama half(route.columns());
+  for (std::size_t i = 0; i < route.size(); i += 2) half.append(route.poses()[i], route.line(i));
+  const RouteLines others(half, options);
+  std::vector<double> right;
+  std::vector<double> wrong;
+  for (std::size_t s = 0; s < samples; ++s) {
+    // Lines of odd numbers, spread over the route.
+    const std::size_t i = (s * route.size() / samples) | 1U;
+    if (i >= route.size()) break;
+    auto line = line_of(route, i);
+    if (const auto fix = others.fit(line, route.poses()[i])) right.push_back(fix->correlation);
+    std::ranges::reverse(line);
+    if (const auto fix = best_anywhere(line)) wrong.push_back(fix->correlation);
+  }
+  if (right.size() < 3 || wrong.size() < 3) return usual;
+  const double low = std::max(0.0, quantile(std::move(wrong), 0.95));
+  const double high = quantile(std::move(right), 0.05);
+  // A view from beside the path or of a changed scene fits worse than one from the path.
+  return low + std::max(0.0, high - low) / 3.0;
+}
+
+TrackedRouteFix RouteTracker::placed(RouteFix fix, RouteFixOrigin origin) const {
+  TrackedRouteFix placed{std::move(fix), origin};
+  const auto path = lines_.poses();
+  const Point2 at = placed.fix.pose.position();
+  double least = std::numeric_limits<double>::infinity();
+  double way = 0.0;
+  for (std::size_t i = 0; i + 1 < path.size(); ++i) {
+    const double ex = path[i + 1].x_m - path[i].x_m;
+    const double ey = path[i + 1].y_m - path[i].y_m;
+    const double length = std::hypot(ex, ey);
+    const double px = at.x_m - path[i].x_m;
+    const double py = at.y_m - path[i].y_m;
+    const double share = std::clamp((px * ex + py * ey) / (length * length), 0.0, 1.0);
+    const double off = std::hypot(px - share * ex, py - share * ey);
+    if (off < least) {
+      least = off;
+      placed.along_m = way + share * length;
+      placed.lateral_m = ex * py - ey * px >= 0.0 ? off : -off;
+    }
+    way += length;
+  }
+  return placed;
+}
+
+std::optional<RouteFix> RouteTracker::recover(std::span<const float> line,
+                                              const Pose2& predicted) const {
+  const auto coarse = lines_.coarse(line);
+  std::optional<RouteLines::Candidate> start;
+  constexpr int rings = 2;
+  constexpr int around = 8;
+  for (int ring = 0; ring <= rings; ++ring) {
+    for (int k = 0; k < (ring == 0 ? 1 : around); ++k) {
+      const double off = options_.recovery_m * ring / rings;
+      const double angle = 2.0 * pi * k / around;
+      const auto found = lines_.candidate(
+          coarse, {predicted.x_m + off * std::cos(angle), predicted.y_m + off * std::sin(angle)});
+      if (found && (!start || found->correlation > start->correlation)) start = found;
+    }
+  }
+  if (!start) return std::nullopt;
+  return lines_.fit(line, start->pose);
+}
+
+std::optional<RouteFix> RouteTracker::best_anywhere(std::span<const float> line) const {
+  const auto coarse = lines_.coarse(line);
+  std::vector<RouteLines::Candidate> found;
+  const auto path = lines_.poses();
+  double since = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    if (i > 0) since += distance(path[i - 1].position(), path[i].position());
+    if (since < options_.search_step_m) continue;
+    since = 0.0;
+    const Pose2& before = path[i == 0 ? 0 : i - 1];
+    const Pose2& after = path[std::min(i + 1, path.size() - 1)];
+    const double length = std::max(1e-9, distance(before.position(), after.position()));
+    const double nx = -(after.y_m - before.y_m) / length;
+    const double ny = (after.x_m - before.x_m) / length;
+    for (int side = -options_.search_sides; side <= options_.search_sides; ++side) {
+      const double off = side * options_.search_lateral_m;
+      const auto candidate =
+          lines_.candidate(coarse, {path[i].x_m + off * nx, path[i].y_m + off * ny});
+      if (candidate) found.push_back(*candidate);
+    }
+  }
+  std::ranges::stable_sort(found, std::greater<>{}, &RouteLines::Candidate::correlation);
+  std::optional<RouteFix> best;
+  std::vector<Point2> tried;
+  for (const auto& candidate : found) {
+    if (tried.size() >= static_cast<std::size_t>(options_.most_candidates)) break;
+    // A fit finds what is near by itself.
+    const bool near = std::ranges::any_of(tried, [&](Point2 other) {
+      return distance(other, candidate.pose.position()) < 1.5 * options_.search_lateral_m;
+    });
+    if (near) continue;
+    tried.push_back(candidate.pose.position());
+    auto fix = lines_.fit(line, candidate.pose);
+    if (fix && (!best || fix->correlation > best->correlation)) best = std::move(fix);
+  }
+  return best;
+}
+
+std::optional<TrackedRouteFix> RouteTracker::search(std::span<const float> line) const {
+  auto best = best_anywhere(line);
+  if (!best || best->correlation < least_correlation_) return std::nullopt;
+  return placed(*std::move(best), RouteFixOrigin::search);
+}
+
+std::optional<TrackedRouteFix> RouteTracker::track(std::span<const float> line, const Pose2& step) {
+  std::optional<TrackedRouteFix> found;
+  if (pose_) {
+    const Pose2 predicted = *pose_ * step;
+    pose_ = predicted;
+    const auto believed = [&](const std::optional<RouteFix>& fix) {
+      return fix && fix->correlation >= least_correlation_ &&
+             distance(fix->pose.position(), predicted.position()) <= 1.5 * options_.recovery_m;
+    };
+    auto fix = lines_.fit(line, predicted);
+    if (believed(fix)) {
+      found = placed(*std::move(fix), RouteFixOrigin::prediction);
+    } else {
+      fix = recover(line, predicted);
+      if (believed(fix)) found = placed(*std::move(fix), RouteFixOrigin::recovery);
+    }
+  }
+  if (!found) found = search(line);
+  if (found) pose_ = found->fix.pose;
+  return found;
+}
+
+}  // namespace panonav

@@ -1,0 +1,126 @@
+#include "panonav/route/route_tracker.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/motion/path.hpp"
+#include "textured_room.hpp"
+
+namespace panonav {
+namespace {
+
+using testing::TexturedRoom;
+
+constexpr double pi = std::numbers::pi;
+
+class RouteTracking : public ::testing::Test {
+ protected:
+  RouteTracking() {
+    path = smooth_path(std::vector<Point2>{{-3, -0.8}, {-1.2, 0.5}, {0.6, -0.3}, {2.8, 0.6}},
+                       {.spacing_m = 0.1});
+    for (const Pose2& pose : path) route.append(pose, room.line(pose));
+  }
+
+  [[nodiscard]] Pose2 beside(std::size_t i, double lateral_m, double turn_rad) const {
+    return path[i] * Pose2{0.0, lateral_m, turn_rad};
+  }
+
+  TexturedRoom room{31};
+  std::vector<Pose2> path;
+  RoutePanorama route;
+};
+
+TEST_F(RouteTracking, FindsTheRobotWithoutAPrediction) {
+  const RouteTracker tracker(route);
+  Random random(5);
+  int found = 0;
+  constexpr int trials = 30;
+  for (int trial = 0; trial < trials; ++trial) {
+    const Pose2 truth = beside(5 + random.index(path.size() - 10), random.uniform(-0.4, 0.4),
+                               random.uniform(-pi, pi));
+    const auto fix = tracker.search(room.line(truth));
+    if (!fix) continue;
+    EXPECT_EQ(fix->origin, RouteFixOrigin::search);
+    if (distance(fix->fix.pose.position(), truth.position()) < 0.05) ++found;
+  }
+  EXPECT_GE(found, 28);
+}
+
+TEST_F(RouteTracking, SaysThatAnotherPlaceIsNotOnThisRoute) {
+  RouteTracker tracker(route);
+  Random random(6);
+  int refused = 0;
+  for (int trial = 0; trial < 40; ++trial) {
+    const TexturedRoom other(500 + static_cast<std::uint64_t>(trial));
+    const Pose2 there{random.uniform(-2.0, 2.0), random.uniform(-0.8, 0.8),
+                      random.uniform(-pi, pi)};
+    refused += tracker.search(other.line(there)) ? 0 : 1;
+  }
+  EXPECT_GE(refused, 36);
+  EXPECT_FALSE(tracker.search(std::vector<float>(360, 0.3F)).has_value());
+  EXPECT_FALSE(tracker.track(std::vector<float>(360, 0.3F), {0.1, 0, 0}).has_value());
+  EXPECT_FALSE(tracker.pose().has_value());
+}
+
+TEST_F(RouteTracking, FollowsADriveAndTellsWayAndSide) {
+  RouteTracker tracker(route);
+  Pose2 robot = beside(4, 0.2, 0.3);
+  ASSERT_TRUE(tracker.track(room.line(robot), {}).has_value());
+  for (std::size_t i = 6; i + 4 < path.size(); i += 2) {
+    const Pose2 next = beside(i, 0.2, 0.3);
+    Pose2 step = inverse(robot) * next;
+    step.x_m *= 1.1;  // slipping wheels
+    step.heading_rad += 0.03;
+    const auto fix = tracker.track(room.line(next), step);
+    ASSERT_TRUE(fix.has_value());
+    EXPECT_EQ(fix->origin, RouteFixOrigin::prediction);
+    EXPECT_NEAR(fix->lateral_m, 0.2, 0.03);
+    EXPECT_NEAR(fix->along_m, 0.1 * static_cast<double>(i), 0.06);
+    EXPECT_LT(distance(fix->fix.pose.position(), next.position()), 0.03);
+    robot = next;
+  }
+}
+
+TEST_F(RouteTracking, RecoversWhenThePredictionIsOff) {
+  Random random(8);
+  int right = 0;
+  constexpr int trials = 40;
+  RouteTracker tracker(route);
+  for (int trial = 0; trial < trials; ++trial) {
+    const Pose2 truth = beside(8 + random.index(path.size() - 16), random.uniform(-0.2, 0.2),
+                               random.uniform(-pi, pi));
+    const double angle = random.uniform(-pi, pi);
+    tracker.set_pose({truth.x_m + 0.5 * std::cos(angle), truth.y_m + 0.5 * std::sin(angle),
+                      wrap_angle(truth.heading_rad + random.uniform(-0.3, 0.3))});
+    const auto fix = tracker.track(room.line(truth), {});
+    if (fix && distance(fix->fix.pose.position(), truth.position()) < 0.05) ++right;
+  }
+  EXPECT_GE(right, 38);
+}
+
+TEST_F(RouteTracking, CarriesOdometryThroughABlindStretch) {
+  RouteTracker tracker(route);
+  tracker.set_pose(beside(10, 0.0, 0.0));
+  const std::vector<float> dark(360, 0.0F);
+  EXPECT_FALSE(tracker.track(dark, {0.1, 0.0, 0.0}).has_value());
+  ASSERT_TRUE(tracker.pose().has_value());
+  EXPECT_LT(distance(tracker.pose()->position(), (path[10] * Pose2{0.1, 0, 0}).position()), 1e-9);
+  tracker.reset();
+  EXPECT_FALSE(tracker.pose().has_value());
+}
+
+TEST_F(RouteTracking, ChecksItsInputs) {
+  EXPECT_THROW((void)RouteTracker(route, {.search_step_m = 0.0}), OptionError);
+  RouteTracker tracker(route, {.least_correlation = 0.8});
+  EXPECT_EQ(tracker.least_correlation(), 0.8);
+  EXPECT_THROW((void)tracker.search(std::vector<float>(10, 0.0F)), ContractError);
+  EXPECT_THROW((void)tracker.track(std::vector<float>(10, 0.0F), {}), ContractError);
+}
+
+}  // namespace
+}  // namespace panonav
