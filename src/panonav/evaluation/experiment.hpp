@@ -1,7 +1,9 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
+#include <string>
 
 #include "panonav/core/executor.hpp"
 #include "panonav/evaluation/place_recording.hpp"
@@ -41,6 +43,11 @@ class Experiment {
 [[nodiscard]] std::unique_ptr<Experiment> component_weights_experiment();
 /// The ways of recognising places that [M04] argues against, on the same views.
 [[nodiscard]] std::unique_ptr<Experiment> rivals_experiment();
+
+/// [M04] section 3: views that arrange themselves (figures 12, 15, 16 and 17), in the hall, a small
+/// room and the periodic hall. `step` is told what comes next, once for each scene.
+void reproduce_lattice(const ReproductionOptions& options, Executor& executor,
+                       const std::function<void(const std::string&)>& step, Reproduction& result);
 
 /// [M03] table 1: bits of the raw image, the cylinder and the signature, counted from the objects.
 void reproduce_memory_table(Reproduction& result);

@@ -30,8 +30,8 @@ Reproduction reproduce_m04(const ReproductionOptions& options, Executor& executo
   experiments.push_back(component_weights_experiment());
   experiments.push_back(rivals_experiment());
 
-  // Each scene is one step for taking its views and one for every experiment.
-  const double steps = options.scenes * (1.0 + static_cast<double>(experiments.size()));
+  // Each scene is one step for taking its views, one for every experiment and one for the lattice.
+  const double steps = options.scenes * (2.0 + static_cast<double>(experiments.size()));
   double done = 0.0;
   const auto step = [&](const std::string& stage) {
     if (progress) progress(stage, done / steps);
@@ -55,6 +55,7 @@ Reproduction reproduce_m04(const ReproductionOptions& options, Executor& executo
   Reproduction result;
   reproduce_memory_table(result);
   for (const auto& experiment : experiments) experiment->report(options.out, result);
+  reproduce_lattice(options, executor, step, result);
   if (progress) progress("done", 1.0);
   return result;
 }

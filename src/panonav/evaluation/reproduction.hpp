@@ -37,8 +37,9 @@ struct Reproduction {
 /// Told what is being done and how far the whole is, 0 .. 1.
 using ReproductionProgress = std::function<void(std::string_view stage, double fraction)>;
 
-/// The localisation experiments of [M04] (figures 4 to 10, eq. 6), table 1 of [M03] and the rivals,
-/// over many variants of the office. Same options: same rows, but for times (unit ms), and same
+/// The experiments of [M04]: localisation (figures 4 to 10, eq. 6) with table 1 of [M03] and the
+/// rivals, over many variants of the office; the spring lattice (figures 12 and 15 to 17) over as
+/// many of the hall. Same options: same rows, but for times (unit ms), and same
 /// pictures on any number of threads. Throws OptionError, FileError.
 [[nodiscard]] Reproduction reproduce_m04(const ReproductionOptions& options, Executor& executor,
                                          const ReproductionProgress& progress = {});

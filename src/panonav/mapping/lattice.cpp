@@ -26,6 +26,8 @@ constexpr double kGivenUp = 0.25;              // springs of less weight do not 
 constexpr std::size_t kFarPairs = 2000;        // drawn for the level of far views
 // Of headings laid out by motion and phases; below what symmetric rooms may turn places by.
 constexpr double kLargestTurnError = 0.25 * std::numbers::pi;
+// More than half of the triangles of a spring must close.
+constexpr double kClosing = 0.5;
 constexpr double kSmallestAngle = 0.0035;  // rad; phases are packed in steps of 0.025
 
 double median_of(std::vector<double> values) {
@@ -283,15 +285,17 @@ class Arranger {
     if (options_.phases) keep_confirmed();
   }
 
-  /// Leaves out springs that close no triangle. A view without any that does hangs on the one part
+  /// Leaves out springs most of whose triangles do not close, or, where motion has told which views
+  /// are near, none. A view without any that does hangs on the one part
   /// to which most of its springs lead, so that it never joins two; or on others of its kind.
   void keep_confirmed() {
     auto& springs = lattice_.springs;
-    const auto closes = closes_triangle(size(), springs);
+    const auto closes = closing_triangles(size(), springs);
+    const double enough = by_motion_ ? 0.0 : kClosing;
     std::vector<GraphEdge> confirmed;
     std::vector<unsigned char> has_support(size());
     for (std::size_t s = 0; s < springs.size(); ++s) {
-      if (closes[s] == 0) continue;
+      if (!(closes[s] > enough)) continue;
       confirmed.push_back({springs[s].a, springs[s].b, 1.0});
       has_support[springs[s].a] = 1;
       has_support[springs[s].b] = 1;
@@ -312,7 +316,7 @@ class Arranger {
       const auto [a, b] = std::pair{springs[s].a, springs[s].b};
       const bool supported_a = has_support[a] != 0;
       const bool supported_b = has_support[b] != 0;
-      const bool keep = closes[s] != 0 ||
+      const bool keep = closes[s] > enough ||
                         (!supported_a && supported_b && hangs_on(a) == parts[b]) ||
                         (supported_a && !supported_b && hangs_on(b) == parts[a]) ||
                         (!supported_a && !supported_b && !hangs_on(a) && !hangs_on(b));

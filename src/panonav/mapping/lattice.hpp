@@ -77,8 +77,8 @@ struct Lattice {
 /// 1. Each view asks for springs to its `neighbours` most alike views, so cost grows with the views
 ///    and not with their pairs.
 /// 2. With phases, both views of a spring say where the other one lies and how it is turned. Pairs
-///    whose answers differ by more than 45 degrees have nothing in common and get no spring; a
-///    spring that no third view confirms is left out where others are confirmed.
+///    whose answers differ by more than 45 degrees have nothing in common and get no spring; nor do
+///    those of whose triangles with third views not more than half close.
 /// 3. The start is deterministic: multidimensional scaling of the shortest ways along the springs.
 ///    A mirror image is told by the directions; without phases it cannot be.
 /// 4. Springs and, with phases, directions and turns are brought to their least energy, and those

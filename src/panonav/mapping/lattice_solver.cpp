@@ -141,6 +141,7 @@ class Solver {
       }
     }
     solution_.weights.assign(springs.size(), 1.0);
+    trust_.resize(springs.size());
   }
 
   LatticeSolution solve() {
@@ -160,7 +161,7 @@ class Solver {
     for (std::size_t s = 0; s < springs_.size(); ++s) {
       const auto squares = squares_of(springs_[s]);
       const Group group = squares[phases] ? phases : length;
-      solution_.weights[s] = weight(springs_[s], squares[group].value_or(0.0), widths_[group]);
+      solution_.weights[s] = weight(s, group, squares[group].value_or(0.0));
     }
     return solution_;
   }
@@ -197,30 +198,49 @@ class Solver {
     return narrowed;
   }
 
-  [[nodiscard]] static double weight(const SpringTerm& spring, double square, double width) {
-    if (spring.certain) return 1.0;
-    const double share = width * width / (width * width + square);
-    return share * share;
+  /// What counts of a group of a spring's strains. Where the views tell direction and turn, lengths
+  /// are believed as far as these are, and then pull for ever: else a node could leave along a
+  /// direction.
+  [[nodiscard]] double weight(std::size_t s, Group group, double square) const {
+    if (springs_[s].certain) return 1.0;
+    const double share = square / (widths_[group] * widths_[group]);
+    if (group == phases || !trust_[s]) return 1.0 / ((1.0 + share) * (1.0 + share));
+    return *trust_[s] / std::sqrt(1.0 + share);
   }
   /// The loss that the weights belong to.
   [[nodiscard]] double energy() const {
     double sum = 0.0;
-    for (const SpringTerm& spring : springs_) {
-      const auto squares = squares_of(spring);
-      for (std::size_t g = 0; g < groups; ++g) {
-        if (!squares[g]) continue;
-        const double width = widths_[g] * widths_[g];
-        sum += spring.certain ? *squares[g] : *squares[g] * width / (width + *squares[g]);
+    for (std::size_t s = 0; s < springs_.size(); ++s) {
+      const auto squares = squares_of(springs_[s]);
+      for (const Group group : {phases, length, length_by_phases}) {
+        if (!squares[group]) continue;
+        const double width = widths_[group] * widths_[group];
+        const double share = *squares[group] / width;
+        if (springs_[s].certain) {
+          sum += *squares[group];
+        } else if (group == phases || !trust_[s]) {
+          sum += *squares[group] / (1.0 + share);
+        } else {
+          sum += *trust_[s] * 2.0 * width * (std::sqrt(1.0 + share) - 1.0);
+        }
       }
     }
     return sum;
   }
+  /// Makes up the mind on whose lengths to believe.
+  void judge() {
+    for (std::size_t s = 0; s < springs_.size(); ++s) {
+      const auto square = squares_of(springs_[s])[phases];
+      trust_[s] = square ? std::optional(weight(s, phases, *square)) : std::nullopt;
+    }
+  }
 
   void relax() {
-    double before = energy();
     double damping = 1e-6;
     for (int i = 0; i < kIterationsPerWidth; ++i) {
       ++solution_.iterations;
+      judge();
+      const double before = energy();
       assemble();
       bool better = false;
       double after = before;
@@ -236,7 +256,6 @@ class Solver {
         }
       }
       if (!better || before - after <= kEnough * before) break;
-      before = after;
     }
   }
 
@@ -245,7 +264,8 @@ class Solver {
     gradient_ = Eigen::VectorXd::Zero(unknowns_);
     // Every diagonal entry is there, whatever the springs touch.
     for (int i = 0; i < unknowns_; ++i) entries_.emplace_back(i, i, 0.0);
-    for (const SpringTerm& spring : springs_) {
+    for (std::size_t s = 0; s < springs_.size(); ++s) {
+      const SpringTerm& spring = springs_[s];
       const int first = unknown_[spring.a];
       const int second = unknown_[spring.b];
       if (first < 0 && second < 0) continue;
@@ -256,7 +276,7 @@ class Solver {
         return base < 0 ? -1 : base + i % 3;
       };
       for (const auto& entry : strain.used()) {
-        const double w = weight(spring, *squares[entry.group], widths_[entry.group]);
+        const double w = weight(s, entry.group, *squares[entry.group]);
         for (int i = 0; i < 6; ++i) {
           const double si = entry.slope[static_cast<std::size_t>(i)];
           const int ci = column(i);
@@ -303,6 +323,7 @@ class Solver {
   Eigen::SparseMatrix<double> matrix_;
   Eigen::VectorXd diagonal_;
   Eigen::VectorXd gradient_;
+  std::vector<std::optional<double>> trust_;  // in the lengths of each spring with phases
   std::array<double, groups> widths_{kWidth, kWidth, kWidth};
   LatticeSolution solution_;
 };

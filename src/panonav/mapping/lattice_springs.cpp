@@ -82,39 +82,44 @@ bool agrees(const LatticeSpring& spring) {
          spring.phases->turn_disagreement_rad <= kAgreement;
 }
 
-std::vector<unsigned char> closes_triangle(std::size_t nodes,
-                                           std::span<const LatticeSpring> springs) {
+std::vector<double> closing_triangles(std::size_t nodes, std::span<const LatticeSpring> springs) {
   std::vector<GraphEdge> edges;
   for (const auto& spring : springs) edges.push_back({spring.a, spring.b, spring.length});
   const LatticeGraph graph(nodes, edges);
-  std::vector<unsigned char> closes(springs.size());
+  std::vector<double> all(springs.size());
+  std::vector<double> closing(springs.size());
   std::vector<std::size_t> spring_to(nodes, springs.size());  // from the node at hand
   for (std::size_t a = 0; a < nodes; ++a) {
     for (const auto& n : graph.neighbours(a)) spring_to[n.node] = n.edge;
     for (const auto& n : graph.neighbours(a)) {
       const LatticeSpring& ab = springs[n.edge];
-      if (n.node < a || !has_direction(ab) || closes[n.edge] != 0) continue;
+      if (n.node < a || !has_direction(ab)) continue;
       const Pose2 to_b = step_from(a, ab);
       for (const auto& m : graph.neighbours(n.node)) {
-        if (m.node == a || spring_to[m.node] == springs.size()) continue;
+        // Each triangle once.
+        if (m.node < n.node || spring_to[m.node] == springs.size()) continue;
+        const std::size_t across = spring_to[m.node];
         const LatticeSpring& bc = springs[m.edge];
-        const LatticeSpring& ac = springs[spring_to[m.node]];
+        const LatticeSpring& ac = springs[across];
         if (!has_direction(bc) || !has_direction(ac)) continue;
         const Pose2 by_b = to_b * step_from(n.node, bc);
         const Pose2 straight = step_from(a, ac);
         const double longest = std::max({ab.length, bc.length, ac.length});
-        if (std::abs(angle_difference(by_b.heading_rad, straight.heading_rad)) <= kTurnsCancel &&
-            distance(by_b.position(), straight.position()) <= kWaysCancel * longest) {
-          closes[n.edge] = 1;
-          closes[m.edge] = 1;
-          closes[spring_to[m.node]] = 1;
-          break;
+        const bool closes =
+            std::abs(angle_difference(by_b.heading_rad, straight.heading_rad)) <= kTurnsCancel &&
+            distance(by_b.position(), straight.position()) <= kWaysCancel * longest;
+        for (const std::size_t edge : {n.edge, m.edge, across}) {
+          all[edge] += 1.0;
+          closing[edge] += closes ? 1.0 : 0.0;
         }
       }
     }
     for (const auto& n : graph.neighbours(a)) spring_to[n.node] = springs.size();
   }
-  return closes;
+  for (std::size_t s = 0; s < springs.size(); ++s) {
+    if (all[s] > 0.0) closing[s] /= all[s];
+  }
+  return closing;
 }
 
 }  // namespace panonav

@@ -38,9 +38,10 @@ class SpringViews {
 /// Whether the two views of the spring agree on how they lie to each other; true without phases.
 [[nodiscard]] bool agrees(const LatticeSpring& spring);
 
-/// For each spring whether it closes a triangle with two others in turn and in displacement, by
-/// their rest lengths. False for all without phases. Cost: springs * springs of a node.
-[[nodiscard]] std::vector<unsigned char> closes_triangle(std::size_t nodes,
-                                                         std::span<const LatticeSpring> springs);
+/// For each spring the share of the triangles with two others that close, in turn and in
+/// displacement by their rest lengths, 0 .. 1; 0 where there are none, and without phases. Cost:
+/// springs * springs of a node.
+[[nodiscard]] std::vector<double> closing_triangles(std::size_t nodes,
+                                                    std::span<const LatticeSpring> springs);
 
 }  // namespace panonav
