@@ -8,7 +8,7 @@ std::vector<Verb> all_verbs() {
       demo_verb(),      simulate_verb(),
 #endif
       calibrate_verb(), unwrap_verb(),   memorise_verb(),  info_verb(), verify_verb(),
-      forget_verb(),    localise_verb(), track_verb(),     home_verb(),
+      forget_verb(),    localise_verb(), track_verb(),     map_verb(),  home_verb(),
 #ifdef PANONAV_COMMAND_SIMULATES
       catchment_verb(), evaluate_verb(), reproduce_verb(),
 #endif

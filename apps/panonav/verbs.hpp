@@ -17,6 +17,7 @@ namespace panonav::command {
 [[nodiscard]] Verb home_verb();
 [[nodiscard]] Verb info_verb();
 [[nodiscard]] Verb localise_verb();
+[[nodiscard]] Verb map_verb();
 [[nodiscard]] Verb memorise_verb();
 [[nodiscard]] Verb reproduce_verb();
 [[nodiscard]] Verb simulate_verb();

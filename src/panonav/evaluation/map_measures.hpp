@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <span>
+
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/mapping/topological_map.hpp"
+
+namespace panonav {
+
+/// How well a map keeps who is next to whom (Venna and Kaski 2001); 1 is perfect, 0.5 about what
+/// chance gives.
+struct NeighbourPreservation {
+  double trustworthiness = 1.0;  ///< neighbours in the map are neighbours in truth
+  double continuity = 1.0;       ///< neighbours in truth are neighbours in the map
+};
+
+/// Over the `neighbours` nearest of each point; ties by order. Throws ContractError on sets of
+/// different size, a coordinate that is not finite, and unless 1 <= neighbours and 3 neighbours + 1
+/// < 2 points, for which the measure is defined. Cost O(n^2 log n).
+[[nodiscard]] NeighbourPreservation neighbour_preservation(std::span<const Point2> map,
+                                                           std::span<const Point2> truth,
+                                                           int neighbours);
+
+/// Closures of a map by how far apart their views truly are.
+struct ClosureCount {
+  std::size_t right = 0;    ///< at most the distance asked for
+  std::size_t wrong = 0;    ///< farther
+  std::size_t unknown = 0;  ///< the truth of a view is not known
+};
+[[nodiscard]] ClosureCount count_closures(const TopologicalMap& map,
+                                          const std::function<std::optional<Point2>(ViewId)>& truth,
+                                          double right_within_m);
+
+}  // namespace panonav

@@ -1,0 +1,89 @@
+#include "panonav/io/graph_file.hpp"
+
+#include <string_view>
+
+#include "panonav/core/error.hpp"
+#include "panonav/io/atomic_file.hpp"
+
+namespace panonav {
+
+namespace {
+
+std::string_view name_of(LinkKind kind) {
+  switch (kind) {
+    case LinkKind::sequence:
+      return "sequence";
+    case LinkKind::neighbour:
+      return "neighbour";
+    case LinkKind::closure:
+      return "closure";
+  }
+  return "";
+}
+
+std::string escaped(std::string_view text) {
+  std::string safe;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        safe += "&amp;";
+        break;
+      case '<':
+        safe += "&lt;";
+        break;
+      case '>':
+        safe += "&gt;";
+        break;
+      case '"':
+        safe += "&quot;";
+        break;
+      default:
+        // Other control characters have no place in XML.
+        safe += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+    }
+  }
+  return safe;
+}
+
+std::string data(std::string_view key, std::string_view value) {
+  return "<data key=\"" + std::string(key) + "\">" + std::string(value) + "</data>";
+}
+
+std::string pose_data(const Pose2& pose) {
+  return data("x_m", to_text(pose.x_m)) + data("y_m", to_text(pose.y_m)) +
+         data("heading_rad", to_text(pose.heading_rad));
+}
+
+}  // namespace
+
+void write_graph(const std::filesystem::path& path, const TopologicalMap& map,
+                 const std::function<std::string(ViewId)>& name) {
+  validate(map);
+  std::string text =
+      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
+      "<graphml xmlns=\"http://graphml.graphdrawing.org/xmlns\">\n";
+  for (const std::string key : {"x_m", "y_m", "heading_rad"}) {
+    text +=
+        "<key id=\"" + key + "\" for=\"all\" attr.name=\"" + key + "\" attr.type=\"double\"/>\n";
+  }
+  text +=
+      "<key id=\"name\" for=\"node\" attr.name=\"name\" attr.type=\"string\"/>\n"
+      "<key id=\"part\" for=\"node\" attr.name=\"part\" attr.type=\"long\"/>\n"
+      "<key id=\"kind\" for=\"edge\" attr.name=\"kind\" attr.type=\"string\"/>\n"
+      "<key id=\"weight\" for=\"edge\" attr.name=\"weight\" attr.type=\"double\"/>\n"
+      "<graph edgedefault=\"directed\">\n";
+  for (const MapNode& node : map.nodes) {
+    text += "<node id=\"" + std::to_string(node.view.value) + "\">" +
+            data("name", escaped(name(node.view))) + pose_data(node.pose) +
+            data("part", std::to_string(node.part)) + "</node>\n";
+  }
+  for (const MapEdge& edge : map.edges) {
+    text += "<edge source=\"" + std::to_string(edge.a.value) + "\" target=\"" +
+            std::to_string(edge.b.value) + "\">" + data("kind", name_of(edge.kind)) +
+            data("weight", to_text(edge.weight)) + pose_data(edge.a_from_b) + "</edge>\n";
+  }
+  text += "</graph>\n</graphml>\n";
+  write_file(path, text);
+}
+
+}  // namespace panonav
