@@ -63,7 +63,9 @@ std::size_t largest_part(const TopologicalMap& map) {
 MappedRun map_recording(const Dataset& recording, const MemoryPipeline& pipeline,
                         const MapSettings& settings, MemoryFile& memory, Session& session) {
   MappedRun run;
-  VisualMemory seen = memory.load();
+  // The nodes so far: a memory that knew what is still to come would be asked another question.
+  const MemoryHeader& header = memory.header();
+  VisualMemory seen(header.shape, header.full_scale, header.elevations);
   TopologicalMapper mapper(seen, settings.mapping, settings.odometry, settings.closure,
                            settings.graph);
   run.wheels = settings.mapping.wheel_lengths &&
@@ -86,20 +88,18 @@ MappedRun map_recording(const Dataset& recording, const MemoryPipeline& pipeline
         ++run.skipped;
         continue;
       }
-      auto id = seen.find(entry.file);
-      if (!id) {
-        const NewView added{{entry.file, entry.pose, entry.stamp_s},
-                            pack(view.signature, memory.header().full_scale),
-                            std::move(views[i]->thumbnail)};
-        id = memory.append(added);
-        seen.append_as(*id, added.signature, added.info);
-      }
+      const NewView added{{entry.file, entry.pose, entry.stamp_s},
+                          pack(view.signature, header.full_scale),
+                          std::move(views[i]->thumbnail)};
+      const auto known = memory.find(entry.file);
+      const ViewId id = known ? *known : memory.append(added);
       const auto moved = run.entries.empty()
                              ? std::nullopt
                              : wheel_step(recording.entries[run.entries.back()], entry);
       start = Clock::now();
       try {
-        static_cast<void>(mapper.add(*id, std::move(view), moved));
+        seen.append_as(id, added.signature, added.info);
+        static_cast<void>(mapper.add(id, std::move(view), moved));
       } catch (const ContractError& error) {
         throw FileError(memory.path().string(), entry.file + ": " + error.what());
       }

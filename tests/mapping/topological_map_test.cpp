@@ -152,6 +152,10 @@ TEST(TopologicalMapper, WhatNothingConnectsBecomesAPartOfItsOwn) {
   with_wheels.add(world.seen_from(truth[0]));
   EXPECT_FALSE(with_wheels.add(empty_view(), Pose2{0.1, 0.0, 0.0}).new_part);
   EXPECT_EQ(number_of_parts(with_wheels.mapper.map()), 1U);
+  Mapping bridged({.bridge_m = 0.5});
+  bridged.add(world.seen_from(truth[0]));
+  EXPECT_FALSE(bridged.add(empty_view()).new_part);
+  EXPECT_NEAR(bridged.mapper.poses().back().x_m, 0.5, 1e-9);
   // The second round joins the parts again.
   for (std::size_t i = 61; i < truth.size(); ++i) mapping.add(world.seen_from(truth[i]));
   mapping.mapper.finish();

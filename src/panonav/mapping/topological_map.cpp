@@ -86,6 +86,11 @@ void visit_options(MappingOptions& options, OptionVisitor& visitor) {
       options.capture_difference);
   visitor.visit({.name = "close_loops", .help = "look for places passed before"},
                 options.close_loops);
+  visitor.visit({.name = "bridge_m",
+                 .help = "length of steps that neither views nor wheels show; 0: a new part begins",
+                 .low = 0.0,
+                 .high = 1e6},
+                options.bridge_m);
   visitor.visit({.name = "wheel_lengths", .help = "take the length of steps from the wheels"},
                 options.wheel_lengths);
   visitor.visit({.name = "step_deviation",
@@ -129,6 +134,16 @@ bool TopologicalMapper::is_new(const OdometryView& view) const {
 void TopologicalMapper::add_step(const std::optional<VisualStep>& step,
                                  const std::optional<Pose2>& moved, MapUpdate& update) {
   const std::size_t here = nodes_.size() - 1;
+  if (!step && !moved && options_.bridge_m > 0.0) {
+    constexpr double any_heading_rad = 1.0;
+    edges_.push_back(
+        {here - 1, here, {options_.bridge_m, 0.0, 0.0}, options_.bridge_m, any_heading_rad});
+    weights_.push_back(1.0);
+    poses_.push_back(poses_.back() * edges_.back().a_from_b);
+    parts_.push_back(parts_.back());
+    nodes_[here].way_m = nodes_[here - 1].way_m + options_.bridge_m;
+    return;
+  }
   if (!step && !moved) {
     // A frame of its own; the way goes on, so that its views are no candidates for each other.
     update.new_part = true;

@@ -51,6 +51,10 @@ struct MappingOptions {
   /// capture by threshold, as in F11's second set. 0 keeps every view.
   double capture_difference = 0.0;
   bool close_loops = true;
+  /// Where neither views nor wheels show a step, it counts as so long, straight ahead and as
+  /// uncertain as it is long: for recordings in order whose pictures stand far apart. 0: a new part
+  /// begins.
+  double bridge_m = 0.0;
   /// Lengths of steps are taken from the wheels where these are known; turns and directions come
   /// from the views all the same.
   bool wheel_lengths = true;
@@ -76,7 +80,7 @@ struct MapUpdate {
 /// before to where it fits the older map; where that leaves it contradicted, the whole is optimised
 /// as a pose graph, if it has grown by a hundredth since the last time: so the cost of a view stays
 /// small however large the map. Where neither views nor wheels tell the step, a part begins
-/// that has its own frame; a closure joins it with the others.
+/// that has its own frame, unless it is bridged; a closure joins it with the others.
 class TopologicalMapper {
  public:
   /// `memory` must outlive the mapper. Throws OptionError.

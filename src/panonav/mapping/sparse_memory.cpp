@@ -1,0 +1,249 @@
+#include "panonav/mapping/sparse_memory.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <set>
+#include <unordered_map>
+#include <unordered_set>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/homing/fourier_homing.hpp"
+#include "panonav/homing/homing_view.hpp"
+
+namespace panonav {
+
+namespace {
+
+/// Kept views by the square of the floor in which they lie.
+class KeptByPlace {
+ public:
+  explicit KeptByPlace(double reach_m) : reach_m_(reach_m) {}
+
+  void insert(ViewId view, Point2 position) { cells_[key(position)].push_back({view, position}); }
+
+  template <class Visit>
+  void visit_near(Point2 position, const Visit& visit) const {
+    for (int dx = -1; dx <= 1; ++dx) {
+      for (int dy = -1; dy <= 1; ++dy) {
+        const auto cell =
+            cells_.find(key({position.x_m + dx * reach_m_, position.y_m + dy * reach_m_}));
+        if (cell == cells_.end()) continue;
+        for (const auto& [view, at] : cell->second) {
+          if (distance(at, position) <= reach_m_) visit(view, distance(at, position));
+        }
+      }
+    }
+  }
+
+ private:
+  [[nodiscard]] std::uint64_t key(Point2 p) const {
+    // Wraps far away, where two cells may share a key: the distance is checked all the same.
+    const auto x = static_cast<std::int64_t>(std::floor(std::fmod(p.x_m / reach_m_, 1e9)));
+    const auto y = static_cast<std::int64_t>(std::floor(std::fmod(p.y_m / reach_m_, 1e9)));
+    return (static_cast<std::uint64_t>(x) << 32U) ^ (static_cast<std::uint64_t>(y) & 0xFFFFFFFFU);
+  }
+  double reach_m_;
+  std::unordered_map<std::uint64_t, std::vector<std::pair<ViewId, Point2>>> cells_;
+};
+
+// Views at most so many links away, without the view itself.
+std::vector<ViewId> within_links(const VisualMemory& memory, ViewId view, int links) {
+  std::unordered_set<ViewId> seen{view};
+  std::vector<ViewId> found;
+  std::vector<ViewId> front{view};
+  for (int i = 0; i < links && !front.empty(); ++i) {
+    std::vector<ViewId> next;
+    for (const ViewId at : front) {
+      for (const ViewId neighbour : memory.neighbours(at)) {
+        if (seen.insert(neighbour).second) next.push_back(neighbour);
+      }
+    }
+    found.insert(found.end(), next.begin(), next.end());
+    front = std::move(next);
+  }
+  return found;
+}
+
+/// Who stands for a view: itself where it is kept.
+class Representatives {
+ public:
+  explicit Representatives(const SparseSelection& selection) {
+    for (const RedundantView& redundant : selection.redundant) {
+      kept_.emplace(redundant.view, redundant.kept);
+    }
+  }
+  [[nodiscard]] ViewId of(ViewId view) const {
+    const auto found = kept_.find(view);
+    return found == kept_.end() ? view : found->second;
+  }
+
+ private:
+  std::unordered_map<ViewId, ViewId> kept_;
+};
+
+/// Says of each pair of views whether it is new.
+class Pairs {
+ public:
+  bool insert(ViewId a, ViewId b) { return pairs_.insert(std::minmax(a.value, b.value)).second; }
+
+ private:
+  std::set<std::pair<std::uint32_t, std::uint32_t>> pairs_;
+};
+
+double middle_of(std::vector<double> values, double fraction) {
+  const auto at = static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + at, values.end());
+  return values[static_cast<std::size_t>(at)];
+}
+
+}  // namespace
+
+void visit_options(SparseMemoryOptions& options, OptionVisitor& visitor) {
+  visitor.visit({.name = "most_difference",
+                 .help = "a view is redundant when one that is kept differs by no more",
+                 .low = 0.0,
+                 .high = 1.0},
+                options.most_difference);
+  visitor.visit({.name = "reach_m",
+                 .help = "only a view so near stands for another, where positions are known",
+                 .low = 0.0,
+                 .high = 1e6,
+                 .low_open = true},
+                options.reach_m);
+  visitor.visit({.name = "reach_links",
+                 .help = "only a view so many links away, where they are not",
+                 .low = 0,
+                 .high = 1000},
+                options.reach_links);
+  visitor.visit({.name = "outdated_within_m",
+                 .help = "a view is outdated when a newer one was taken so near; 0: never",
+                 .low = 0.0,
+                 .high = 1e6},
+                options.outdated_within_m);
+}
+
+SparseSelection select_references(const VisualMemory& memory, const SparseMemoryOptions& options) {
+  validate(options);
+  SparseSelection selection;
+  KeptByPlace by_place(std::max(options.reach_m, options.outdated_within_m));
+  std::unordered_map<ViewId, HomingView> kept;
+  const auto views = memory.views();
+  for (auto at = views.rbegin(); at != views.rend(); ++at) {
+    const ViewId view = *at;
+    HomingView seen = homing_view(memory.signature(view));
+    const auto& pose = memory.info(view).pose;
+    std::optional<RedundantView> best;
+    const auto consider = [&](ViewId other, std::optional<double> distance_m) {
+      const auto found = kept.find(other);
+      if (found == kept.end()) return;
+      const double difference = image_difference(found->second, seen);
+      const bool outdated = distance_m && *distance_m < options.outdated_within_m;
+      const bool alike =
+          difference <= options.most_difference && (!distance_m || *distance_m <= options.reach_m);
+      if (!outdated && !alike) return;
+      if (best && best->difference <= difference) return;
+      best = RedundantView{view, other, difference, !alike};
+    };
+    if (pose) {
+      by_place.visit_near(pose->position(), consider);
+    } else {
+      for (const ViewId other : within_links(memory, view, options.reach_links)) {
+        consider(other, std::nullopt);
+      }
+    }
+    if (best) {
+      selection.redundant.push_back(*best);
+      continue;
+    }
+    selection.kept.push_back(view);
+    kept.emplace(view, std::move(seen));
+    if (pose) by_place.insert(view, pose->position());
+  }
+  std::ranges::reverse(selection.kept);
+  std::ranges::reverse(selection.redundant);
+  return selection;
+}
+
+std::vector<Link> contract_links(std::span<const Link> links, const SparseSelection& selection) {
+  const Representatives representatives(selection);
+  Pairs pairs;
+  std::vector<Link> left;
+  for (const Link& link : links) {
+    const Link moved{representatives.of(link.a), representatives.of(link.b), link.kind};
+    if (moved.a != moved.b && pairs.insert(moved.a, moved.b)) left.push_back(moved);
+  }
+  return left;
+}
+
+TopologicalMap contract_map(const TopologicalMap& map, const SparseSelection& selection) {
+  validate(map);
+  const Representatives representatives(selection);
+  TopologicalMap left;
+  for (const MapNode& node : map.nodes) {
+    if (representatives.of(node.view) == node.view) left.nodes.push_back(node);
+  }
+  const auto node_of = [&](ViewId view) -> const MapNode* {
+    const auto found = std::ranges::lower_bound(left.nodes, view, {}, &MapNode::view);
+    return found != left.nodes.end() && found->view == view ? &*found : nullptr;
+  };
+  Pairs pairs;
+  for (const MapEdge& edge : map.edges) {
+    MapEdge moved = edge;
+    moved.a = representatives.of(edge.a);
+    moved.b = representatives.of(edge.b);
+    const MapNode* const a = node_of(moved.a);
+    const MapNode* const b = node_of(moved.b);
+    // A view outside of the map, or of another part, may stand for one in it.
+    if (moved.a == moved.b || a == nullptr || b == nullptr || a->part != b->part) continue;
+    if (!pairs.insert(moved.a, moved.b)) continue;
+    if (moved.a != edge.a || moved.b != edge.b) moved.a_from_b = inverse(a->pose) * b->pose;
+    left.edges.push_back(moved);
+  }
+  return left;
+}
+
+SparseLoss measure_loss(const VisualMemory& memory, const SparseSelection& selection,
+                        std::size_t most_asked) {
+  require(most_asked >= 1, "most_asked", static_cast<double>(most_asked), ">= 1");
+  SparseLoss loss;
+  const std::size_t count = selection.redundant.size();
+  if (count == 0) return loss;
+  std::vector<ViewId> dropped;
+  for (const RedundantView& redundant : selection.redundant) dropped.push_back(redundant.view);
+  const std::size_t asked = std::min(count, most_asked);
+  std::vector<double> differences;
+  std::vector<double> before_m;
+  std::vector<double> after_m;
+  for (std::size_t i = 0; i < asked; ++i) {
+    const RedundantView& redundant = selection.redundant[i * count / asked];
+    differences.push_back(redundant.difference);
+    const auto& pose = memory.info(redundant.view).pose;
+    if (!pose) continue;
+    const PackedSignature query = memory.packed(redundant.view);
+    const std::vector<ViewId> itself{redundant.view};
+    const auto error_m = [&](std::span<const ViewId> excluded) -> std::optional<double> {
+      const auto found = memory.search(query, {.top = 1}, {.excluded_views = excluded});
+      if (found.matches.empty()) return std::nullopt;
+      const auto& other = memory.info(found.matches.front().view).pose;
+      if (!other) return std::nullopt;
+      return distance(other->position(), pose->position());
+    };
+    const auto before = error_m(itself);
+    const auto after = error_m(dropped);
+    if (!before || !after) continue;
+    before_m.push_back(*before);
+    after_m.push_back(*after);
+  }
+  loss.asked = asked;
+  loss.median_difference = middle_of(differences, 0.5);
+  if (before_m.size() >= 2) {
+    loss.positions = SparseLoss::Positions{middle_of(before_m, 0.5), middle_of(before_m, 0.95),
+                                           middle_of(after_m, 0.5), middle_of(after_m, 0.95)};
+  }
+  return loss;
+}
+
+}  // namespace panonav

@@ -1,0 +1,104 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "command_runner.hpp"
+#include "landmark_world.hpp"
+
+namespace panonav::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+// One and a quarter rounds of 7.5 m.
+std::vector<Pose2> round_trip() {
+  std::vector<Pose2> poses;
+  for (int i = 0; i < 100; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / 80.0;
+    poses.push_back({2.0 + 1.2 * std::sin(angle), 2.0 - 1.2 * std::cos(angle), 0.0});
+  }
+  return poses;
+}
+
+class Map : public ::testing::Test {
+ protected:
+  void SetUp() override { write_dataset(folder_.path() / "run", LandmarkWorld(3), round_trip()); }
+  [[nodiscard]] std::string memory() const { return folder_ / "m.panonav"; }
+  [[nodiscard]] json map(std::vector<std::string> more = {}) const {
+    std::vector<std::string> arguments{"map", folder_ / "run", memory(), "--json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const auto result = run_panonav(arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_EQ(result.err, "");
+    return json::parse(result.out);
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(Map, EveryPictureBecomesANodeOfTheMap) {
+  const json said = map({"--tum", folder_ / "m.tum", "--graphml", folder_ / "m.graphml"});
+  for (const char* key : {"memory", "pictures", "nodes", "skipped", "parts", "closures", "scale_m",
+                          "wheel_lengths", "step_ms", "truth"}) {
+    EXPECT_TRUE(said.contains(key)) << key;
+  }
+  EXPECT_EQ(said["nodes"], 100);
+  EXPECT_EQ(said["wheel_lengths"], false);
+  std::ifstream tum(folder_ / "m.tum");
+  std::size_t lines = 0;
+  for (std::string line; std::getline(tum, line);) lines += line.empty() || line[0] == '#' ? 0 : 1;
+  EXPECT_EQ(lines, said["parts"][0]);
+  EXPECT_TRUE(fs::exists(folder_ / "m.graphml"));
+  const auto verified = run_panonav({"verify", memory()});
+  EXPECT_EQ(verified.exit_code, 0) << verified.out;
+  // A second time the views are known, and the map is the same.
+  json again = map();
+  json before = said;
+  again.erase("step_ms");
+  before.erase("step_ms");
+  EXPECT_EQ(again, before);
+}
+
+TEST_F(Map, ViewsThatHardlyDifferAreSkipped) {
+  const json said = map({"--capture-difference", "0.05"});
+  EXPECT_LT(said["nodes"], 100);
+  EXPECT_GT(said["nodes"], 5);
+  EXPECT_EQ(said["nodes"].get<int>() + said["skipped"].get<int>(), 100);
+}
+
+TEST_F(Map, PruneShrinksTheMemoryAndKeepsTheMapWhole) {
+  const json said = map();
+  const auto dry =
+      run_panonav({"prune", memory(), "--dry-run", "--most-difference", "0.05", "--json"});
+  ASSERT_EQ(dry.exit_code, 0) << dry.err;
+  const auto pruned = run_panonav({"prune", memory(), "--most-difference", "0.05", "--json"});
+  ASSERT_EQ(pruned.exit_code, 0) << pruned.err;
+  const json result = json::parse(pruned.out);
+  EXPECT_EQ(result["views_before"], 100);
+  EXPECT_LT(result["views"], 100);
+  EXPECT_GT(result["factor"], 1.0);
+  EXPECT_EQ(json::parse(dry.out)["views"], result["views"]);
+  const auto info = run_panonav({"info", memory(), "--json"});
+  EXPECT_EQ(json::parse(info.out)["views"], result["views"]);
+  EXPECT_GE(json::parse(info.out)["links"].get<int>(),
+            result["views"].get<int>() - static_cast<int>(said["parts"].size()));
+  EXPECT_EQ(run_panonav({"verify", memory()}).exit_code, 0);
+}
+
+TEST_F(Map, WrongUseIsRefused) {
+  EXPECT_NE(refusal({"map", folder_ / "run", memory(), "--scale-m", "0"}).find("scale_m"),
+            std::string::npos);
+  EXPECT_FALSE(fs::exists(memory()));
+  EXPECT_NE(refusal({"map", folder_ / "none", memory()}).find("none"), std::string::npos);
+  static_cast<void>(map());
+  EXPECT_NE(refusal({"map", folder_ / "run", memory(), "--components", "9"}).find("keeps"),
+            std::string::npos);
+  EXPECT_NE(refusal({"prune", folder_ / "none.panonav"}).find("none.panonav"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace panonav::testing
