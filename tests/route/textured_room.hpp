@@ -14,12 +14,12 @@ namespace panonav::testing {
 /// A rectangular room with pillars, all with smooth random textures, seen in the plane.
 class TexturedRoom {
  public:
-  explicit TexturedRoom(std::uint64_t seed, double width_m = 8.0, double depth_m = 6.0)
-      : width_m_(width_m), depth_m_(depth_m) {
+  /// `finest`: the highest frequency of the textures, radians a metre.
+  explicit TexturedRoom(std::uint64_t seed, double finest = 9.0) {
     Random random(seed);
     for (int wave = 0; wave < 24; ++wave) {
       waves_.push_back(
-          {random.uniform(0.5, 9.0), random.uniform(0.0, 6.28), random.uniform(-1.0, 1.0)});
+          {random.uniform(0.5, finest), random.uniform(0.0, 6.28), random.uniform(-1.0, 1.0)});
     }
     for (int i = 0; i < 4; ++i) {
       pillars_.push_back(
@@ -96,7 +96,8 @@ class TexturedRoom {
     return value;
   }
 
-  double width_m_, depth_m_;
+  double width_m_ = 8.0;
+  double depth_m_ = 6.0;
   std::vector<Wave> waves_;
   std::vector<Pillar> pillars_;
 };

@@ -98,15 +98,8 @@ RouteLines::RouteLines(const RoutePanorama& route, const RouteFitOptions& option
         static_cast<std::size_t>(std::lround(usual_distance_m * sigma_rad / (2.0 * spacing_m)));
     levels_.push_back(std::move(level));
   }
-  std::vector<float> line(static_cast<std::size_t>(columns_));
-  std::vector<float> turned(line.size());
   for (std::size_t i = 0; i < route.size(); ++i) {
-    const auto bytes = route.line(i);
-    for (std::size_t c = 0; c < line.size(); ++c) line[c] = static_cast<float>(bytes[c]) / 255.0F;
-    const double turn = poses_[i].heading_rad * columns_ / (2.0 * pi);
-    for (std::size_t c = 0; c < line.size(); ++c) {
-      turned[c] = sample_line(line, static_cast<double>(c) - turn).value;
-    }
+    const auto turned = world_line(route, i);
     for (Level& level : levels_) {
       const auto smooth = smoothed_line(turned, level.sigma);
       level.values.insert(level.values.end(), smooth.begin(), smooth.end());

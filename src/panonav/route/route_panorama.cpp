@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <string>
 
 #include "panonav/core/error.hpp"
 #include "panonav/motion/path.hpp"
+#include "panonav/route/line_sampling.hpp"
 
 namespace panonav {
 
@@ -39,6 +42,18 @@ bool RoutePanorama::append(const Pose2& pose, std::span<const std::uint8_t> line
   poses_.push_back({pose.x_m, pose.y_m, wrap_angle(pose.heading_rad)});
   bytes_.insert(bytes_.end(), line.begin(), line.end());
   return true;
+}
+
+std::vector<float> world_line(const RoutePanorama& route, std::size_t i) {
+  const auto bytes = route.line(i);
+  std::vector<float> line(bytes.size());
+  for (std::size_t c = 0; c < line.size(); ++c) line[c] = static_cast<float>(bytes[c]) / 255.0F;
+  const double turn = route.poses()[i].heading_rad * route.columns() / (2.0 * std::numbers::pi);
+  std::vector<float> turned(line.size());
+  for (std::size_t c = 0; c < line.size(); ++c) {
+    turned[c] = sample_line(line, static_cast<double>(c) - turn).value;
+  }
+  return turned;
 }
 
 double RoutePanorama::length_m() const {

@@ -46,4 +46,8 @@ class RoutePanorama {
   std::vector<std::uint8_t> bytes_;
 };
 
+/// Line i in the world's frame, 0 .. 1: value c is what lies in direction 2 pi c / columns from the
+/// world's x axis.
+[[nodiscard]] std::vector<float> world_line(const RoutePanorama& route, std::size_t i);
+
 }  // namespace panonav

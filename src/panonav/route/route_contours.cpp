@@ -1,0 +1,322 @@
+#include "panonav/route/route_contours.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <string>
+
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/route/line_sampling.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+std::vector<float> slopes(std::span<const float> line) {
+  std::vector<float> result(line.size());
+  for (std::size_t c = 0; c < line.size(); ++c) {
+    const float left = line[(c + line.size() - 1) % line.size()];
+    const float right = line[(c + 1) % line.size()];
+    result[c] = 0.5F * (right - left);
+  }
+  return result;
+}
+
+// Local maxima of the slope's size that exceed its mean, the strongest first wins.
+std::vector<int> edge_columns(std::span<const float> edges, int most) {
+  double mean = 0.0;
+  for (const float edge : edges)
+    mean += static_cast<double>(std::abs(edge)) / static_cast<double>(edges.size());
+  std::vector<int> columns;
+  const std::size_t size = edges.size();
+  for (std::size_t c = 0; c < size; ++c) {
+    const float here = std::abs(edges[c]);
+    if (static_cast<double>(here) <= mean) continue;
+    if (here < std::abs(edges[(c + size - 1) % size]) || here < std::abs(edges[(c + 1) % size]))
+      continue;
+    columns.push_back(static_cast<int>(c));
+  }
+  std::ranges::stable_sort(columns, std::greater<>{},
+                           [&](int c) { return std::abs(edges[static_cast<std::size_t>(c)]); });
+  if (columns.size() > static_cast<std::size_t>(most))
+    columns.resize(static_cast<std::size_t>(most));
+  std::ranges::sort(columns);
+  return columns;
+}
+
+double wrap_columns(double columns, double size) {
+  return columns - size * std::floor(columns / size + 0.5);
+}
+
+}  // namespace
+
+void visit_options(RouteContourOptions& options, OptionVisitor& visitor) {
+  visitor.visit({.name = "margin_m",
+                 .help = "both contours start so far from the prediction",
+                 .low = 0.001,
+                 .high = 10},
+                options.margin_m);
+  visitor.visit({.name = "tension", .help = "w_alpha", .low = 0, .high = 1000}, options.tension);
+  visitor.visit({.name = "rigidity", .help = "w_beta", .low = 0, .high = 1000}, options.rigidity);
+  visitor.visit({.name = "image", .help = "w_diff", .low = 0, .high = 1000}, options.image);
+  visitor.visit({.name = "pull", .help = "w_pull", .low = 0, .high = 1000}, options.pull);
+  visitor.visit({.name = "constant", .help = "w_const", .low = 0, .high = 1000}, options.constant);
+  visitor.visit({.name = "smoothing_deg",
+                 .help = "of the lines before they are differentiated",
+                 .low = 0,
+                 .high = 45},
+                options.smoothing_deg);
+  visitor.visit({.name = "most_points", .help = "control points", .low = 8, .high = 10000},
+                options.most_points);
+  visitor.visit(
+      {.name = "most_iterations", .help = "until the contours stop", .low = 1, .high = 100000},
+      options.most_iterations);
+}
+
+RouteContours::RouteContours(const RoutePanorama& route, const RouteContourOptions& options)
+    : columns_(route.columns()),
+      options_(options),
+      poses_(route.poses().begin(), route.poses().end()),
+      directions_(equal_directions(static_cast<std::size_t>(route.columns()))) {
+  validate(options);
+  if (route.size() < 2) {
+    throw ContractError("lines of the route", static_cast<double>(route.size()), "2 or more");
+  }
+  spacing_m_ = route.length_m() / static_cast<double>(route.size() - 1);
+  for (std::size_t i = 0; i < route.size(); ++i) {
+    const auto line =
+        slopes(smoothed_line(world_line(route, i), options.smoothing_deg * columns_ / 360.0));
+    edges_.insert(edges_.end(), line.begin(), line.end());
+  }
+}
+
+float RouteContours::edge(double along, double azimuth) const noexcept {
+  const auto size = static_cast<long long>(columns_);
+  const double at = std::clamp(along, 0.0, static_cast<double>(poses_.size() - 1));
+  const auto row = std::min(static_cast<std::size_t>(at), poses_.size() - 2);
+  const auto fy = static_cast<float>(at - static_cast<double>(row));
+  const double whole = std::floor(azimuth);
+  const auto fx = static_cast<float>(azimuth - whole);
+  const auto c0 = static_cast<std::size_t>(((static_cast<long long>(whole) % size) + size) % size);
+  const std::size_t c1 = (c0 + 1) % static_cast<std::size_t>(size);
+  const float* const a = edges_.data() + row * static_cast<std::size_t>(columns_);
+  const float* const b = a + columns_;
+  return (1.0F - fy) * ((1.0F - fx) * a[c0] + fx * a[c1]) + fy * ((1.0F - fx) * b[c0] + fx * b[c1]);
+}
+
+std::vector<RouteCrossing> RouteContours::curve(Point2 viewpoint) const {
+  std::vector<RouteCrossing> crossings(static_cast<std::size_t>(columns_));
+  cross_route(poses_, 0, viewpoint, directions_, crossings);
+  return crossings;
+}
+
+// Dynamic programming along the contour: each control point stays or goes to one of its eight
+// neighbours, and pairs of neighbours share eq. 7 and 11. The second derivative takes the point
+// after next from the last iteration.
+void RouteContours::move(std::vector<ContourPoint>& contour, const std::vector<ContourPoint>& other,
+                         const std::vector<int>& columns, std::span<const float> edges,
+                         const std::vector<bool>& joined, double step) const {
+  constexpr std::size_t choices = 9;
+  const std::size_t n = contour.size();
+  const auto size = static_cast<double>(columns_);
+  const auto choice = [&](std::size_t i, std::size_t k) {
+    const double da = (static_cast<double>(k % 3) - 1.0) * step;
+    const double dt = (static_cast<double>(k / 3) - 1.0) * step;
+    return ContourPoint{contour[i].azimuth + da, contour[i].along + dt};
+  };
+  std::vector<std::array<double, choices>> cost(n);
+  std::vector<std::array<std::size_t, choices>> from(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto target = edges[static_cast<std::size_t>(columns[i])];
+    for (std::size_t k = 0; k < choices; ++k) {
+      const ContourPoint at = choice(i, k);
+      const double off_azimuth = wrap_columns(other[i].azimuth - at.azimuth, size);
+      const double off_along = other[i].along - at.along;
+      double own =
+          options_.image * static_cast<double>(std::abs(edge(at.along, at.azimuth) - target));
+      own += 0.5 * options_.pull * (off_azimuth * off_azimuth + off_along * off_along);
+      if (i == 0) {
+        cost[i][k] = own;
+        continue;
+      }
+      double best = std::numeric_limits<double>::infinity();
+      const double wanted = static_cast<double>(columns[i] - columns[i - 1]);
+      for (std::size_t j = 0; j < choices; ++j) {
+        const ContourPoint before = choice(i - 1, j);
+        // Contours are drawn over azimuth: per column, so that close points do not count more.
+        const double along = (at.along - before.along) / wanted;
+        const double interval = (wrap_columns(at.azimuth - before.azimuth, size) - wanted);
+        double pair = options_.constant * interval * interval;
+        if (joined[i]) pair += 0.5 * options_.tension * along * along * wanted;
+        if (joined[i] && i + 1 < n && joined[i + 1]) {
+          const double next =
+              (contour[i + 1].along - at.along) / static_cast<double>(columns[i + 1] - columns[i]);
+          const double bend = next - along;
+          pair += 0.5 * options_.rigidity * bend * bend * wanted;
+        }
+        const double total = cost[i - 1][j] + pair;
+        if (total < best) {
+          best = total;
+          from[i][k] = j;
+        }
+      }
+      cost[i][k] = own + best;
+    }
+  }
+  std::size_t k =
+      static_cast<std::size_t>(std::ranges::min_element(cost[n - 1]) - cost[n - 1].begin());
+  std::vector<ContourPoint> moved(n);
+  for (std::size_t i = n; i-- > 0;) {
+    moved[i] = choice(i, k);
+    if (i > 0) k = from[i][k];
+  }
+  for (ContourPoint& point : moved) {
+    point.along = std::clamp(point.along, 0.0, static_cast<double>(poses_.size() - 1));
+  }
+  contour = std::move(moved);
+}
+
+// Eq. 5 in least squares: along the path, weighted by how well an azimuth tells the way.
+bool RouteContours::fit_pose(RouteContourFix& fix) const {
+  using Matrix = Eigen::Matrix3d;
+  using Vector = Eigen::Vector3d;
+  const double columns_per_rad = columns_ / (2.0 * pi);
+  const auto size = static_cast<long long>(columns_);
+  constexpr int steps = 20;
+  std::vector<double> sizes;
+  for (int step = 0; step <= steps; ++step) {
+    const auto crossings = curve(fix.pose.position());
+    struct Term {
+      double difference, weight;
+      Vector slope;
+    };
+    std::vector<Term> terms;
+    sizes.clear();
+    for (std::size_t i = 0; i < fix.columns.size(); ++i) {
+      const double azimuth = fix.columns[i] + fix.pose.heading_rad * columns_per_rad;
+      const double whole = std::floor(azimuth);
+      const double f = azimuth - whole;
+      const auto c0 =
+          static_cast<std::size_t>(((static_cast<long long>(whole) % size) + size) % size);
+      const RouteCrossing& a = crossings[c0];
+      const RouteCrossing& b = crossings[(c0 + 1) % static_cast<std::size_t>(size)];
+      if (a.along < 0.0F || b.along < 0.0F) continue;
+      const auto turn = static_cast<double>(b.along - a.along);  // lines a column
+      // A jump from one part of the path to another, or next to a pole.
+      if (std::abs(turn) * spacing_m_ > 1.0) continue;
+      const double along = static_cast<double>(a.along) + f * turn;
+      const double middle = 0.5 * (fix.first[i].along + fix.second[i].along);
+      const double difference = middle - along;
+      // Half a line along the path, half a column of azimuth.
+      const double variance = 0.25 + 0.25 * turn * turn;
+      terms.push_back({difference, 1.0 / variance,
+                       Vector(static_cast<double>(a.along_by_x), static_cast<double>(a.along_by_y),
+                              turn * columns_per_rad)});
+      sizes.push_back(std::abs(difference) / std::sqrt(variance));
+    }
+    if (terms.size() < 8) return false;
+    const auto half = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+    std::nth_element(sizes.begin(), half, sizes.end());
+    const double noise = std::max(0.1, 1.4826 * *half);
+    Matrix matrix = Matrix::Zero();
+    Vector right = Vector::Zero();
+    double left = 0.0;
+    double weights = 0.0;
+    for (const Term& term : terms) {
+      const double ratio = term.difference * std::sqrt(term.weight) / (2.0 * noise);
+      const double weight = term.weight / (1.0 + ratio * ratio);
+      matrix += weight * term.slope * term.slope.transpose();
+      right += weight * term.difference * term.slope;
+      left += weight * term.difference * term.difference;
+      weights += weight;
+    }
+    fix.residual_m = std::sqrt(left / weights) * spacing_m_;
+    matrix.diagonal() *= 1.0 + 1e-6;
+    const Vector change = matrix.ldlt().solve(right);
+    const Matrix inverse = matrix.ldlt().solve(Matrix::Identity());
+    if (!change.allFinite() || !inverse.allFinite()) return false;
+    for (std::size_t i = 0; i < 3; ++i) {
+      for (std::size_t j = 0; j < 3; ++j) {
+        fix.covariance[3 * i + j] =
+            noise * noise * inverse(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+      }
+    }
+    const double length_m = std::hypot(change[0], change[1]);
+    const double scale = std::min(1.0, 0.1 / std::max(1e-12, length_m));
+    if (step == steps || (length_m < 1e-5 && std::abs(change[2]) < 1e-6)) break;
+    fix.pose.x_m += scale * change[0];
+    fix.pose.y_m += scale * change[1];
+    fix.pose.heading_rad = wrap_angle(fix.pose.heading_rad + scale * change[2]);
+  }
+  return true;
+}
+
+std::optional<RouteContourFix> RouteContours::fit(std::span<const float> line,
+                                                  const Pose2& predicted) const {
+  if (line.size() != static_cast<std::size_t>(columns_)) {
+    throw ContractError("values of the line", static_cast<double>(line.size()),
+                        std::to_string(columns_));
+  }
+  const auto edges = slopes(smoothed_line(line, options_.smoothing_deg * columns_ / 360.0));
+  const auto crossings = curve(predicted.position());
+  const double turn = predicted.heading_rad * columns_ / (2.0 * pi);
+  const auto size = static_cast<long long>(columns_);
+  RouteContourFix fix;
+  fix.pose = predicted;
+  const double margin = options_.margin_m / spacing_m_;
+  // Whether a control point and the one before lie on the same side of the path.
+  std::vector<bool> joined;
+  bool left = false;
+  for (const int column : edge_columns(edges, options_.most_points)) {
+    const double azimuth = column + turn;
+    const auto c = static_cast<std::size_t>(((std::llround(azimuth) % size) + size) % size);
+    const RouteCrossing& crossing = crossings[c];
+    if (crossing.along < 0.0F) continue;
+    // Sine of the angle between the line of sight and the path.
+    const double across = 1.0 / (spacing_m_ * std::hypot(static_cast<double>(crossing.along_by_x),
+                                                         static_cast<double>(crossing.along_by_y)));
+    if (across < std::sin(radians(10.0))) continue;
+    const auto along = static_cast<double>(crossing.along);
+    const Direction2& direction = directions_[c];
+    const bool to_the_left = direction.y * static_cast<double>(crossing.along_by_x) >
+                             direction.x * static_cast<double>(crossing.along_by_y);
+    joined.push_back(!joined.empty() && to_the_left == left);
+    left = to_the_left;
+    fix.columns.push_back(column);
+    fix.first.push_back({azimuth, along + margin});
+    fix.second.push_back({azimuth, along - margin});
+  }
+  if (fix.columns.size() < 8) return std::nullopt;
+  // Steps of a line and a column first, then of half, until nothing moves.
+  double step = 1.0;
+  for (; fix.iterations < options_.most_iterations; ++fix.iterations) {
+    const auto first = fix.first;
+    const auto second = fix.second;
+    move(fix.first, fix.second, fix.columns, edges, joined, step);
+    move(fix.second, fix.first, fix.columns, edges, joined, step);
+    bool still = true;
+    for (std::size_t i = 0; i < first.size(); ++i) {
+      still = still && first[i].along == fix.first[i].along &&
+              first[i].azimuth == fix.first[i].azimuth && second[i].along == fix.second[i].along &&
+              second[i].azimuth == fix.second[i].azimuth;
+    }
+    if (!still) continue;
+    if (step < 0.3) break;
+    step *= 0.5;
+  }
+  std::size_t met = 0;
+  for (std::size_t i = 0; i < fix.first.size(); ++i) {
+    met += std::abs(fix.first[i].along - fix.second[i].along) <= 1.0 ? 1 : 0;
+  }
+  fix.converged = 5 * met >= 4 * fix.first.size();
+  if (!fit_pose(fix)) return std::nullopt;
+  return fix;
+}
+
+}  // namespace panonav

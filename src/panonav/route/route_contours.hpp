@@ -1,0 +1,81 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "panonav/core/options.hpp"
+#include "panonav/route/route_crossing.hpp"
+#include "panonav/route/route_panorama.hpp"
+
+namespace panonav {
+
+/// The energies of the dual active contour models [Y03 eq. 6-11]. The paper prints no weights;
+/// these were chosen on lab scenes of seeds 701 to 704 (docs/decisions.md). Lengths along the path
+/// are counted in lines, azimuths in columns, intensities from 0 to 1.
+struct RouteContourOptions {
+  double margin_m = 0.14;      ///< Delta_ACM: both contours start so far from the prediction
+  double tension = 0.002;      ///< w_alpha, eq. 7
+  double rigidity = 0.002;     ///< w_beta, eq. 7
+  double image = 1.0;          ///< w_diff, eq. 8
+  double pull = 0.002;         ///< w_pull, eq. 10
+  double constant = 0.5;       ///< w_const, eq. 11 squared
+  double smoothing_deg = 1.0;  ///< of the lines before they are differentiated
+  int most_points = 120;       ///< control points, at the strongest edges of the line
+  int most_iterations = 200;
+  friend bool operator==(const RouteContourOptions&, const RouteContourOptions&) = default;
+};
+void visit_options(RouteContourOptions& options, OptionVisitor& visitor);
+
+/// A control point of a contour in the route panorama.
+struct ContourPoint {
+  double azimuth = 0.0;  ///< column in the world's frame
+  double along = 0.0;    ///< line, with its fraction
+};
+
+/// Where both contours ended, and the pose that fits them.
+struct RouteContourFix {
+  Pose2 pose;
+  std::array<double, 9> covariance{};  ///< of x, y, heading; row-major
+  double residual_m = 0.0;  ///< root mean square between contour and eq. 5, along the path, robust
+  bool converged = false;   ///< both contours met at four of five control points
+  int iterations = 0;
+  std::vector<int> columns;         ///< of the line, one a control point
+  std::vector<ContourPoint> first;  ///< the contour that started ahead
+  std::vector<ContourPoint> second;
+};
+
+/// A route panorama made ready for active contours.
+class RouteContours {
+ public:
+  /// Throws OptionError, ContractError on a route of fewer than two lines.
+  explicit RouteContours(const RoutePanorama& route, const RouteContourOptions& options = {});
+
+  /// Two contours start `margin_m` before and behind the curve that eq. 5 predicts, move by dynamic
+  /// programming over the eight neighbours and the place of each control point, and pull each other
+  /// until they meet; least squares of eq. 5 over the control points give the pose [Y03 section 4].
+  /// Control points lie on edges of the line, not within 10 degrees of the path's direction, where
+  /// eq. 5 has its poles. Empty with fewer than eight control points or where the path is out of
+  /// reach. Throws ContractError on a wrong length.
+  [[nodiscard]] std::optional<RouteContourFix> fit(std::span<const float> line,
+                                                   const Pose2& predicted) const;
+
+ private:
+  [[nodiscard]] float edge(double along, double azimuth) const noexcept;
+  void move(std::vector<ContourPoint>& contour, const std::vector<ContourPoint>& other,
+            const std::vector<int>& columns, std::span<const float> edges,
+            const std::vector<bool>& joined, double step) const;
+  [[nodiscard]] std::vector<RouteCrossing> curve(Point2 viewpoint) const;
+  bool fit_pose(RouteContourFix& fix) const;
+
+  int columns_;
+  RouteContourOptions options_;
+  std::vector<Pose2> poses_;
+  std::vector<Direction2> directions_;
+  double spacing_m_;
+  std::vector<float> edges_;  // slope of each line over azimuth, line by line
+};
+
+}  // namespace panonav
