@@ -211,8 +211,8 @@ TEST(MemoryFileDamage, NewerFilesAreRefused) {
   const TemporaryFolder folder;
   const auto path = folder / "m.panonav";
   { (void)MemoryFile::create(path, small_header()); }
-  run_sql(path, "PRAGMA journal_mode=DELETE; PRAGMA user_version=4");
-  expect_refused_unchanged(path, "newer version: format version is 4; allowed: 1 .. 3");
+  run_sql(path, "PRAGMA journal_mode=DELETE; PRAGMA user_version=5");
+  expect_refused_unchanged(path, "newer version: format version is 5; allowed: 1 .. 4");
 }
 
 TEST(MemoryFileDamage, OtherTablesAreRefused) {

@@ -13,8 +13,10 @@
 #include "panonav/storage/checksum.hpp"
 #include "panonav/storage/map_tables.hpp"
 #include "panonav/storage/memory_file_access.hpp"
+#include "panonav/storage/memory_file_implementation.hpp"
 #include "panonav/storage/memory_header.hpp"
 #include "panonav/storage/memory_schema.hpp"
+#include "panonav/storage/route_tables.hpp"
 
 namespace panonav {
 
@@ -113,115 +115,94 @@ void bind_pose(Statement& statement, int first, const std::optional<ReferencePos
   bind_optional(statement, first + 2, pose ? pose->heading_rad : std::nullopt);
 }
 
-[[noreturn]] void refuse_view(ViewId view) {
+}  // namespace
+
+void refuse_view(ViewId view) {
   throw ContractError("view", std::to_string(view.value), "a view of the memory file");
 }
 
-// A row of the table of views, checked. `signature` points into the statement's row.
-struct StoredView {
-  ViewId id;
-  ReferenceInfo info;
-  std::span<const std::uint8_t> signature;
-};
+MemoryFile::Implementation::Implementation(std::filesystem::path path_, Database database_,
+                                           MemoryHeader header_)
+    : path(std::move(path_)),
+      database(std::move(database_)),
+      header(std::move(header_)),
+      insert_view(database,
+                  "INSERT INTO views(id, name, x_m, y_m, heading_rad, stamp_s, signature, "
+                  "checksum) VALUES(?, ?, ?, ?, ?, ?, ?, ?)"),
+      next_id(database, "SELECT seq FROM sqlite_sequence WHERE name = 'views'"),
+      insert_thumbnail(database, "INSERT INTO thumbnails(view, picture, checksum) VALUES(?, ?, ?)"),
+      find_name(database, "SELECT id FROM views WHERE name = ?") {}
 
-}  // namespace
+ViewId MemoryFile::Implementation::id_in(const Statement& row, int column) {
+  const std::int64_t id = row.integer(column);
+  if (id < 1 || id > std::int64_t{UINT32_MAX}) database.fail_damaged("a view id is out of range");
+  return {static_cast<std::uint32_t>(id)};
+}
 
-struct MemoryFile::Implementation {
-  Implementation(std::filesystem::path path_, Database database_, MemoryHeader header_)
-      : path(std::move(path_)),
-        database(std::move(database_)),
-        header(std::move(header_)),
-        insert_view(database,
-                    "INSERT INTO views(id, name, x_m, y_m, heading_rad, stamp_s, signature, "
-                    "checksum) VALUES(?, ?, ?, ?, ?, ?, ?, ?)"),
-        next_id(database, "SELECT seq FROM sqlite_sequence WHERE name = 'views'"),
-        insert_thumbnail(database,
-                         "INSERT INTO thumbnails(view, picture, checksum) VALUES(?, ?, ?)"),
-        find_name(database, "SELECT id FROM views WHERE name = ?") {}
-
-  [[nodiscard]] ViewId id_in(const Statement& row, int column) {
-    const std::int64_t id = row.integer(column);
-    if (id < 1 || id > std::int64_t{UINT32_MAX}) database.fail_damaged("a view id is out of range");
-    return {static_cast<std::uint32_t>(id)};
+StoredView MemoryFile::Implementation::view_in(const Statement& row) {
+  StoredView view;
+  view.id = id_in(row, 0);
+  view.info.name = row.text(1);
+  const auto x_m = optional_real(row, 2);
+  const auto y_m = optional_real(row, 3);
+  if (x_m && y_m) view.info.pose = ReferencePose{*x_m, *y_m, optional_real(row, 4)};
+  view.info.stamp_s = optional_real(row, 5);
+  view.signature = row.blob(6);
+  if (view.signature.size() != 2 * header.shape.size() ||
+      row.integer(7) != view_checksum(scratch, view.id, view.info, view.signature)) {
+    database.fail_damaged("view " + std::to_string(view.id.value) + " does not match its checksum");
   }
+  return view;
+}
 
-  // Reads and checks a row of `view_columns`.
-  [[nodiscard]] StoredView view_in(const Statement& row) {
-    StoredView view;
-    view.id = id_in(row, 0);
-    view.info.name = row.text(1);
-    const auto x_m = optional_real(row, 2);
-    const auto y_m = optional_real(row, 3);
-    if (x_m && y_m) view.info.pose = ReferencePose{*x_m, *y_m, optional_real(row, 4)};
-    view.info.stamp_s = optional_real(row, 5);
-    view.signature = row.blob(6);
-    if (view.signature.size() != 2 * header.shape.size() ||
-        row.integer(7) != view_checksum(scratch, view.id, view.info, view.signature)) {
-      database.fail_damaged("view " + std::to_string(view.id.value) +
-                            " does not match its checksum");
-    }
-    return view;
+ViewId MemoryFile::Implementation::insert(const NewView& view) {
+  const std::int64_t last = next_id.step() ? next_id.integer(0) : 0;
+  next_id.reset();
+  if (last < 0 || last >= std::int64_t{UINT32_MAX}) {
+    database.fail_damaged("the last view id is out of range");
   }
-
-  ViewId insert(const NewView& view) {
-    const std::int64_t last = next_id.step() ? next_id.integer(0) : 0;
-    next_id.reset();
-    if (last < 0 || last >= std::int64_t{UINT32_MAX}) {
-      database.fail_damaged("the last view id is out of range");
-    }
-    const ViewId id{static_cast<std::uint32_t>(last + 1)};
-    signature.assign(view.signature.magnitudes.begin(), view.signature.magnitudes.end());
-    signature.insert(signature.end(), view.signature.phases.begin(), view.signature.phases.end());
-    insert_view.bind(1, std::int64_t{id.value}).bind(2, std::string_view(view.info.name));
-    bind_pose(insert_view, 3, view.info.pose);
-    bind_optional(insert_view, 6, view.info.stamp_s);
-    insert_view.bind(7, std::span<const std::uint8_t>(signature))
-        .bind(8, view_checksum(scratch, id, view.info, signature));
-    const int constraint = insert_view.run();
-    if (constraint == SQLITE_CONSTRAINT_UNIQUE) {
-      throw ContractError("view name",
-                          "\"" + view.info.name + "\", which " + path.string() + " already holds",
-                          "a name that is unique");
-    }
-    if (constraint != 0) database.fail_damaged("the id of a new view is taken");
-    if (!view.thumbnail.empty()) {
-      insert_thumbnail.bind(1, std::int64_t{id.value})
-          .bind(2, std::span<const std::uint8_t>(view.thumbnail))
-          .bind(3, thumbnail_checksum(id, view.thumbnail));
-      if (insert_thumbnail.run() != 0) database.fail_damaged("a thumbnail without a view");
-    }
-    return id;
+  const ViewId id{static_cast<std::uint32_t>(last + 1)};
+  signature.assign(view.signature.magnitudes.begin(), view.signature.magnitudes.end());
+  signature.insert(signature.end(), view.signature.phases.begin(), view.signature.phases.end());
+  insert_view.bind(1, std::int64_t{id.value}).bind(2, std::string_view(view.info.name));
+  bind_pose(insert_view, 3, view.info.pose);
+  bind_optional(insert_view, 6, view.info.stamp_s);
+  insert_view.bind(7, std::span<const std::uint8_t>(signature))
+      .bind(8, view_checksum(scratch, id, view.info, signature));
+  const int constraint = insert_view.run();
+  if (constraint == SQLITE_CONSTRAINT_UNIQUE) {
+    throw ContractError("view name",
+                        "\"" + view.info.name + "\", which " + path.string() + " already holds",
+                        "a name that is unique");
   }
-
-  [[nodiscard]] bool contains(ViewId view) {
-    Statement statement(database, "SELECT 1 FROM views WHERE id = ?");
-    return statement.bind(1, std::int64_t{view.value}).step();
+  if (constraint != 0) database.fail_damaged("the id of a new view is taken");
+  if (!view.thumbnail.empty()) {
+    insert_thumbnail.bind(1, std::int64_t{id.value})
+        .bind(2, std::span<const std::uint8_t>(view.thumbnail))
+        .bind(3, thumbnail_checksum(id, view.thumbnail));
+    if (insert_thumbnail.run() != 0) database.fail_damaged("a thumbnail without a view");
   }
+  return id;
+}
 
-  [[nodiscard]] Link link_in(const Statement& row) {
-    Link link{id_in(row, 0), id_in(row, 1), LinkKind::sequence};
-    const std::int64_t kind = row.integer(2);
-    if (kind < 0 || kind > static_cast<int>(LinkKind::closure)) {
-      database.fail_damaged("a link of unknown kind");
-    }
-    link.kind = static_cast<LinkKind>(kind);
-    if (row.integer(3) != link_checksum(link)) {
-      database.fail_damaged("the link of views " + std::to_string(link.a.value) + " and " +
-                            std::to_string(link.b.value) + " does not match its checksum");
-    }
-    return link;
+bool MemoryFile::Implementation::contains(ViewId view) {
+  Statement statement(database, "SELECT 1 FROM views WHERE id = ?");
+  return statement.bind(1, std::int64_t{view.value}).step();
+}
+
+Link MemoryFile::Implementation::link_in(const Statement& row) {
+  Link link{id_in(row, 0), id_in(row, 1), LinkKind::sequence};
+  const std::int64_t kind = row.integer(2);
+  if (kind < 0 || kind > static_cast<int>(LinkKind::closure)) {
+    database.fail_damaged("a link of unknown kind");
   }
-
-  std::filesystem::path path;
-  Database database;
-  MemoryHeader header;
-  RecordBytes scratch;
-  std::vector<std::uint8_t> signature;
-  Statement insert_view;
-  Statement next_id;
-  Statement insert_thumbnail;
-  Statement find_name;
-};
+  link.kind = static_cast<LinkKind>(kind);
+  if (row.integer(3) != link_checksum(link)) {
+    database.fail_damaged("the link of views " + std::to_string(link.a.value) + " and " +
+                          std::to_string(link.b.value) + " does not match its checksum");
+  }
+  return link;
+}
 
 MemoryFile::MemoryFile(std::unique_ptr<Implementation> implementation)
     : implementation_(std::move(implementation)) {}
@@ -387,71 +368,6 @@ std::optional<std::string> MemoryFile::parameter(std::string_view name) const {
   return *text;
 }
 
-void MemoryFile::save_chain(std::string_view name, const SnapshotChain& chain) {
-  Database& database = implementation_->database;
-  Transaction transaction(database, Transaction::Kind::writing);
-  add_chain_tables(database);
-  write_chain(database, name, chain);
-  transaction.commit();
-}
-
-std::optional<SnapshotChain> MemoryFile::chain(std::string_view name) const {
-  Database& database = implementation_->database;
-  const Transaction reading(database, Transaction::Kind::reading);
-  if (!has_chain_tables(database)) return std::nullopt;
-  return read_chain(database, name);
-}
-
-void MemoryFile::remove_chain(std::string_view name) {
-  Database& database = implementation_->database;
-  Transaction transaction(database, Transaction::Kind::writing);
-  if (!has_chain_tables(database) || !erase_chain(database, name)) {
-    throw ContractError("chain", std::string(name), "a chain of the memory file");
-  }
-  transaction.commit();
-}
-
-std::vector<std::string> MemoryFile::chain_names() const {
-  Database& database = implementation_->database;
-  const Transaction reading(database, Transaction::Kind::reading);
-  if (!has_chain_tables(database)) return {};
-  return panonav::chain_names(database);
-}
-
-void MemoryFile::save_map(std::string_view name, const TopologicalMap& map) {
-  Database& database = implementation_->database;
-  Transaction transaction(database, Transaction::Kind::writing);
-  for (const MapNode& node : map.nodes) {
-    if (!implementation_->contains(node.view)) refuse_view(node.view);
-  }
-  add_map_table(database);
-  write_map(database, name, map);
-  transaction.commit();
-}
-
-std::optional<TopologicalMap> MemoryFile::map(std::string_view name) const {
-  Database& database = implementation_->database;
-  const Transaction reading(database, Transaction::Kind::reading);
-  if (!has_map_table(database)) return std::nullopt;
-  return read_map(database, name);
-}
-
-void MemoryFile::remove_map(std::string_view name) {
-  Database& database = implementation_->database;
-  Transaction transaction(database, Transaction::Kind::writing);
-  if (!has_map_table(database) || !erase_map(database, name)) {
-    throw ContractError("map", std::string(name), "a map of the memory file");
-  }
-  transaction.commit();
-}
-
-std::vector<std::string> MemoryFile::map_names() const {
-  Database& database = implementation_->database;
-  const Transaction reading(database, Transaction::Kind::reading);
-  if (!has_map_table(database)) return {};
-  return panonav::map_names(database);
-}
-
 VisualMemory MemoryFile::load() const {
   Database& database = implementation_->database;
   const MemoryHeader& header = implementation_->header;
@@ -567,6 +483,10 @@ std::vector<MemoryFault> MemoryFile::verify() const {
         database, [&](ViewId view) { return views.contains(view); },
         [&](const std::function<void()>& part) { check(std::nullopt, part); });
   });
+  check(std::nullopt, [&] {
+    if (!has_route_tables(database)) return;
+    verify_routes(database, [&](const std::function<void()>& part) { check(std::nullopt, part); });
+  });
   return faults;
 }
 
@@ -584,6 +504,7 @@ MemoryFileInfo MemoryFile::info() const {
   info.thumbnails = count("SELECT count(*) FROM thumbnails");
   if (has_chain_tables(database)) info.chains = count("SELECT count(*) FROM chains");
   if (has_map_table(database)) info.maps = count("SELECT count(*) FROM maps");
+  if (has_route_tables(database)) info.routes = count("SELECT count(*) FROM routes");
   info.format_version = static_cast<int>(database.integer("PRAGMA user_version"));
   for (const char* suffix : {"", "-wal"}) {
     std::filesystem::path file = database.path();

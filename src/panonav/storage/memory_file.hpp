@@ -15,6 +15,7 @@
 #include "panonav/panorama/picture.hpp"
 #include "panonav/panorama/picture_source.hpp"
 #include "panonav/panorama/preprocessing.hpp"
+#include "panonav/route/route_panorama.hpp"
 
 namespace panonav {
 
@@ -59,6 +60,7 @@ struct MemoryFileInfo {
   std::uint64_t thumbnails = 0;
   std::uint64_t chains = 0;
   std::uint64_t maps = 0;
+  std::uint64_t routes = 0;
   std::uint64_t file_bytes = 0;  ///< with what is still in the write-ahead log
   int format_version = 0;
   friend bool operator==(const MemoryFileInfo&, const MemoryFileInfo&) = default;
@@ -130,6 +132,22 @@ class MemoryFile {
   void remove_map(std::string_view name);
   /// Ascending.
   [[nodiscard]] std::vector<std::string> map_names() const;
+
+  /// Adds lines to the route of that name, which is made where there is none; all of them or none.
+  /// Returns how many were added: the first ones are left out while they lie within a millimetre of
+  /// the last line there. The first route gives the file format version 4. Throws ContractError on
+  /// an empty name, no lines, and another number of columns than the route has. Cost: that of the
+  /// lines and at most 256 more.
+  std::size_t append_route(std::string_view name, const RoutePanorama& more);
+  /// The same bits; empty when there is no such route.
+  [[nodiscard]] std::optional<RoutePanorama> route(std::string_view name) const;
+  /// Bytes of its lines and poses as they are kept, packed without loss. Throws ContractError when
+  /// there is no such route.
+  [[nodiscard]] std::uint64_t route_bytes(std::string_view name) const;
+  /// Throws ContractError when there is no such route.
+  void remove_route(std::string_view name);
+  /// Ascending.
+  [[nodiscard]] std::vector<std::string> route_names() const;
 
   /// All views and links. Checks every view's checksum and throws FileError at the first fault.
   /// 100,000 views of 80 x 15 take about 0.6 s of processor time.

@@ -58,9 +58,19 @@ constexpr const char* map_table_name = "maps";
 constexpr const char* map_table =
     "CREATE TABLE maps(name TEXT NOT NULL PRIMARY KEY, nodes BLOB NOT NULL, edges BLOB NOT NULL, "
     "checksum INTEGER NOT NULL) STRICT, WITHOUT ROWID";
+// Of version 4; they come after the maps.
+constexpr std::array<std::pair<const char*, const char*>, 2> route_tables{{
+    {"route_blocks",
+     "CREATE TABLE route_blocks(route TEXT NOT NULL, number INTEGER NOT NULL, lines BLOB NOT NULL, "
+     "checksum INTEGER NOT NULL, PRIMARY KEY(route, number)) STRICT, WITHOUT ROWID"},
+    {"routes",
+     "CREATE TABLE routes(name TEXT NOT NULL PRIMARY KEY, columns INTEGER NOT NULL, lines INTEGER "
+     "NOT NULL, checksum INTEGER NOT NULL) STRICT, WITHOUT ROWID"},
+}};
 constexpr int first_version = 1;
 constexpr int version_with_chains = 2;
 constexpr int version_with_maps = 3;
+constexpr int version_with_routes = 4;
 
 // The second end of a link, so that a view's links are found from either.
 constexpr const char* links_index = "CREATE INDEX links_b ON links(b)";
@@ -183,6 +193,17 @@ void add_map_table(Database& database) {
   database.execute(("PRAGMA user_version=" + std::to_string(version_with_maps)).c_str());
 }
 
+bool has_route_tables(Database& database) {
+  return database.integer("PRAGMA user_version") >= version_with_routes;
+}
+
+void add_route_tables(Database& database) {
+  if (has_route_tables(database)) return;
+  add_map_table(database);
+  for (const auto& [name, text] : route_tables) database.execute(text);
+  database.execute(("PRAGMA user_version=" + std::to_string(version_with_routes)).c_str());
+}
+
 void require_schema(Database& database) {
   Statement rows(database,
                  "SELECT type, name, sql FROM sqlite_schema WHERE name NOT LIKE 'sqlite\\_%' "
@@ -196,8 +217,16 @@ void require_schema(Database& database) {
     for (const auto& [name, text] : chain_tables) require_table(name, text);
   }
   const bool maps = has_map_table(database);
+  const bool routes = has_route_tables(database);
   for (const auto& [name, text] : tables) {
-    if (maps && std::string_view(name) == "settings") require_table(map_table_name, map_table);
+    if (std::string_view(name) == "settings") {
+      if (maps) require_table(map_table_name, map_table);
+      if (routes) {
+        for (const auto& [route_name, route_text] : route_tables) {
+          require_table(route_name, route_text);
+        }
+      }
+    }
     require_table(name, text);
   }
   if (!rows.step() || rows.text(1) != "links_b" || rows.text(2) != links_index || rows.step()) {

@@ -15,9 +15,9 @@ namespace panonav {
 inline constexpr std::uint32_t memory_application_id = 0x504E4156;
 /// The user_version of files is at most this; a reader refuses files of a larger one. New files
 /// have 1; saving the first chain of snapshots adds its tables and makes it 2, saving the first map
-/// adds the table of maps, and those of chains, and makes it 3, so that who has neither can give
-/// the file to an older reader.
-inline constexpr int memory_format_version = 3;
+/// adds the table of maps, and those of chains, and makes it 3, the first route likewise its tables
+/// and 4, so that who has none of them can give the file to an older reader.
+inline constexpr int memory_format_version = 4;
 
 /// Looks at the first bytes alone, without SQLite, so that nothing that is not ours is ever opened
 /// for writing. Throws FileError: missing, no SQLite file, of another program, newer.
@@ -31,6 +31,9 @@ void add_chain_tables(Database& database);
 /// The same of the table of maps, which comes with those of chains.
 void add_map_table(Database& database);
 [[nodiscard]] bool has_map_table(Database& database);
+/// The same of the tables of routes, which come with those of chains and maps.
+void add_route_tables(Database& database);
+[[nodiscard]] bool has_route_tables(Database& database);
 /// Throws FileError unless the tables are exactly those of the file's version.
 void require_schema(Database& database);
 

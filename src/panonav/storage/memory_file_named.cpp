@@ -1,0 +1,117 @@
+// Chains, maps and routes of a memory file, each under a name.
+
+#include "panonav/core/error.hpp"
+#include "panonav/storage/chain_tables.hpp"
+#include "panonav/storage/map_tables.hpp"
+#include "panonav/storage/memory_file_implementation.hpp"
+#include "panonav/storage/memory_schema.hpp"
+#include "panonav/storage/route_tables.hpp"
+
+namespace panonav {
+
+void MemoryFile::save_chain(std::string_view name, const SnapshotChain& chain) {
+  Database& database = implementation_->database;
+  Transaction transaction(database, Transaction::Kind::writing);
+  add_chain_tables(database);
+  write_chain(database, name, chain);
+  transaction.commit();
+}
+
+std::optional<SnapshotChain> MemoryFile::chain(std::string_view name) const {
+  Database& database = implementation_->database;
+  const Transaction reading(database, Transaction::Kind::reading);
+  if (!has_chain_tables(database)) return std::nullopt;
+  return read_chain(database, name);
+}
+
+void MemoryFile::remove_chain(std::string_view name) {
+  Database& database = implementation_->database;
+  Transaction transaction(database, Transaction::Kind::writing);
+  if (!has_chain_tables(database) || !erase_chain(database, name)) {
+    throw ContractError("chain", std::string(name), "a chain of the memory file");
+  }
+  transaction.commit();
+}
+
+std::vector<std::string> MemoryFile::chain_names() const {
+  Database& database = implementation_->database;
+  const Transaction reading(database, Transaction::Kind::reading);
+  if (!has_chain_tables(database)) return {};
+  return panonav::chain_names(database);
+}
+
+void MemoryFile::save_map(std::string_view name, const TopologicalMap& map) {
+  Database& database = implementation_->database;
+  Transaction transaction(database, Transaction::Kind::writing);
+  for (const MapNode& node : map.nodes) {
+    if (!implementation_->contains(node.view)) refuse_view(node.view);
+  }
+  add_map_table(database);
+  write_map(database, name, map);
+  transaction.commit();
+}
+
+std::optional<TopologicalMap> MemoryFile::map(std::string_view name) const {
+  Database& database = implementation_->database;
+  const Transaction reading(database, Transaction::Kind::reading);
+  if (!has_map_table(database)) return std::nullopt;
+  return read_map(database, name);
+}
+
+void MemoryFile::remove_map(std::string_view name) {
+  Database& database = implementation_->database;
+  Transaction transaction(database, Transaction::Kind::writing);
+  if (!has_map_table(database) || !erase_map(database, name)) {
+    throw ContractError("map", std::string(name), "a map of the memory file");
+  }
+  transaction.commit();
+}
+
+std::vector<std::string> MemoryFile::map_names() const {
+  Database& database = implementation_->database;
+  const Transaction reading(database, Transaction::Kind::reading);
+  if (!has_map_table(database)) return {};
+  return panonav::map_names(database);
+}
+
+std::size_t MemoryFile::append_route(std::string_view name, const RoutePanorama& more) {
+  Database& database = implementation_->database;
+  Transaction transaction(database, Transaction::Kind::writing);
+  add_route_tables(database);
+  const std::size_t appended = append_to_route(database, name, more);
+  transaction.commit();
+  return appended;
+}
+
+std::optional<RoutePanorama> MemoryFile::route(std::string_view name) const {
+  Database& database = implementation_->database;
+  const Transaction reading(database, Transaction::Kind::reading);
+  if (!has_route_tables(database)) return std::nullopt;
+  return read_route(database, name);
+}
+
+std::uint64_t MemoryFile::route_bytes(std::string_view name) const {
+  Database& database = implementation_->database;
+  const Transaction reading(database, Transaction::Kind::reading);
+  const std::size_t bytes = has_route_tables(database) ? panonav::route_bytes(database, name) : 0;
+  if (bytes == 0) throw ContractError("route", std::string(name), "a route of the memory file");
+  return bytes;
+}
+
+void MemoryFile::remove_route(std::string_view name) {
+  Database& database = implementation_->database;
+  Transaction transaction(database, Transaction::Kind::writing);
+  if (!has_route_tables(database) || !erase_route(database, name)) {
+    throw ContractError("route", std::string(name), "a route of the memory file");
+  }
+  transaction.commit();
+}
+
+std::vector<std::string> MemoryFile::route_names() const {
+  Database& database = implementation_->database;
+  const Transaction reading(database, Transaction::Kind::reading);
+  if (!has_route_tables(database)) return {};
+  return panonav::route_names(database);
+}
+
+}  // namespace panonav

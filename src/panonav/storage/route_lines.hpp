@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "panonav/route/route_panorama.hpp"
+
+namespace panonav {
+
+/// Lines `first` .. `first + count` of a route and their poses as bytes that take less room,
+/// without loss (docs/formats.md, route_blocks): what a line differs by from a guess. The guess
+/// knows the line before, turned as the robot turned, and the columns of the line itself up to
+/// there.
+[[nodiscard]] std::vector<std::uint8_t> pack_route_lines(const RoutePanorama& route,
+                                                         std::size_t first, std::size_t count);
+
+/// Appends `count` lines that `pack_route_lines` packed. False where `bytes` are anything else; the
+/// route may then hold some of them.
+[[nodiscard]] bool unpack_route_lines(std::span<const std::uint8_t> bytes, std::size_t count,
+                                      RoutePanorama& route);
+
+}  // namespace panonav

@@ -1,0 +1,279 @@
+// Route panoramas in a memory file.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sqlite3.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <numbers>
+#include <thread>
+
+#include "panonav/core/error.hpp"
+#include "panonav/storage/memory_file.hpp"
+#include "route/textured_room.hpp"
+#include "storage/memory_samples.hpp"
+#include "support/temporary_folder.hpp"
+
+namespace panonav {
+namespace {
+
+using test::small_header;
+using test::TemporaryFolder;
+
+// Noise, which nothing can be gained from, at random places.
+RoutePanorama random_route(std::size_t lines, std::uint64_t seed, int columns = 360) {
+  Random random(seed);
+  RoutePanorama route(columns);
+  std::vector<std::uint8_t> line(static_cast<std::size_t>(columns));
+  while (route.size() < lines) {
+    for (auto& value : line) value = static_cast<std::uint8_t>(random.index(256));
+    route.append({random.normal(), random.normal(), random.uniform(-3.0, 3.0)},
+                 std::span<const std::uint8_t>(line));
+  }
+  return route;
+}
+
+RoutePanorama part(const RoutePanorama& route, std::size_t first, std::size_t end) {
+  RoutePanorama result(route.columns());
+  for (std::size_t i = first; i < end; ++i) result.append(route.poses()[i], route.line(i));
+  return result;
+}
+
+TEST(RouteTables, WhatIsAppendedIsReadBackBitForBit) {
+  const TemporaryFolder folder;
+  const auto path = folder / "m.panonav";
+  // Less than a block, one exactly, and several.
+  const std::vector<std::size_t> sizes{1, 7, 255, 256, 257, 1300};
+  {
+    MemoryFile file = MemoryFile::create(path, small_header());
+    EXPECT_TRUE(file.route_names().empty());
+    EXPECT_FALSE(file.route("route").has_value());
+    EXPECT_EQ(file.info().format_version, 1);
+    for (const std::size_t size : sizes) {
+      EXPECT_EQ(file.append_route("r" + std::to_string(size), random_route(size, size, 24)), size);
+    }
+    EXPECT_EQ(file.info().format_version, 4);
+    EXPECT_EQ(file.info().routes, sizes.size());
+  }
+  MemoryFile file = MemoryFile::open(path, Access::read_write);
+  EXPECT_EQ(file.route_names().size(), sizes.size());
+  for (const std::size_t size : sizes) {
+    EXPECT_EQ(file.route("r" + std::to_string(size)), random_route(size, size, 24)) << size;
+  }
+  EXPECT_TRUE(file.verify().empty());
+  file.remove_route("r257");
+  EXPECT_FALSE(file.route("r257").has_value());
+  EXPECT_THROW(file.remove_route("r257"), ContractError);
+  EXPECT_THROW((void)file.route_bytes("r257"), ContractError);
+  EXPECT_EQ(file.route("r256"), random_route(256, 256, 24));
+  EXPECT_TRUE(file.verify().empty());
+}
+
+// In whatever batches a route is appended, it is the same route, byte by byte of its blocks.
+TEST(RouteTables, BatchesMakeTheSameRoute) {
+  const TemporaryFolder folder;
+  MemoryFile file = MemoryFile::create(folder / "m.panonav", small_header());
+  const RoutePanorama route = random_route(1200, 3, 16);
+  file.append_route("whole", route);
+  Random random(4);
+  int batches = 0;
+  for (std::size_t first = 0; first < route.size(); ++batches) {
+    const std::size_t end = std::min(route.size(), first + 1 + random.index(150));
+    ASSERT_EQ(file.append_route("batches", part(route, first, end)), end - first);
+    if (batches % 5 == 0) {
+      ASSERT_EQ(file.route("batches"), part(route, 0, end));
+    }
+    first = end;
+  }
+  EXPECT_GT(batches, 10);
+  EXPECT_EQ(file.route("batches"), route);
+  EXPECT_EQ(file.route_bytes("batches"), file.route_bytes("whole"));
+}
+
+TEST(RouteTables, WhereTheRobotStoodStillNothingIsAdded) {
+  const TemporaryFolder folder;
+  MemoryFile file = MemoryFile::create(folder / "m.panonav", small_header());
+  const RoutePanorama route = random_route(5, 5);
+  file.append_route("route", route);
+  EXPECT_EQ(file.append_route("route", part(route, 4, 5)), 0U);
+  EXPECT_EQ(file.route("route"), route);
+}
+
+TEST(RouteTables, WrongLinesAreRefusedAndChangeNothing) {
+  const TemporaryFolder folder;
+  MemoryFile file = MemoryFile::create(folder / "m.panonav", small_header());
+  EXPECT_THROW(file.append_route("route", RoutePanorama(360)), ContractError);
+  EXPECT_EQ(file.info().format_version, 1);  // tables and all are taken back
+  const RoutePanorama route = random_route(5, 5);
+  file.append_route("route", route);
+  EXPECT_THROW(file.append_route("", route), ContractError);
+  EXPECT_THROW(file.append_route("route", random_route(5, 6, 180)), ContractError);
+  EXPECT_EQ(file.route("route"), route);
+}
+
+// [Y03 section 2.2]: 3.6 MB a kilometre at a line every 10 cm, measured on the file.
+TEST(RouteTables, TakesLessThan360BytesALineOfTheFile) {
+  const TemporaryFolder folder;
+  const auto path = folder / "m.panonav";
+  { (void)MemoryFile::create(path, small_header()); }
+  const auto before = std::filesystem::file_size(path);
+  // Round and round in the room; every line is seen anew, with the noise of a camera.
+  const testing::TexturedRoom room(1);
+  constexpr int places = 120;
+  constexpr int laps = 25;
+  constexpr int lines = places * laps;
+  std::vector<Pose2> poses;
+  std::vector<std::vector<float>> seen;
+  for (int i = 0; i < places; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / places;
+    poses.push_back({2.0 * std::cos(angle), 1.8 * std::sin(angle), wrap_angle(angle + 1.5)});
+    seen.push_back(room.line(poses.back()));
+  }
+  Random noise(2);
+  RoutePanorama route(360);
+  for (int i = 0; i < lines; ++i) {
+    const auto at = static_cast<std::size_t>(i % places);
+    auto line = seen[at];
+    for (float& value : line) value += 0.01F * static_cast<float>(noise.normal());
+    ASSERT_TRUE(route.append({poses[at].x_m + 0.003 * noise.normal(),
+                              poses[at].y_m + 0.003 * noise.normal(), poses[at].heading_rad},
+                             std::span<const float>(line)));
+  }
+  EXPECT_NEAR(route.length_m() / lines, 0.1, 0.02);
+  {
+    MemoryFile file = MemoryFile::open(path, Access::read_write);
+    for (std::size_t first = 0; first < route.size(); first += 100) {
+      file.append_route("route", part(route, first, first + 100));
+    }
+    EXPECT_EQ(file.route("route"), route);
+  }
+  const auto bytes = std::filesystem::file_size(path) - before;
+  EXPECT_LE(bytes, 360U * lines) << static_cast<double>(bytes) / lines << " bytes a line";
+  RecordProperty("bytes_of_file_a_line", static_cast<int>(bytes / lines));
+}
+
+// After a kill every batch is there whole or not at all, and all those that append returned for.
+TEST(RouteTables, KilledWriterLeavesWholeBatches) {
+  const TemporaryFolder folder;
+  const auto path = folder / "m.panonav";
+  { (void)MemoryFile::create(path, small_header()); }
+  constexpr std::size_t batch = 37;
+  const RoutePanorama route = random_route(batch * 200, 7, 32);
+  std::size_t known = 0;
+  int kills_while_appending = 0;
+  for (int round = 0; round < 12; ++round) {
+    int ends[2];
+    ASSERT_EQ(::pipe(ends), 0);
+    const pid_t child = ::fork();
+    if (child == 0) {
+      try {
+        MemoryFile file = MemoryFile::open(path, Access::read_write);
+        for (std::size_t first = known; first < route.size(); first += batch) {
+          file.append_route("route", part(route, first, first + batch));
+          const std::size_t done = first + batch;
+          if (::write(ends[1], &done, sizeof(done)) != sizeof(done)) std::_Exit(1);
+        }
+        ::pause();
+      } catch (...) {
+      }
+      std::_Exit(99);
+    }
+    ASSERT_GT(child, 0);
+    ::close(ends[1]);
+    std::this_thread::sleep_for(std::chrono::milliseconds(5 + 7 * round));
+    ASSERT_EQ(::kill(child, SIGKILL), 0);
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFSIGNALED(status)) << "the writer ended by itself";
+    std::size_t acknowledged = known;
+    std::size_t done = 0;
+    while (::read(ends[0], &done, sizeof(done)) == sizeof(done)) acknowledged = done;
+    ::close(ends[0]);
+    kills_while_appending += acknowledged > known && acknowledged < route.size();
+
+    const MemoryFile file = MemoryFile::open(path, Access::read_only);
+    ASSERT_TRUE(file.verify().empty());
+    const auto stored = file.route("route");
+    known = stored ? stored->size() : 0;
+    ASSERT_TRUE(known == acknowledged || known == acknowledged + batch);
+    if (stored) {
+      ASSERT_EQ(*stored, part(route, 0, known));
+    }
+    if (known == route.size()) break;
+  }
+  EXPECT_GE(kills_while_appending, 2) << "most kills came before the first append";
+}
+
+TEST(RouteTables, RowsThatWereTamperedWith) {
+  const TemporaryFolder folder;
+  int number = 0;
+  for (const std::string sql :
+       {"UPDATE routes SET columns = 32", "UPDATE routes SET columns = 1 << 40",
+        "UPDATE routes SET lines = lines - 1", "UPDATE routes SET lines = 1 << 60",
+        "UPDATE routes SET checksum = checksum + 1", "UPDATE routes SET name = 'other'",
+        "DELETE FROM routes", "DELETE FROM route_blocks WHERE number = 0",
+        "DELETE FROM route_blocks WHERE number = 1",
+        "UPDATE route_blocks SET number = 5 WHERE number = 1",
+        "UPDATE route_blocks SET lines = x'00' WHERE number = 1",
+        "UPDATE route_blocks SET lines = substr(lines, 1, 1000)",
+        "UPDATE route_blocks SET lines = zeroblob(100)",
+        "UPDATE route_blocks SET checksum = 0 WHERE number = 1",
+        "UPDATE route_blocks SET route = 'other' WHERE number = 1"}) {
+    const auto path = folder / ("m" + std::to_string(number++) + ".panonav");
+    {
+      MemoryFile file = MemoryFile::create(path, small_header());
+      file.append_route("route", random_route(600, 1, 16));
+    }
+    sqlite3* database = nullptr;
+    ASSERT_EQ(sqlite3_open(path.c_str(), &database), SQLITE_OK);
+    EXPECT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK) << sql;
+    sqlite3_close(database);
+    MemoryFile file = MemoryFile::open(path, Access::read_write);
+    EXPECT_FALSE(file.verify().empty()) << sql;
+    const std::string name = sql.find("name = 'other'") == std::string::npos ? "route" : "other";
+    EXPECT_THROW((void)file.route(name), FileError) << sql;
+    EXPECT_EQ(file.load().size(), 0U);  // the views are not harmed
+  }
+  EXPECT_EQ(number, 15);
+}
+
+// Bytes of the file damaged at random: one clear error or the very same route.
+TEST(RouteTables, DamagedBytes) {
+  const TemporaryFolder folder;
+  const auto path = folder / "m.panonav";
+  const RoutePanorama route = random_route(1200, 1, 64);
+  {
+    MemoryFile file = MemoryFile::create(path, small_header());
+    file.append_route("route", route);
+  }
+  const auto size = std::filesystem::file_size(path);
+  Random random(8);
+  int refused = 0;
+  for (int round = 0; round < 100; ++round) {
+    const auto copy = folder / "copy.panonav";
+    std::filesystem::copy_file(path, copy, std::filesystem::copy_options::overwrite_existing);
+    std::FILE* raw = std::fopen(copy.c_str(), "r+b");
+    ASSERT_NE(raw, nullptr);
+    std::fseek(raw, static_cast<long>(random.index(size)), SEEK_SET);
+    for (int i = 0; i < 16; ++i) std::fputc(static_cast<int>(random.index(256)), raw);
+    std::fclose(raw);
+    try {
+      const MemoryFile file = MemoryFile::open(copy, Access::read_only);
+      const auto read = file.route("route");
+      ASSERT_TRUE(read.has_value()) << round;
+      EXPECT_EQ(*read, route);
+    } catch (const FileError& error) {
+      EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, 30);
+}
+
+}  // namespace
+}  // namespace panonav
