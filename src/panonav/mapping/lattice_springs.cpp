@@ -62,7 +62,7 @@ std::vector<NodePair> SpringViews::most_alike(const LatticeOptions& options,
   std::vector<NodePair> pairs;
   for (const auto& some : found) pairs.insert(pairs.end(), some.begin(), some.end());
   std::ranges::sort(pairs);
-  pairs.erase(std::ranges::unique(pairs).begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
   return pairs;
 }
 
