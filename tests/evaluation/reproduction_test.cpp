@@ -9,6 +9,7 @@
 #include <string>
 
 #include "panonav/core/error.hpp"
+#include "support/sanitizers.hpp"
 
 namespace panonav {
 namespace {
@@ -27,6 +28,7 @@ class ReproductionFolder : public ::testing::Test {
 };
 
 TEST_F(ReproductionFolder, SameSeedSameRowsOnOneAndTwoThreads) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   const Reproduction one = reproduce(1);
   const Reproduction two = reproduce(2);
   ASSERT_GT(one.rows.size(), 100U);
