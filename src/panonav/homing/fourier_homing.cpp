@@ -8,134 +8,18 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/homing/coherence_weights.hpp"
 #include "panonav/homing/displacement.hpp"
+#include "panonav/homing/pair_equations.hpp"
 #include "panonav/homing/turn_correlation.hpp"
 
 namespace panonav {
 
 namespace {
-
-constexpr int most_starts = 6;
-
-// What is computed for one pair of views. One row lives on the stack, more rows on the heap.
-class Coefficients {
- public:
-  Coefficients(std::size_t rows, std::size_t components) : rows_(rows), size_(rows * components) {
-    if (arrays * size_ > on_stack_.size()) on_heap_.resize(arrays * size_);
-  }
-
-  // Component-major like HomingView.
-  [[nodiscard]] float* home_a(int k) noexcept { return at(0, k); }
-  [[nodiscard]] float* home_b(int k) noexcept { return at(1, k); }
-  [[nodiscard]] float* current_a(int k) noexcept { return at(2, k); }
-  [[nodiscard]] float* current_b(int k) noexcept { return at(3, k); }
-  // The view whose slope counts.
-  [[nodiscard]] float* middle_a(int k) noexcept { return at(4, k); }
-  [[nodiscard]] float* middle_b(int k) noexcept { return at(5, k); }
-  // Its change with elevation.
-  [[nodiscard]] float* rise_a(int k) noexcept { return at(6, k); }
-  [[nodiscard]] float* rise_b(int k) noexcept { return at(7, k); }
-
- private:
-  static constexpr std::size_t arrays = 8;
-  static constexpr std::size_t stacked = TurnCorrelation::most_frequencies + 2;
-  [[nodiscard]] float* at(std::size_t array, int k) noexcept {
-    float* const first = on_heap_.empty() ? on_stack_.data() : on_heap_.data();
-    return first + array * size_ + static_cast<std::size_t>(k) * rows_;
-  }
-  std::size_t rows_;
-  std::size_t size_;
-  std::array<float, arrays * stacked> on_stack_;  // not initialised: written before it is read
-  std::vector<float> on_heap_;
-};
-
-// Normal equations of Delta, xi, eta, in this order.
-struct Normal {
-  std::array<double, 6> matrix{};  // 00 01 02 11 12 22
-  std::array<double, 3> right{};
-  double energy = 0.0;           // of what is to be explained
-  double energy_of_views = 0.0;  // of both
-
-  void add(const Normal& other, double weight) noexcept {
-    for (std::size_t i = 0; i < 6; ++i) matrix[i] += weight * other.matrix[i];
-    for (std::size_t i = 0; i < 3; ++i) right[i] += weight * other.right[i];
-    energy += weight * other.energy;
-    energy_of_views += weight * other.energy_of_views;
-  }
-};
-
-// The same of a lean in two directions, P and Q: PD Px Pe, QD Qx Qe, PP PQ QQ, right sides P Q.
-struct LeanTerms {
-  std::array<double, 11> sums{};
-
-  void add(const LeanTerms& other, double weight) noexcept {
-    for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += weight * other.sums[i];
-  }
-};
-
-// The normal equations once the lean that fits best is taken out. `certain`: the inverse variance
-// of the lean, in units of that of an equation.
-Normal without_lean(Normal normal, const LeanTerms& lean, double certain) noexcept {
-  const auto& s = lean.sums;
-  const double pp = s[6] + certain;
-  const double qq = s[8] + certain;
-  const double determinant = pp * qq - s[7] * s[7];
-  if (!(determinant > 0.0)) return normal;
-  const auto product = [&](double p1, double q1, double p2, double q2) {
-    return (qq * p1 * p2 - s[7] * (p1 * q2 + q1 * p2) + pp * q1 * q2) / determinant;
-  };
-  std::size_t at = 0;
-  for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t j = i; j < 3; ++j) {
-      normal.matrix[at++] -= product(s[i], s[3 + i], s[j], s[3 + j]);
-    }
-    normal.right[i] -= product(s[i], s[3 + i], s[9], s[10]);
-  }
-  normal.energy -= product(s[9], s[10], s[9], s[10]);
-  return normal;
-}
-
-struct Solution {
-  double turn = 0.0;
-  double xi = 0.0;
-  double eta = 0.0;
-  double explained = 0.0;
-  // Of xi and eta, for unit variance of an equation.
-  double variance = 0.0;
-};
-
-// Cholesky's rule; directions in which the views tell nothing stay 0.
-Solution solve(const Normal& normal) noexcept {
-  const auto& m = normal.matrix;
-  // Below this share of its own size a pivot is rounding.
-  constexpr double least = 1e-6;
-  std::array<double, 3> d{};
-  const double d0 = m[0];
-  d[0] = d0 > 0.0 ? 1.0 / d0 : 0.0;
-  const double l10 = m[1] * d[0];
-  const double l20 = m[2] * d[0];
-  const double d1 = m[3] - l10 * m[1];
-  d[1] = d1 > least * m[3] && d1 > 0.0 ? 1.0 / d1 : 0.0;
-  const double l21 = (m[4] - l20 * m[1]) * d[1];
-  const double d2 = m[5] - l20 * m[2] - l21 * (m[4] - l20 * m[1]);
-  d[2] = d2 > least * m[5] && d2 > 0.0 ? 1.0 / d2 : 0.0;
-  const double y0 = normal.right[0];
-  const double y1 = normal.right[1] - l10 * y0;
-  const double y2 = normal.right[2] - l20 * y0 - l21 * y1;
-  Solution s;
-  s.eta = y2 * d[2];
-  s.xi = y1 * d[1] - l21 * s.eta;
-  s.turn = y0 * d[0] - l10 * s.xi - l20 * s.eta;
-  s.explained = y0 * y0 * d[0] + y1 * y1 * d[1] + y2 * y2 * d[2];
-  // The lower right block of the inverse.
-  s.variance = d[1] + l21 * l21 * d[2] + d[2];
-  return s;
-}
 
 // What one row becomes when the robot turns.
 void turn_row(std::span<float> a, std::span<float> b, double turn_rad) {
@@ -153,53 +37,6 @@ void turn_row(std::span<float> a, std::span<float> b, double turn_rad) {
     sine = sine * step_cosine + cosine * step_sine;
     cosine = next;
   }
-}
-
-using PerFrequency = std::array<double, TurnCorrelation::most_frequencies + 1>;
-
-// The bell exp(-k^2 / (2 width^2)) that is nearest to the coherences in least squares, up to its
-// height: noise lowers all coherences, distance the high ones first. One row gives little more than
-// a sign for each frequency, so only one number is asked of all of them.
-PerFrequency fitted_bell(const PerFrequency& coherences, int highest) {
-  PerFrequency best{};
-  double most = -std::numeric_limits<double>::infinity();
-  for (double width = 1.5; width < 3.0 * highest; width *= 1.19) {
-    PerFrequency bell{};
-    const double step = std::exp(-0.5 / (width * width));
-    double value = step;
-    double ratio = step * step * step;  // step^(2 k + 1)
-    double common = 0.0;
-    double square = 0.0;
-    for (int k = 1; k <= highest; ++k) {
-      const auto i = static_cast<std::size_t>(k);
-      bell[i] = value;
-      common += value * coherences[i];
-      square += value * value;
-      value *= ratio;
-      ratio *= step * step;
-    }
-    const double gain = common / std::sqrt(square);
-    if (gain > most) {
-      most = gain;
-      best = bell;
-    }
-  }
-  return best;
-}
-
-// Weights over amplitudes; their sum stays. `power`: the mean of the powers.
-void over_amplitude(PerFrequency& weights, const PerFrequency& powers, double power, int highest) {
-  if (!(power > 0.0)) return;
-  constexpr double faint = 0.02;  // of the mean: fainter ones are mostly noise
-  double before = 0.0;
-  double after = 0.0;
-  for (int k = 1; k <= highest; ++k) {
-    const auto i = static_cast<std::size_t>(k);
-    before += weights[i];
-    weights[i] /= std::sqrt(powers[i] / power + faint);
-    after += weights[i];
-  }
-  for (int k = 1; k <= highest; ++k) weights[static_cast<std::size_t>(k)] *= before / after;
 }
 
 class PairOfViews {
@@ -238,14 +75,12 @@ class PairOfViews {
   void turn_home(double turn_rad);
   void weigh();
   void take_slopes();
-  [[nodiscard]] Normal equations(int k);
-  [[nodiscard]] LeanTerms lean_terms(int k);
   // Whether it is known how the image changes from row to row.
   [[nodiscard]] bool sees_rise() const noexcept {
     return (options_.vertical_motion || options_.lean) && home_.elevations() && rows_ >= 3;
   }
   void sum_equations();
-  [[nodiscard]] Solution solve_at(double turn_rad);
+  [[nodiscard]] PairSolution solve_at(double turn_rad);
   void move_current(double xi, double eta);
   // Where the least squares start, with the heading that fits there.
   struct Start {
@@ -263,7 +98,7 @@ class PairOfViews {
   std::size_t rows_;
   int highest_;
   int known_;
-  Coefficients c_;
+  PairCoefficients c_;
   TurnCorrelation correlation_;
   double home_energy_ = 0.0;
   double current_energy_ = 0.0;
@@ -271,7 +106,7 @@ class PairOfViews {
   // By row: how fast things rise as the robot comes nearer, and the tangent of the elevation.
   std::vector<float> approach_, tangent_;
   std::vector<float> row_weights_;  // empty: all alike
-  Normal normal_;
+  PairEquations normal_;
 };
 
 // Correlation of the home view, not turned, with the current view, summed over the rows.
@@ -410,133 +245,22 @@ void PairOfViews::take_slopes() {
   }
 }
 
-Normal PairOfViews::equations(int k) {
-  const float* const row_weights = row_weights_.empty() ? nullptr : row_weights_.data();
-  const float* const approach =
-      options_.vertical_motion && sees_rise() ? approach_.data() : nullptr;
-  const float* const ha = c_.home_a(k);
-  const float* const hb = c_.home_b(k);
-  const float* const ca = c_.current_a(k);
-  const float* const cb = c_.current_b(k);
-  const float* const la = c_.middle_a(k - 1);
-  const float* const lb = c_.middle_b(k - 1);
-  const float* const ua = c_.middle_a(k + 1);
-  const float* const ub = c_.middle_b(k + 1);
-  const float* const lra = c_.rise_a(k - 1);
-  const float* const lrb = c_.rise_b(k - 1);
-  const float* const ura = c_.rise_a(k + 1);
-  const float* const urb = c_.rise_b(k + 1);
-  const auto frequency = static_cast<float>(k);
-  const float lower = 0.5F * (frequency - 1.0F);
-  const float upper = 0.5F * (frequency + 1.0F);
-  float m00 = 0, m01 = 0, m02 = 0, m11 = 0, m12 = 0, m22 = 0, v0 = 0, v1 = 0, v2 = 0, energy = 0,
-        both = 0;
-  for (std::size_t y = 0; y < rows_; ++y) {
-    // a^h - a = k b^h Delta + a^x xi + a^y eta, b^h - b = -k a^h Delta + b^x xi + b^y eta.
-    const float ta = frequency * hb[y];
-    const float tb = -frequency * ha[y];
-    float xa = upper * ua[y] - lower * la[y];
-    float ya = upper * ub[y] + lower * lb[y];
-    float xb = upper * ub[y] - lower * lb[y];
-    float yb = -upper * ua[y] - lower * la[y];
-    if (approach != nullptr) {
-      const float half = 0.5F * approach[y];
-      xa -= half * (lra[y] + ura[y]);
-      xb -= half * (lrb[y] + urb[y]);
-      ya -= half * (urb[y] - lrb[y]);
-      yb -= half * (lra[y] - ura[y]);
-    }
-    const float ea = ha[y] - ca[y];
-    const float eb = hb[y] - cb[y];
-    const float weight = row_weights != nullptr ? row_weights[y] : 1.0F;
-    m00 += weight * (ta * ta + tb * tb);
-    m01 += weight * (ta * xa + tb * xb);
-    m02 += weight * (ta * ya + tb * yb);
-    m11 += weight * (xa * xa + xb * xb);
-    m12 += weight * (xa * ya + xb * yb);
-    m22 += weight * (ya * ya + yb * yb);
-    v0 += weight * (ta * ea + tb * eb);
-    v1 += weight * (xa * ea + xb * eb);
-    v2 += weight * (ya * ea + yb * eb);
-    energy += weight * (ea * ea + eb * eb);
-    both += weight * (ha[y] * ha[y] + hb[y] * hb[y] + ca[y] * ca[y] + cb[y] * cb[y]);
-  }
-  return {{m00, m01, m02, m11, m12, m22}, {v0, v1, v2}, energy, both};
-}
-
-// A lean of the robot moves things up and down by P cos phi + Q sin phi, and those off the horizon
-// to the side by tan(elevation) (P sin phi - Q cos phi).
-LeanTerms PairOfViews::lean_terms(int k) {
-  const float* const row_weights = row_weights_.empty() ? nullptr : row_weights_.data();
-  const float* const ha = c_.home_a(k);
-  const float* const hb = c_.home_b(k);
-  const float* const ca = c_.current_a(k);
-  const float* const cb = c_.current_b(k);
-  const float* const la = c_.middle_a(k - 1);
-  const float* const lb = c_.middle_b(k - 1);
-  const float* const ua = c_.middle_a(k + 1);
-  const float* const ub = c_.middle_b(k + 1);
-  const float* const lra = c_.rise_a(k - 1);
-  const float* const lrb = c_.rise_b(k - 1);
-  const float* const ura = c_.rise_a(k + 1);
-  const float* const urb = c_.rise_b(k + 1);
-  const auto frequency = static_cast<float>(k);
-  const float lower = 0.5F * (frequency - 1.0F);
-  const float upper = 0.5F * (frequency + 1.0F);
-  std::array<float, 11> sums{};
-  for (std::size_t y = 0; y < rows_; ++y) {
-    const float ta = frequency * hb[y];
-    const float tb = -frequency * ha[y];
-    const float xa = upper * ua[y] - lower * la[y];
-    const float ya = upper * ub[y] + lower * lb[y];
-    const float xb = upper * ub[y] - lower * lb[y];
-    const float yb = -upper * ua[y] - lower * la[y];
-    const float ra = 0.5F * (lra[y] + ura[y]);
-    const float rb = 0.5F * (lrb[y] + urb[y]);
-    const float sa = 0.5F * (urb[y] - lrb[y]);
-    const float sb = 0.5F * (lra[y] - ura[y]);
-    const float near = options_.vertical_motion ? approach_[y] : 0.0F;
-    const float mxa = xa - near * ra;
-    const float mxb = xb - near * rb;
-    const float mya = ya - near * sa;
-    const float myb = yb - near * sb;
-    const float pa = tangent_[y] * xa - ra;
-    const float pb = tangent_[y] * xb - rb;
-    const float qa = tangent_[y] * ya - sa;
-    const float qb = tangent_[y] * yb - sb;
-    const float ea = ha[y] - ca[y];
-    const float eb = hb[y] - cb[y];
-    const float weight = row_weights != nullptr ? row_weights[y] : 1.0F;
-    sums[0] += weight * (pa * ta + pb * tb);
-    sums[1] += weight * (pa * mxa + pb * mxb);
-    sums[2] += weight * (pa * mya + pb * myb);
-    sums[3] += weight * (qa * ta + qb * tb);
-    sums[4] += weight * (qa * mxa + qb * mxb);
-    sums[5] += weight * (qa * mya + qb * myb);
-    sums[6] += weight * (pa * pa + pb * pb);
-    sums[7] += weight * (pa * qa + pb * qb);
-    sums[8] += weight * (qa * qa + qb * qb);
-    sums[9] += weight * (pa * ea + pb * eb);
-    sums[10] += weight * (qa * ea + qb * eb);
-  }
-  LeanTerms terms;
-  std::copy(sums.begin(), sums.end(), terms.sums.begin());
-  return terms;
-}
-
 // At the present turn and with the present weights.
 void PairOfViews::sum_equations() {
   take_slopes();
+  RowTerms terms{.weights = row_weights_, .tangent = tangent_};
+  if (options_.vertical_motion) terms.approach = approach_;
   normal_ = {};
   for (int k = 1; k <= highest_; ++k) {
-    normal_.add(equations(k), component_weights_[static_cast<std::size_t>(k)]);
+    normal_.add(pair_equations(c_, k, rows_, terms),
+                component_weights_[static_cast<std::size_t>(k)]);
   }
   if (options_.lean && sees_rise()) {
-    LeanTerms lean;
+    LeanEquations lean;
     double equations = 0.0;
     for (int k = 1; k <= highest_; ++k) {
       const double weight = component_weights_[static_cast<std::size_t>(k)];
-      lean.add(lean_terms(k), weight);
+      lean.add(lean_equations(c_, k, rows_, terms), weight);
       equations += 2.0 * weight * static_cast<double>(rows_);
     }
     // Robots lean by a degree or two: more must be shown by the views.
@@ -546,7 +270,7 @@ void PairOfViews::sum_equations() {
   }
 }
 
-Solution PairOfViews::solve_at(double turn_rad) {
+PairSolution PairOfViews::solve_at(double turn_rad) {
   turn_home(turn_rad);
   weigh();
   sum_equations();
@@ -662,7 +386,7 @@ HomeVector PairOfViews::result() {
     constexpr double rounding = 1e-6;
     if (!(most > rounding * rounding * static_cast<double>(rows_))) return {};
 
-    std::array<float, most_starts> turns{};
+    std::array<float, most_starting_estimates> turns{};
     int starts = 1;
     if (found && found->displacement.ring > 0 && iteration == 0) {
       turns[0] = static_cast<float>(found->turn_rad);
@@ -674,7 +398,7 @@ HomeVector PairOfViews::result() {
           std::span(turns).first(static_cast<std::size_t>(options_.starting_estimates)), window_);
       if (starts == 0) return {};
     }
-    Solution best;
+    PairSolution best;
     double best_residual = 2.0;
     double best_turn = 0.0;
     double variance = 0.0;
@@ -683,7 +407,7 @@ HomeVector PairOfViews::result() {
       // A heading at which the views do not even correlate half as well explains nothing better.
       const auto value = static_cast<double>(correlation_.at(static_cast<float>(turn)));
       if (i > 0 && value < 0.5 * static_cast<double>(correlation_.at(turns[0]))) break;
-      const Solution solution = solve_at(turn);
+      const PairSolution solution = solve_at(turn);
       const double left = std::max(0.0, normal_.energy - solution.explained);
       const double residual = normal_.energy_of_views > 0.0 ? left / normal_.energy_of_views : 1.0;
       if (residual >= best_residual) continue;
@@ -747,53 +471,6 @@ double HomeVector::length() const noexcept {
 
 double HomeVector::direction_rad() const noexcept {
   return std::atan2(eta, xi);
-}
-
-void visit_options(FourierHomingOptions& options, OptionVisitor& visitor) {
-  visitor.visit(
-      {.name = "highest", .help = "highest frequency compared; 0 takes all", .low = 0, .high = 62},
-      options.highest);
-  visitor.visit(
-      {.name = "iterations", .help = "times that the solution is refined", .low = 0, .high = 20},
-      options.iterations);
-  visitor.visit({.name = "rising", .help = "each iteration compares higher frequencies"},
-                options.rising);
-  constexpr std::array<std::string_view, 2> turns{"sequential", "global"};
-  int turn = static_cast<int>(options.turn);
-  visitor.visit({.name = "turn", .help = "how the heading is found first"}, turns, turn);
-  options.turn = static_cast<TurnEstimate>(turn);
-  constexpr std::array<std::string_view, 2> gradients{"current", "both"};
-  int gradient = static_cast<int>(options.gradient);
-  visitor.visit({.name = "gradient", .help = "views whose slopes count"}, gradients, gradient);
-  options.gradient = static_cast<HomingGradient>(gradient);
-  constexpr std::array<std::string_view, 2> weights{"equal", "coherence"};
-  int weight = static_cast<int>(options.weights);
-  visitor.visit({.name = "weights", .help = "how much components and rows count"}, weights, weight);
-  options.weights = static_cast<HomingWeights>(weight);
-  visitor.visit({.name = "starting_estimates",
-                 .help = "headings tried",
-                 .low = 1,
-                 .high = static_cast<double>(most_starts)},
-                options.starting_estimates);
-  visitor.visit({.name = "displacement_search",
-                 .help = "try displacements up to two thirds of R before solving"},
-                options.displacement_search);
-  visitor.visit({.name = "vertical_motion", .help = "rows off the horizon move up and down, too"},
-                options.vertical_motion);
-  visitor.visit({.name = "lean", .help = "the robot may lean a little, as on uneven ground"},
-                options.lean);
-}
-
-FourierHomingOptions published_homing(int highest, int iterations) {
-  return {.highest = highest,
-          .iterations = iterations,
-          .turn = TurnEstimate::sequential,
-          .gradient = HomingGradient::current,
-          .weights = HomingWeights::equal,
-          .starting_estimates = 1,
-          .displacement_search = false,
-          .vertical_motion = false,
-          .lean = false};
 }
 
 HomeVector home_vector(const HomingView& home, const HomingView& current,

@@ -49,6 +49,9 @@ enum class HomingWeights {
   coherence,
 };
 
+/// So many headings can be tried at most.
+inline constexpr int most_starting_estimates = 6;
+
 /// The defaults are our own rule; `published_homing` is S06's.
 struct FourierHomingOptions {
   int highest = 0;     ///< K, the highest frequency; 0 takes all that both views have, but one
