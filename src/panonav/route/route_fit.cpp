@@ -128,6 +128,14 @@ std::optional<RouteLines::Window> RouteLines::window(Point2 position) const {
   return found;
 }
 
+float RouteLines::shown(const Level& level, float along, std::size_t column) const noexcept {
+  const auto before = std::min(static_cast<std::size_t>(along), poses_.size() - 2);
+  const float share = along - static_cast<float>(before);
+  const float* const at =
+      level.values.data() + before * static_cast<std::size_t>(columns_) + column;
+  return at[0] + share * (at[columns_] - at[0]);
+}
+
 bool RouteLines::collect(const Level& level, std::span<const float> seen, const Pose2& pose,
                          const Window& window, std::vector<RouteCrossing>& crossings,
                          std::vector<Term>& terms) const {
@@ -143,15 +151,12 @@ bool RouteLines::collect(const Level& level, std::span<const float> seen, const 
     const RouteCrossing& crossing = crossings[c];
     if (crossing.along < 0.0F) continue;
     const auto before = std::min(static_cast<std::size_t>(crossing.along), poses_.size() - 2);
-    const float share = crossing.along - static_cast<float>(before);
-    const float first = row(before)[c];
-    const float second = row(before + 1)[c];
     const std::size_t low = before >= level.half_slope ? before - level.half_slope : 0;
     const std::size_t high = std::min(before + 1 + level.half_slope, poses_.size() - 1);
     const float along = (row(high)[c] - row(low)[c]) / static_cast<float>(high - low);
     const LineSample at = sample_line(seen, static_cast<double>(c) - turn);
     terms.push_back(
-        {first + share * (second - first), along * crossing.along_by_x, along * crossing.along_by_y,
+        {shown(level, crossing.along, c), along * crossing.along_by_x, along * crossing.along_by_y,
          at.value, at.slope * static_cast<float>(columns_per_rad), static_cast<std::uint32_t>(c)});
   }
   return terms.size() >= fewest_directions;
@@ -303,13 +308,8 @@ std::vector<float> RouteLines::synthesise(const Pose2& pose) const {
   cross_route(std::span(poses_).subspan(near->begin, near->end - near->begin), near->begin,
               pose.position(), directions_, crossings);
   std::vector<float> world(line.size(), nothing);
-  const float* const values = levels_.back().values.data();
   for (std::size_t c = 0; c < line.size(); ++c) {
-    if (crossings[c].along < 0.0F) continue;
-    const auto before = std::min(static_cast<std::size_t>(crossings[c].along), poses_.size() - 2);
-    const float share = crossings[c].along - static_cast<float>(before);
-    const float first = values[before * line.size() + c];
-    world[c] = first + share * (values[(before + 1) * line.size() + c] - first);
+    if (crossings[c].along >= 0.0F) world[c] = shown(levels_.back(), crossings[c].along, c);
   }
   const double turn = pose.heading_rad * columns_ / (2.0 * pi);
   for (std::size_t c = 0; c < line.size(); ++c) {

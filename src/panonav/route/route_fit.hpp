@@ -91,6 +91,8 @@ class RouteLines {
   struct Term;
   struct Linearised;
   [[nodiscard]] std::optional<Window> window(Point2 position) const;
+  // What the route shows in a column where a line of sight crosses the path.
+  [[nodiscard]] float shown(const Level& level, float along, std::size_t column) const noexcept;
   [[nodiscard]] bool collect(const Level& level, std::span<const float> seen, const Pose2& pose,
                              const Window& window, std::vector<RouteCrossing>& crossings,
                              std::vector<Term>& terms) const;

@@ -44,10 +44,15 @@ bool RoutePanorama::append(const Pose2& pose, std::span<const std::uint8_t> line
   return true;
 }
 
-std::vector<float> world_line(const RoutePanorama& route, std::size_t i) {
+std::vector<float> line_values(const RoutePanorama& route, std::size_t i) {
   const auto bytes = route.line(i);
   std::vector<float> line(bytes.size());
   for (std::size_t c = 0; c < line.size(); ++c) line[c] = static_cast<float>(bytes[c]) / 255.0F;
+  return line;
+}
+
+std::vector<float> world_line(const RoutePanorama& route, std::size_t i) {
+  const auto line = line_values(route, i);
   const double turn = route.poses()[i].heading_rad * route.columns() / (2.0 * std::numbers::pi);
   std::vector<float> turned(line.size());
   for (std::size_t c = 0; c < line.size(); ++c) {

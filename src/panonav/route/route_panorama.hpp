@@ -46,6 +46,9 @@ class RoutePanorama {
   std::vector<std::uint8_t> bytes_;
 };
 
+/// Line i as a camera gives it, 0 .. 1.
+[[nodiscard]] std::vector<float> line_values(const RoutePanorama& route, std::size_t i);
+
 /// Line i in the world's frame, 0 .. 1: value c is what lies in direction 2 pi c / columns from the
 /// world's x axis.
 [[nodiscard]] std::vector<float> world_line(const RoutePanorama& route, std::size_t i);

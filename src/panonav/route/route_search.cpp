@@ -87,21 +87,17 @@ std::optional<RouteLines::Candidate> RouteLines::candidate(std::span<const float
   std::vector<RouteCrossing> crossings(coarse_columns);
   cross_route(std::span(poses_).subspan(near->begin, near->end - near->begin), near->begin,
               position, directions, crossings);
-  std::vector<float> shown(coarse_columns, std::numeric_limits<float>::quiet_NaN());
+  std::vector<float> shown_there(coarse_columns, std::numeric_limits<float>::quiet_NaN());
   std::size_t count = 0;
-  const float* const values = levels_.front().values.data();
+  const auto size = static_cast<std::size_t>(columns_);
   for (std::size_t c = 0; c < coarse_columns; ++c) {
     if (crossings[c].along < 0.0F) continue;
-    const auto size = static_cast<std::size_t>(columns_);
-    const auto before = std::min(static_cast<std::size_t>(crossings[c].along), poses_.size() - 2);
-    const float share = crossings[c].along - static_cast<float>(before);
     const std::size_t column = (c * size + coarse_columns / 2) / coarse_columns % size;
-    const float first = values[before * size + column];
-    shown[c] = first + share * (values[(before + 1) * size + column] - first);
+    shown_there[c] = shown(levels_.front(), crossings[c].along, column);
     ++count;
   }
   if (2 * count < coarse_columns) return std::nullopt;
-  const Correlation best = best_turn(shown, coarse_line);
+  const Correlation best = best_turn(shown_there, coarse_line);
   if (!(best.value > -1.0)) return std::nullopt;
   return Candidate{{position.x_m, position.y_m, wrap_angle(best.turn * 2.0 * pi / coarse_columns)},
                    best.value};

@@ -15,14 +15,6 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 
-// As a robot reads it from its camera.
-std::vector<float> line_of(const RoutePanorama& route, std::size_t i) {
-  const auto bytes = route.line(i);
-  std::vector<float> line(bytes.size());
-  for (std::size_t c = 0; c < line.size(); ++c) line[c] = static_cast<float>(bytes[c]) / 255.0F;
-  return line;
-}
-
 double quantile(std::vector<double> values, double share) {
   std::ranges::sort(values);
   return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
@@ -82,7 +74,7 @@ double RouteTracker::learnt_correlation(const RoutePanorama& route,
     // Lines of odd numbers, spread over the route.
     const std::size_t i = (s * route.size() / samples) | 1U;
     if (i >= route.size()) break;
-    auto line = line_of(route, i);
+    auto line = line_values(route, i);
     if (const auto fix = others.fit(line, route.poses()[i])) right.push_back(fix->correlation);
     std::ranges::reverse(line);
     if (const auto fix = best_anywhere(line)) wrong.push_back(fix->correlation);
