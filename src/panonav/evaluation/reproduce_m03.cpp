@@ -1,12 +1,12 @@
 #include <algorithm>
 #include <array>
-#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "panonav/core/error.hpp"
 #include "panonav/evaluation/m03_experiments.hpp"
+#include "panonav/evaluation/reproduction_stages.hpp"
 
 namespace panonav {
 
@@ -40,14 +40,9 @@ Reproduction reproduce_m03(const TrackingReproductionOptions& options, Executor&
   std::filesystem::create_directories(options.out, error);
   if (error) throw FileError(options.out.string(), "cannot be made: " + error.message());
 
-  struct Stage {
-    std::string name;
-    double cost;  // relative, for the progress
-    std::function<void()> run;
-  };
   Reproduction result;
   std::vector<OfficeRuns> offices;
-  std::vector<Stage> stages;
+  std::vector<ReproductionStage> stages;
   for (int s = 0; wanted("office") && s < options.scenes; ++s) {
     stages.push_back({"office " + std::to_string(s + 1) + " of " + std::to_string(options.scenes),
                       20.0, [&, s] { offices.push_back(record_office(options, s, executor)); }});
@@ -90,15 +85,7 @@ Reproduction reproduce_m03(const TrackingReproductionOptions& options, Executor&
   recording("sussex_route", reproduce_recorded_route);
   recording("gantry_plants", reproduce_gantry);
 
-  double all = 0.0;
-  for (const Stage& stage : stages) all += stage.cost;
-  double done = 0.0;
-  for (const Stage& stage : stages) {
-    if (progress) progress(stage.name, done / all);
-    stage.run();
-    done += stage.cost;
-  }
-  if (progress) progress("done", 1.0);
+  run_stages(stages, progress);
   return result;
 }
 

@@ -1,10 +1,10 @@
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/evaluation/reproduction_stages.hpp"
 #include "panonav/evaluation/s06_chains.hpp"
 #include "panonav/evaluation/s06_support.hpp"
 #include "panonav/evaluation/s06_worlds.hpp"
@@ -34,13 +34,8 @@ Reproduction reproduce_s06(const HomingReproductionOptions& options, Executor& e
   std::filesystem::create_directories(options.out, error);
   if (error) throw FileError(options.out.string(), "cannot be made: " + error.message());
 
-  struct Stage {
-    std::string name;
-    double cost;  // relative, for the progress
-    std::function<void()> run;
-  };
   Reproduction result;
-  std::vector<Stage> stages;
+  std::vector<ReproductionStage> stages;
   std::vector<CatchmentAreas> areas;
   const ArenaOptions first_options{.seed = options.seed, .spacing_m = options.spacing_m};
   std::optional<Arena> first;
@@ -117,15 +112,7 @@ Reproduction reproduce_s06(const HomingReproductionOptions& options, Executor& e
                       }});
   }
 
-  double all = 0.0;
-  for (const Stage& stage : stages) all += stage.cost;
-  double done = 0.0;
-  for (const Stage& stage : stages) {
-    if (progress) progress(stage.name, done / all);
-    stage.run();
-    done += stage.cost;
-  }
-  if (progress) progress("done", 1.0);
+  run_stages(stages, progress);
   return result;
 }
 
