@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/median.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/voronoi.hpp"
@@ -71,9 +72,7 @@ double learnt_distance_m(const std::vector<Pose2>& goals, const std::vector<Pose
     }
   }
   if (ratios.empty()) return near_m;
-  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
-  std::nth_element(ratios.begin(), middle, ratios.end());
-  return std::clamp(*middle, 1e-3, 1e3);
+  return std::clamp(upper_median_in_place(std::span(ratios)), 1e-3, 1e3);
 }
 
 /// Sums of unit vectors of heading errors.

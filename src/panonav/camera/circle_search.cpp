@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/median.hpp"
 
 namespace panonav {
 namespace {
@@ -243,12 +244,6 @@ std::optional<EdgePoint> edge_on_ray(std::span<const SmoothPlanes> images,
   return EdgePoint{circle.u + r * cosine, circle.v + r * sine};
 }
 
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// Least squares of the distances to the circle with Tukey's weights; the residual is the weighted
 /// root mean square. Empty when the points do not determine a circle.
 std::optional<CircleFit> fit_points(const std::vector<EdgePoint>& points, FieldCircle circle) {
@@ -260,7 +255,7 @@ std::optional<CircleFit> fit_points(const std::vector<EdgePoint>& points, FieldC
       deviations.push_back(std::abs(std::hypot(p.u - circle.u, p.v - circle.v) - circle.radius));
     }
     // A tenth of a pixel is what the parabola of the edge gives at best.
-    const double scale = tukey * std::max(0.1, 1.4826 * median_of(deviations));
+    const double scale = tukey * std::max(0.1, 1.4826 * upper_median(deviations));
     Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
     Eigen::Vector3d right = Eigen::Vector3d::Zero();
     double weights = 0;

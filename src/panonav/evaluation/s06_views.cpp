@@ -146,7 +146,8 @@ void draw_spectrum(const Arena& arena, const std::filesystem::path& folder, Repr
   report_figure(result, "s06.spectrum.slope",
                 "power falls with frequency to the power of minus this, k = 1 .. 15", slope, "",
                 std::pair(1.8, 1.8));
-  Series line{.label = "slope " + std::to_string(slope).substr(0, 4), .style = SeriesStyle::lines};
+  Series line{.label = "slope " + std::to_string(std::round(100.0 * slope) / 100.0).substr(0, 4),
+              .style = SeriesStyle::lines};
   for (int k = 1; k <= top; ++k) {
     line.x.push_back(k);
     line.y.push_back(std::exp(mean_log - slope * (std::log(k) - mean_k)));

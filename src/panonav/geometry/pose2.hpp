@@ -27,6 +27,10 @@ struct Pose2 {
   friend bool operator==(const Pose2&, const Pose2&) = default;
 };
 
+[[nodiscard]] inline bool is_finite(const Pose2& pose) {
+  return std::isfinite(pose.x_m) && std::isfinite(pose.y_m) && std::isfinite(pose.heading_rad);
+}
+
 /// a_from_c = a_from_b * b_from_c.
 [[nodiscard]] inline Pose2 operator*(const Pose2& a_from_b, const Pose2& b_from_c) {
   const double c = std::cos(a_from_b.heading_rad);

@@ -534,8 +534,7 @@ void MonteCarloLocaliser::start_at(const Pose2& pose, double deviation_m,
 }
 
 void MonteCarloLocaliser::move(const Pose2& step) {
-  require(std::isfinite(step.x_m) && std::isfinite(step.y_m) && std::isfinite(step.heading_rad),
-          "step of the odometry", step.x_m, "numbers");
+  require(is_finite(step), "step of the odometry", step.x_m, "numbers");
   auto& own = *implementation_;
   own.travelled_m += std::hypot(step.x_m, step.y_m);
   move_particles(own.particles, StepSampler(step, own.odometry), own.random);

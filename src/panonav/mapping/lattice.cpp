@@ -8,6 +8,7 @@
 #include <set>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/median.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/mapping/lattice_graph.hpp"
@@ -29,12 +30,6 @@ constexpr double kLargestTurnError = 0.25 * std::numbers::pi;
 // More than half of the triangles of a spring must close.
 constexpr double kClosing = 0.5;
 constexpr double kSmallestAngle = 0.0035;  // rad; phases are packed in steps of 0.025
-
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
 
 void check(const CoarseMotion& motion) {
   const double sum = motion.step.x_m + motion.step.y_m + motion.step.heading_rad;
@@ -157,7 +152,7 @@ class Arranger {
         slopes.push_back(spring.phases->length / spring.dissimilarity);
       }
     }
-    if (!units.empty()) phase_unit_ = median_of(units);
+    if (!units.empty()) phase_unit_ = upper_median(units);
     for (double& slope : slopes) slope *= phase_unit_;
     if (!motions_.empty()) slopes.clear();
     for (const auto& step : motions_) {
@@ -175,7 +170,7 @@ class Arranger {
         if (std::isfinite(value) && value > 0.0) slopes.push_back(1.0 / value);
       }
     }
-    lattice_.curve = DissimilarityCurve(slopes.empty() ? 1.0 : median_of(slopes));
+    lattice_.curve = DissimilarityCurve(slopes.empty() ? 1.0 : upper_median(slopes));
   }
 
   [[nodiscard]] std::vector<Point2> positions() const {
@@ -250,7 +245,7 @@ class Arranger {
     }
     // Where all views are near, correlation ends nowhere.
     lattice_.curve =
-        DissimilarityCurve(pairs, level_of_far_views(median_of(lengths)).value_or(2.0 * most));
+        DissimilarityCurve(pairs, level_of_far_views(upper_median(lengths)).value_or(2.0 * most));
     curve_is_fitted_ = true;
     fit_phase_unit();
   }
@@ -263,11 +258,11 @@ class Arranger {
       ratios.push_back(laid_out(spring.a, spring.b) / spring.phases->length);
     }
     if (ratios.empty()) return;
-    const double unit = median_of(ratios);
+    const double unit = upper_median(ratios);
     if (!(unit > 0.0)) return;
     for (double& ratio : ratios) ratio = std::abs(ratio / unit - 1.0);
     phase_unit_ = unit;
-    phase_error_ = std::max(kSmallestLengthError, kNormal * median_of(ratios));
+    phase_error_ = std::max(kSmallestLengthError, kNormal * upper_median(ratios));
   }
 
   /// Springs within the curve's range whose views agree with each other and with a third one.
@@ -367,14 +362,14 @@ class Arranger {
       turn_disagreements.push_back(spring.phases->turn_disagreement_rad);
     }
     // The median spring errs by E, the others as their stiffness says [M04 eq. 5].
-    const double middle = lengths.empty() ? 1.0 : median_of(lengths);
+    const double middle = lengths.empty() ? 1.0 : upper_median(lengths);
     double error = lattice_.curve.error(middle);
     if (!(error > 0.0)) error = kFirstError * (middle > 0.0 ? middle : 1.0);
     const double at_middle = lattice_.curve.stiffness(middle);
     // Two readings of deviation s differ by sqrt(2) s; their mean errs by s / sqrt(2).
     const auto deviation = [](const std::vector<double>& differences) {
       if (differences.empty()) return kSmallestAngle;
-      return std::max(kSmallestAngle, 0.5 * kNormal * median_of(differences));
+      return std::max(kSmallestAngle, 0.5 * kNormal * upper_median(differences));
     };
     const double direction = deviation(disagreements);
     const double turn = deviation(turn_disagreements);
@@ -448,7 +443,7 @@ class Arranger {
       if (length > 0.0) nearest.push_back(length);
     }
     if (nearest.empty()) return;
-    rescale(1.0 / median_of(nearest));
+    rescale(1.0 / upper_median(nearest));
   }
 
   void rescale(double scale) {

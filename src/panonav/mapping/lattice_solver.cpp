@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/median.hpp"
 #include "panonav/geometry/angles.hpp"
 
 namespace panonav {
@@ -187,9 +188,8 @@ class Solver {
     for (std::size_t g = 0; g < groups; ++g) {
       double least = kWidth;
       if (!squares[g].empty()) {
-        const auto middle = squares[g].begin() + static_cast<std::ptrdiff_t>(squares[g].size() / 2);
-        std::ranges::nth_element(squares[g], middle);
-        least *= std::max(1.0, std::sqrt(*middle / kMedianSquare[g]));
+        const double middle = upper_median_in_place(std::span(squares[g]));
+        least *= std::max(1.0, std::sqrt(middle / kMedianSquare[g]));
       }
       if (widths_[g] <= least) continue;
       widths_[g] = std::max(least, 0.5 * widths_[g]);

@@ -18,10 +18,6 @@ namespace {
 using Triplet = Eigen::Triplet<double>;
 constexpr std::size_t unknowns = 3;  // x, y, heading of each node
 
-bool is_finite(const Pose2& pose) {
-  return std::isfinite(pose.x_m) && std::isfinite(pose.y_m) && std::isfinite(pose.heading_rad);
-}
-
 void check(std::span<const Pose2> nodes, std::span<const PoseEdge> edges) {
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     if (!is_finite(nodes[i])) {

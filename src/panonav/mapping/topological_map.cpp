@@ -42,9 +42,6 @@ Pose2 with_length(const Pose2& step, double length_m) {
 }  // namespace
 
 void validate(const TopologicalMap& map) {
-  const auto is_finite = [](const Pose2& pose) {
-    return std::isfinite(pose.x_m) && std::isfinite(pose.y_m) && std::isfinite(pose.heading_rad);
-  };
   for (std::size_t i = 0; i < map.nodes.size(); ++i) {
     const MapNode& node = map.nodes[i];
     if (i > 0 && node.view <= map.nodes[i - 1].view) {
@@ -172,9 +169,7 @@ MapUpdate TopologicalMapper::add(ViewId view, OdometryView seen,
                         "a view of the memory, later than those of the map");
   }
   if (moved) {
-    require(
-        std::isfinite(moved->x_m) && std::isfinite(moved->y_m) && std::isfinite(moved->heading_rad),
-        "step of the wheels", length(*moved), "finite");
+    require(is_finite(*moved), "step of the wheels", length(*moved), "finite");
   }
   MapUpdate update;
   if (last_) update.step = visual_step(*last_, seen, odometry_);

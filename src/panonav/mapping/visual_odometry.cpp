@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/median.hpp"
 #include "panonav/signature/compass.hpp"
 #include "panonav/signature/dissimilarity.hpp"
 
@@ -110,9 +111,7 @@ std::optional<double> length_scale_m(std::span<const KnownLength> steps) {
     }
   }
   if (ratios.empty()) return std::nullopt;
-  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
-  std::nth_element(ratios.begin(), middle, ratios.end());
-  return *middle;
+  return upper_median_in_place(std::span(ratios));
 }
 
 VisualOdometry::VisualOdometry(const VisualOdometryOptions& options) : options_(options) {

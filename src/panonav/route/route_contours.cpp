@@ -9,6 +9,7 @@
 #include <string>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/median.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/route/line_sampling.hpp"
 
@@ -221,9 +222,7 @@ bool RouteContours::fit_pose(RouteContourFix& fix) const {
       sizes.push_back(std::abs(difference) / std::sqrt(variance));
     }
     if (terms.size() < 8) return false;
-    const auto half = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-    std::nth_element(sizes.begin(), half, sizes.end());
-    const double noise = std::max(0.1, 1.4826 * *half);
+    const double noise = std::max(0.1, 1.4826 * upper_median_in_place(std::span(sizes)));
     Matrix matrix = Matrix::Zero();
     Vector right = Vector::Zero();
     double left = 0.0;

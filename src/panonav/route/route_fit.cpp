@@ -10,6 +10,7 @@
 #include <string>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/median.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/motion/path.hpp"
 #include "panonav/route/line_sampling.hpp"
@@ -29,12 +30,6 @@ constexpr double usual_distance_m = 2.0;
 
 // With fewer directions three numbers are not worth asking for.
 constexpr std::size_t fewest_directions = 16;
-
-float median(std::vector<float>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 }  // namespace
 
@@ -197,7 +192,8 @@ std::optional<RouteLines::Linearised> RouteLines::linearise(const std::vector<Te
   for (const Term& term : terms) scratch.push_back(std::abs(static_cast<float>(difference(term))));
   // A grey level at least: lines are bytes.
   constexpr double least_noise = 1.0 / 255.0;
-  const double noise = std::max(least_noise, 1.4826 * static_cast<double>(median(scratch)));
+  const double noise = std::max(
+      least_noise, 1.4826 * static_cast<double>(upper_median_in_place(std::span(scratch))));
   double left = 0.0;
   double weights = 0.0;
   double x = 0.0;

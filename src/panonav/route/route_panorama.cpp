@@ -32,7 +32,7 @@ bool RoutePanorama::append(const Pose2& pose, std::span<const std::uint8_t> line
     throw ContractError("values of the line", static_cast<double>(line.size()),
                         std::to_string(columns_));
   }
-  if (!std::isfinite(pose.x_m) || !std::isfinite(pose.y_m) || !std::isfinite(pose.heading_rad)) {
+  if (!is_finite(pose)) {
     throw ContractError("pose", "not finite", "finite numbers");
   }
   constexpr double least_m = 1e-3;
