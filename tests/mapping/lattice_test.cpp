@@ -11,6 +11,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/mapping/lattice_map.hpp"
 
 namespace panonav {
 namespace {
@@ -253,6 +254,81 @@ TEST(Lattice, AViewTwiceLiesAtOnePlace) {
   const Pose2& again = lattice.nodes.back().pose;
   EXPECT_LT(distance(first.position(), again.position()), 0.15);
   EXPECT_NEAR(angle_difference(again.heading_rad, first.heading_rad), 0.7, radians(3.0));
+}
+
+TEST(Lattice, ViewsThatCameLaterFindTheirPlace) {
+  const Place place(7, 0.3);
+  std::vector<FourierSignature> signatures;
+  for (const ViewId view : place.memory.views()) signatures.push_back(place.memory.signature(view));
+  // Every sixth view comes later: all around the others.
+  std::vector<std::size_t> order;
+  std::vector<std::size_t> later;
+  for (std::size_t i = 0; i < signatures.size(); ++i) (i % 6 == 3 ? later : order).push_back(i);
+  const std::size_t first = order.size();
+  order.insert(order.end(), later.begin(), later.end());
+  std::vector<FourierSignature> ordered;
+  std::vector<Point2> truth;
+  for (const std::size_t i : order) {
+    ordered.push_back(signatures[i]);
+    truth.push_back(place.poses[i].position());
+  }
+  const VisualMemory all = memory_of(ordered);
+  VisualMemory memory(all);
+  for (std::size_t i = first; i < order.size(); ++i) memory.remove(all.views()[i]);
+  Lattice lattice = arrange(memory);
+  ASSERT_EQ(lattice.nodes.size(), first);
+  ASSERT_EQ(lattice.parts.size(), 1U);
+  const auto before = positions_of(lattice);
+  extend(lattice, all);
+  ASSERT_EQ(lattice.nodes.size(), order.size());
+  EXPECT_EQ(lattice.parts.size(), 1U);
+  EXPECT_EQ(lattice.parts[0].views, order.size());
+  std::vector<Point2> known(truth.begin(), truth.begin() + static_cast<std::ptrdiff_t>(first));
+  const double difference_before = shape_difference(before, known).value;
+  EXPECT_LT(shape_difference(positions_of(lattice), truth).value, difference_before + 0.01);
+  // New views lie about as well as the old ones.
+  const auto fit = align(before, known, {.allow_scale = true});
+  std::vector<double> errors;
+  for (std::size_t i = first; i < order.size(); ++i) {
+    errors.push_back(distance(fit.apply(lattice.nodes[i].pose.position()), truth[i]));
+  }
+  EXPECT_LT(median_of(errors), 1.5 * fit.rms_m + 0.02);
+  // Nothing new: nothing happens.
+  const auto settled = positions_of(lattice);
+  extend(lattice, all);
+  EXPECT_EQ(positions_of(lattice), settled);
+}
+
+TEST(Lattice, GrowsFromNothing) {
+  const Place place(8, 0.5);
+  Lattice lattice;
+  VisualMemory memory(place.memory.shape(), place.memory.full_scale(), place.memory.elevations());
+  extend(lattice, memory);
+  EXPECT_TRUE(lattice.nodes.empty());
+  memory.append_as(ViewId{5}, place.memory.packed(place.memory.views()[0]), {.name = "first"});
+  extend(lattice, memory);
+  ASSERT_EQ(lattice.nodes.size(), 1U);
+  memory.append_as(ViewId{3 + 5}, place.memory.packed(place.memory.views()[1]), {.name = "second"});
+  extend(lattice, memory);
+  ASSERT_EQ(lattice.nodes.size(), 2U);
+  for (const auto& node : lattice.nodes) EXPECT_TRUE(std::isfinite(node.pose.x_m));
+  // A lattice of another memory.
+  EXPECT_THROW(extend(lattice, place.memory), ContractError);
+}
+
+TEST(Lattice, AMapOfItHoldsAllNodesAndSprings) {
+  const Place place(9, 0.5);
+  const Lattice lattice = arrange(place.memory);
+  const TopologicalMap map = map_of(lattice);
+  EXPECT_NO_THROW(validate(map));
+  ASSERT_EQ(map.nodes.size(), lattice.nodes.size());
+  ASSERT_EQ(map.edges.size(), lattice.springs.size());
+  EXPECT_EQ(number_of_parts(map), lattice.parts.size());
+  for (std::size_t s = 0; s < map.edges.size(); ++s) {
+    const Pose2& a = lattice.nodes[lattice.springs[s].a].pose;
+    const Pose2& b = lattice.nodes[lattice.springs[s].b].pose;
+    EXPECT_LT(distance((a * map.edges[s].a_from_b).position(), b.position()), 1e-9);
+  }
 }
 
 TEST(Lattice, RefusesMotionsThatAreNone) {

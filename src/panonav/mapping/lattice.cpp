@@ -20,8 +20,6 @@ namespace panonav {
 
 namespace {
 
-constexpr double kNormal = 1.4826;             // deviation of normal errors over their median size
-constexpr double kFirstError = 0.25;           // of a length, before the curve is known
 constexpr double kSmallestLengthError = 0.02;  // of the lengths that phases tell, relative
 constexpr double kGivenUp = 0.25;              // springs of less weight do not count for the curve
 constexpr std::size_t kFarPairs = 2000;        // drawn for the level of far views
@@ -29,7 +27,6 @@ constexpr std::size_t kFarPairs = 2000;        // drawn for the level of far vie
 constexpr double kLargestTurnError = 0.25 * std::numbers::pi;
 // More than half of the triangles of a spring must close.
 constexpr double kClosing = 0.5;
-constexpr double kSmallestAngle = 0.0035;  // rad; phases are packed in steps of 0.025
 
 void check(const CoarseMotion& motion) {
   const double sum = motion.step.x_m + motion.step.y_m + motion.step.heading_rad;
@@ -152,8 +149,8 @@ class Arranger {
         slopes.push_back(spring.phases->length / spring.dissimilarity);
       }
     }
-    if (!units.empty()) phase_unit_ = upper_median(units);
-    for (double& slope : slopes) slope *= phase_unit_;
+    if (!units.empty()) lattice_.errors.phase_unit = upper_median(units);
+    for (double& slope : slopes) slope *= lattice_.errors.phase_unit;
     if (!motions_.empty()) slopes.clear();
     for (const auto& step : motions_) {
       const double seen = views_.dissimilarity(std::minmax(step.a, step.b));
@@ -261,8 +258,9 @@ class Arranger {
     const double unit = upper_median(ratios);
     if (!(unit > 0.0)) return;
     for (double& ratio : ratios) ratio = std::abs(ratio / unit - 1.0);
-    phase_unit_ = unit;
-    phase_error_ = std::max(kSmallestLengthError, kNormal * upper_median(ratios));
+    lattice_.errors.phase_unit = unit;
+    lattice_.errors.phase_length =
+        std::max(kSmallestLengthError, normal_over_median * upper_median(ratios));
   }
 
   /// Springs within the curve's range whose views agree with each other and with a third one.
@@ -322,7 +320,8 @@ class Arranger {
 
   /// Before the curve is known the views' own idea of the distance is the better one.
   [[nodiscard]] double rest_length(const LatticeSpring& spring) const {
-    if (!curve_is_fitted_ && spring.phases) return phase_unit_ * spring.phases->length;
+    if (!curve_is_fitted_ && spring.phases)
+      return lattice_.errors.phase_unit * spring.phases->length;
     return lattice_.curve.distance(spring.dissimilarity);
   }
 
@@ -352,47 +351,9 @@ class Arranger {
   }
 
   [[nodiscard]] std::vector<SpringTerm> terms() const {
-    std::vector<double> lengths;
-    std::vector<double> disagreements;
-    std::vector<double> turn_disagreements;
-    for (const auto& spring : lattice_.springs) {
-      lengths.push_back(spring.length);
-      if (!spring.phases) continue;
-      disagreements.push_back(spring.phases->disagreement_rad);
-      turn_disagreements.push_back(spring.phases->turn_disagreement_rad);
-    }
-    // The median spring errs by E, the others as their stiffness says [M04 eq. 5].
-    const double middle = lengths.empty() ? 1.0 : upper_median(lengths);
-    double error = lattice_.curve.error(middle);
-    if (!(error > 0.0)) error = kFirstError * (middle > 0.0 ? middle : 1.0);
-    const double at_middle = lattice_.curve.stiffness(middle);
-    // Two readings of deviation s differ by sqrt(2) s; their mean errs by s / sqrt(2).
-    const auto deviation = [](const std::vector<double>& differences) {
-      if (differences.empty()) return kSmallestAngle;
-      return std::max(kSmallestAngle, 0.5 * kNormal * upper_median(differences));
-    };
-    const double direction = deviation(disagreements);
-    const double turn = deviation(turn_disagreements);
     std::vector<SpringTerm> result;
     for (const auto& spring : lattice_.springs) {
-      SpringTerm term{.a = spring.a,
-                      .b = spring.b,
-                      .length = spring.length,
-                      .length_deviation = error * std::sqrt(at_middle / spring.stiffness)};
-      if (spring.phases) {
-        const PhaseReading& phases = *spring.phases;
-        term.turn =
-            SpringTurn{phases.turn_rad, std::hypot(turn, 0.5 * phases.turn_disagreement_rad)};
-        if (phases.points) {
-          term.direction = SpringDirection{phases.direction_a_rad, phases.direction_b_rad,
-                                           std::hypot(direction, 0.5 * phases.disagreement_rad)};
-          if (curve_is_fitted_) {
-            const double length = phase_unit_ * phases.length;
-            term.along_direction = SpringLength{length, phase_error_ * length};
-          }
-        }
-      }
-      result.push_back(term);
+      result.push_back(spring_term(spring, lattice_.errors, curve_is_fitted_));
     }
     for (const auto& [a, b, motion] : motions_) {
       const double travel = std::hypot(motion.step.x_m, motion.step.y_m);
@@ -412,6 +373,7 @@ class Arranger {
   }
 
   void relax() {
+    learn_errors(lattice_.springs, lattice_.curve, lattice_.errors);
     const auto solution = solve_lattice(terms(), start_.poses);
     for (std::size_t s = 0; s < lattice_.springs.size(); ++s) {
       lattice_.springs[s].weight = solution.weights[s];
@@ -455,7 +417,9 @@ class Arranger {
   }
 
   void finish() {
-    fit_curve();  // in the unit of the result
+    // In the unit of the result.
+    fit_curve();
+    learn_errors(lattice_.springs, lattice_.curve, lattice_.errors);
     auto& parts = lattice_.parts;
     for (const std::size_t part : start_.parts) parts.resize(std::max(parts.size(), part + 1));
     std::vector<std::optional<Pose2>> part_from_frame(parts.size());
@@ -478,8 +442,6 @@ class Arranger {
   std::set<NodePair> known_;
   std::vector<LatticeSpring> measured_;  // ascending (a, b)
   bool curve_is_fitted_ = false;
-  double phase_unit_ = 1.0;  // length of the unit of phases in the arrangement
-  double phase_error_ = kFirstError;
   LatticeStart start_;
   Lattice lattice_;
 };
@@ -506,6 +468,40 @@ void visit_options(LatticeOptions& options, OptionVisitor& visitor) {
                  .low = 1,
                  .high = 20},
                 options.rounds);
+}
+
+void visit_options(CoarseMotionOptions& options, OptionVisitor& visitor) {
+  visitor.visit({.name = "distance_deviation",
+                 .help = "standard deviation of a step's length, as a share of it",
+                 .low = 0.0,
+                 .high = 10.0,
+                 .low_open = true},
+                options.distance_deviation);
+  visitor.visit({.name = "direction_deviation_rad",
+                 .help = "standard deviation of the direction of travel",
+                 .low = 0.0,
+                 .high = std::numbers::pi,
+                 .low_open = true},
+                options.direction_deviation_rad);
+  visitor.visit({.name = "turn_deviation_rad",
+                 .help = "standard deviation of a step's turn",
+                 .low = 0.0,
+                 .high = std::numbers::pi,
+                 .low_open = true},
+                options.turn_deviation_rad);
+}
+
+CoarseMotion coarse_motion(ViewId from, ViewId to, const Pose2& step,
+                           const CoarseMotionOptions& options) {
+  validate(options);
+  constexpr double kSmallestTravelM = 0.01;
+  const double travel_m = std::max(kSmallestTravelM, std::hypot(step.x_m, step.y_m));
+  return {.from = from,
+          .to = to,
+          .step = step,
+          .distance_deviation_m = options.distance_deviation * travel_m,
+          .direction_deviation_rad = options.direction_deviation_rad,
+          .turn_deviation_rad = options.turn_deviation_rad};
 }
 
 Lattice arrange(const VisualMemory& memory, const LatticeOptions& options,

@@ -33,6 +33,19 @@ struct CoarseMotion {
   double turn_deviation_rad = 0.2;       ///< > 0
 };
 
+/// How far the motion of a robot is trusted; the defaults are those of wheels that slip.
+struct CoarseMotionOptions {
+  double distance_deviation = 0.06;       ///< standard deviation, share of the distance
+  double direction_deviation_rad = 0.15;  ///< of the direction of travel
+  double turn_deviation_rad = 0.15;       ///< of the turn
+};
+void visit_options(CoarseMotionOptions& options, OptionVisitor& visitor);
+
+/// The motion with deviations as the options say; one centimetre of travel at least. Throws
+/// OptionError.
+[[nodiscard]] CoarseMotion coarse_motion(ViewId from, ViewId to, const Pose2& step,
+                                         const CoarseMotionOptions& options = {});
+
 /// A view in the arrangement.
 struct LatticeNode {
   ViewId view;
@@ -50,6 +63,16 @@ struct LatticeSpring {
   std::optional<PhaseReading> phases;
 };
 
+/// How far springs are off, as the arrangement itself tells; lengths in its unit.
+struct SpringErrors {
+  double length = 0.25;        ///< of the rest length of a spring of stiffness 1
+  double direction_rad = 0.1;  ///< of a direction in which both views agree
+  double turn_rad = 0.1;       ///< of a turn in which both views agree
+  /// How long the unit of the lengths that phases tell is, and how far these are off, as a share.
+  double phase_unit = 1.0;
+  double phase_length = 0.25;
+};
+
 /// Views that springs hold together. Different parts lie in frames of their own: nothing is known
 /// of how they lie to each other.
 struct LatticePart {
@@ -64,6 +87,7 @@ struct Lattice {
   std::vector<LatticeSpring> springs;  ///< ascending (a, b)
   std::vector<LatticePart> parts;      ///< the largest first
   DissimilarityCurve curve{1.0};
+  SpringErrors errors;
   /// True: metres, from the coarse motion. False: the unit is the median distance of a view to its
   /// nearest one.
   bool metric = false;
@@ -94,5 +118,14 @@ struct Lattice {
 /// bits on any number of threads.
 [[nodiscard]] Lattice arrange(const VisualMemory& memory, const LatticeOptions& options,
                               std::span<const CoarseMotion> motion, Executor& executor);
+
+/// Adds the views that the memory has and the lattice has not, one after the other: springs to the
+/// most alike views of the lattice, the place of least energy among those that they point to, then
+/// a few nodes around give way. Other views stay where they are, so the cost of a view does not
+/// grow with the lattice but for the search (and one look at each spring). A view joins the one
+/// part to which most of its springs lead; without springs it is a part of its own, which is last.
+/// `arrange` joins parts, this does not. The lattice must come from the same memory, of which views
+/// may only have been added. Throws OptionError, ContractError.
+void extend(Lattice& lattice, const VisualMemory& memory, const LatticeOptions& options = {});
 
 }  // namespace panonav

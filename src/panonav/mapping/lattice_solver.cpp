@@ -15,9 +15,10 @@ namespace panonav {
 
 namespace {
 
-constexpr double kWidth = 3.0;           // in deviations: where a spring begins to be given up
-constexpr int kIterationsPerWidth = 20;  // at most
-constexpr double kEnough = 1e-7;         // relative change of the energy
+constexpr double kWidth = 3.0;            // in deviations: where a spring begins to be given up
+constexpr int kIterationsPerWidth = 20;   // at most
+constexpr double kEnough = 1e-7;          // relative change of the energy
+constexpr double kEnoughOnTheWay = 1e-3;  // the same before the widths are narrow
 
 using Row = std::array<double, 6>;  // derivatives by x, y, heading of a and of b
 
@@ -155,8 +156,8 @@ class Solver {
           widths_[g] = std::max(widths_[g], 2.0 * std::sqrt(squares[g].value_or(0.0)));
         }
       }
-      while (narrow()) relax();
-      relax();
+      while (narrow()) relax(kEnoughOnTheWay);
+      relax(kEnough);
     }
     solution_.energy = energy();
     for (std::size_t s = 0; s < springs_.size(); ++s) {
@@ -235,7 +236,7 @@ class Solver {
     }
   }
 
-  void relax() {
+  void relax(double enough) {
     double damping = 1e-6;
     for (int i = 0; i < kIterationsPerWidth; ++i) {
       ++solution_.iterations;
@@ -255,7 +256,7 @@ class Solver {
           damping *= 10.0;
         }
       }
-      if (!better || before - after <= kEnough * before) break;
+      if (!better || before - after <= enough * before) break;
     }
   }
 

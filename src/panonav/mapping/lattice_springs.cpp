@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "panonav/core/median.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/mapping/lattice_graph.hpp"
 #include "panonav/signature/dissimilarity.hpp"
@@ -18,6 +19,8 @@ constexpr double kAgreement = 0.25 * std::numbers::pi;
 // Three turns that should cancel; three displacements, relative to the longest.
 constexpr double kTurnsCancel = 10.0 * std::numbers::pi / 180.0;
 constexpr double kWaysCancel = 0.5;
+constexpr double kUnknownError = 0.25;     // of a length, before the curve is known
+constexpr double kSmallestAngle = 0.0035;  // rad; phases are packed in steps of 0.025
 
 /// Displacement and turn of the spring from one of its ends.
 Pose2 step_from(std::size_t from, const LatticeSpring& spring) {
@@ -80,6 +83,51 @@ bool agrees(const LatticeSpring& spring) {
   if (!spring.phases) return true;
   return spring.phases->disagreement_rad <= kAgreement &&
          spring.phases->turn_disagreement_rad <= kAgreement;
+}
+
+void learn_errors(std::span<const LatticeSpring> springs, const DissimilarityCurve& curve,
+                  SpringErrors& errors) {
+  std::vector<double> lengths;
+  std::vector<double> disagreements;
+  std::vector<double> turn_disagreements;
+  for (const auto& spring : springs) {
+    lengths.push_back(spring.length);
+    if (!spring.phases) continue;
+    disagreements.push_back(spring.phases->disagreement_rad);
+    turn_disagreements.push_back(spring.phases->turn_disagreement_rad);
+  }
+  // The median spring errs by E, the others as their stiffness says [M04 eq. 5].
+  const double middle = lengths.empty() ? 1.0 : upper_median(lengths);
+  double error = curve.error(middle);
+  if (!(error > 0.0)) error = kUnknownError * (middle > 0.0 ? middle : 1.0);
+  errors.length = error * std::sqrt(curve.stiffness(middle));
+  // Two readings of deviation s differ by sqrt(2) s; their mean errs by s / sqrt(2).
+  const auto deviation = [](const std::vector<double>& differences) {
+    if (differences.empty()) return kSmallestAngle;
+    return std::max(kSmallestAngle, 0.5 * normal_over_median * upper_median(differences));
+  };
+  errors.direction_rad = deviation(disagreements);
+  errors.turn_rad = deviation(turn_disagreements);
+}
+
+SpringTerm spring_term(const LatticeSpring& spring, const SpringErrors& errors,
+                       bool phase_lengths) {
+  SpringTerm term{.a = spring.a,
+                  .b = spring.b,
+                  .length = spring.length,
+                  .length_deviation = errors.length / std::sqrt(spring.stiffness)};
+  if (!spring.phases) return term;
+  const PhaseReading& phases = *spring.phases;
+  term.turn =
+      SpringTurn{phases.turn_rad, std::hypot(errors.turn_rad, 0.5 * phases.turn_disagreement_rad)};
+  if (!phases.points) return term;
+  term.direction = SpringDirection{phases.direction_a_rad, phases.direction_b_rad,
+                                   std::hypot(errors.direction_rad, 0.5 * phases.disagreement_rad)};
+  if (phase_lengths) {
+    const double length = errors.phase_unit * phases.length;
+    term.along_direction = SpringLength{length, errors.phase_length * length};
+  }
+  return term;
 }
 
 std::vector<double> closing_triangles(std::size_t nodes, std::span<const LatticeSpring> springs) {

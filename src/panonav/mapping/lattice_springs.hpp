@@ -7,8 +7,12 @@
 
 #include "panonav/core/executor.hpp"
 #include "panonav/mapping/lattice.hpp"
+#include "panonav/mapping/lattice_solver.hpp"
 
 namespace panonav {
+
+/// Deviation of normal errors over their median size.
+inline constexpr double normal_over_median = 1.4826;
 
 /// Two nodes, the smaller one first.
 using NodePair = std::pair<std::size_t, std::size_t>;
@@ -37,6 +41,15 @@ class SpringViews {
 
 /// Whether the two views of the spring agree on how they lie to each other; true without phases.
 [[nodiscard]] bool agrees(const LatticeSpring& spring);
+
+/// What the springs' views disagree on, and the curve's error, make the deviations; those of phase
+/// lengths are not touched.
+void learn_errors(std::span<const LatticeSpring> springs, const DissimilarityCurve& curve,
+                  SpringErrors& errors);
+
+/// The spring as the solver sees it. `phase_lengths`: the lengths that phases tell count, too.
+[[nodiscard]] SpringTerm spring_term(const LatticeSpring& spring, const SpringErrors& errors,
+                                     bool phase_lengths);
 
 /// For each spring the share of the triangles with two others that close, in turn and in
 /// displacement by their rest lengths, 0 .. 1; 0 where there are none, and without phases. Cost:

@@ -23,8 +23,8 @@ constexpr double closure_deviation = 1.0;
 constexpr double closure_position_deviation_m = 0.02;
 constexpr double closure_turn_deviation = 0.05;
 constexpr double closure_heading_deviation_rad = 0.01;
-// Known steps by which the scale is judged: the latest.
-constexpr std::size_t most_known_lengths = 200;
+// Known steps by which the scale is judged: the latest, as R is another in every room.
+constexpr std::size_t most_known_lengths = 15;
 constexpr double refuted_weight = 0.1;
 // Closures that are right within so many standard deviations do not pull.
 constexpr double pulling_deviations = 3.0;
@@ -124,8 +124,9 @@ TopologicalMapper::TopologicalMapper(const VisualMemory& memory, const MappingOp
 }
 
 bool TopologicalMapper::is_new(const OdometryView& view) const {
-  if (!last_ || options_.capture_difference == 0.0) return true;
-  return image_difference(last_->coefficients, view.coefficients) > options_.capture_difference;
+  const auto& last = odometry_.last();
+  if (!last || options_.capture_difference == 0.0) return true;
+  return image_difference(last->coefficients, view.coefficients) > options_.capture_difference;
 }
 
 void TopologicalMapper::add_step(const std::optional<VisualStep>& step,
@@ -172,7 +173,7 @@ MapUpdate TopologicalMapper::add(ViewId view, OdometryView seen,
     require(is_finite(*moved), "step of the wheels", length(*moved), "finite");
   }
   MapUpdate update;
-  if (last_) update.step = visual_step(*last_, seen, odometry_);
+  update.step = odometry_.add(std::move(seen));
   nodes_.push_back({view, 0.0});
   if (nodes_.size() == 1) {
     poses_.emplace_back();
@@ -185,15 +186,17 @@ MapUpdate TopologicalMapper::add(ViewId view, OdometryView seen,
     }
     add_step(update.step, moved, update);
   }
-  if (options_.close_loops) close_loops(seen, update);
-  last_ = std::move(seen);
+  if (options_.close_loops) close_loops(update);
   return update;
 }
 
-void TopologicalMapper::close_loops(const OdometryView& seen, MapUpdate& update) {
-  double scale_m = odometry_.scale_m;
-  if (const auto known = length_scale_m(known_lengths_)) scale_m = *known;
-  update.closures = finder_.find(nodes_, poses_, seen, scale_m);
+double TopologicalMapper::scale_m() const {
+  return length_scale_m(known_lengths_).value_or(odometry_.scale_m());
+}
+
+void TopologicalMapper::close_loops(MapUpdate& update) {
+  const double scale_m = this->scale_m();
+  update.closures = finder_.find(nodes_, poses_, *odometry_.last(), scale_m);
   for (const LoopClosure& closure : update.closures) {
     join_parts(closure);
     const double length_m = length(closure.earlier_from_later);

@@ -106,20 +106,21 @@ class TopologicalMapper {
   [[nodiscard]] std::span<const Pose2> poses() const noexcept { return poses_; }
   /// The parts are numbered in the order of their first nodes.
   [[nodiscard]] TopologicalMap map() const;
-  /// Metres for each unit of length of the views, as the wheels tell or as it was given.
-  [[nodiscard]] double scale_m() const noexcept { return odometry_.scale_m; }
+  /// Metres for each unit of length of the views: as the wheels tell, or else as the visual
+  /// odometry has it.
+  [[nodiscard]] double scale_m() const;
 
  private:
   void add_step(const std::optional<VisualStep>& step, const std::optional<Pose2>& moved,
                 MapUpdate& update);
-  void close_loops(const OdometryView& seen, MapUpdate& update);
+  void close_loops(MapUpdate& update);
   void join_parts(const LoopClosure& closure);
   void optimise_latest();
   void optimise();
 
   const VisualMemory* memory_;
   MappingOptions options_;
-  VisualOdometryOptions odometry_;
+  VisualOdometry odometry_;
   PoseGraphOptions graph_;
   LoopClosureFinder finder_;
   std::vector<PassedNode> nodes_;
@@ -128,7 +129,6 @@ class TopologicalMapper {
   std::vector<PoseEdge> edges_;
   std::vector<double> weights_;
   std::vector<KnownLength> known_lengths_;
-  std::optional<OdometryView> last_;
   std::size_t optimised_size_ = 0;  // nodes when the map was last optimised
   std::size_t anchored_ = 0;        // the latest node of the closures so far
   bool changed_ = false;            // by closures since then

@@ -8,6 +8,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/median.hpp"
+#include "panonav/mapping/azimuth_flow.hpp"
 #include "panonav/signature/compass.hpp"
 #include "panonav/signature/dissimilarity.hpp"
 
@@ -44,8 +45,24 @@ std::optional<VisualStep> home_vector_step(const OdometryView& before, const Odo
       home_vector(before.coefficients, after.coefficients, vector_options(options));
   if (!(vector.correlation > 0.0)) return std::nullopt;
   VisualStep step;
-  step.before_from_after =
-      inverse(Pose2{options.scale_m * vector.xi, options.scale_m * vector.eta, vector.heading_rad});
+  Pose2 motion = inverse(Pose2{vector.xi, vector.eta, vector.heading_rad});
+  if (options.nearer_side) {
+    // The robot goes away from home.
+    const AzimuthFlow flow =
+        refine_flow(before.coefficients, after.coefficients,
+                    {.g0 = -vector.heading_rad, .a1 = -vector.eta, .b1 = vector.xi}, 1);
+    const double turn = flow.turn_rad();
+    // Far from the start the flow has lost its way.
+    constexpr double farthest_rad = 0.2;
+    if (std::abs(angle_difference(turn, motion.heading_rad)) < farthest_rad) {
+      // The length stays the home vector's, whose weights leave out what does not fit.
+      const double direction = flow.direction_rad() + turn;
+      motion = {vector.length() * std::cos(direction), vector.length() * std::sin(direction),
+                wrap_angle(turn)};
+    }
+  }
+  step.before_from_after = {options.scale_m * motion.x_m, options.scale_m * motion.y_m,
+                            motion.heading_rad};
   step.length_in_views = vector.length();
   step.correlation = vector.correlation;
   step.residual = vector.residual;
@@ -65,6 +82,11 @@ void visit_options(VisualOdometryOptions& options, OptionVisitor& visitor) {
                  .high = 1e6,
                  .low_open = true},
                 options.scale_m);
+  visitor.visit({.name = "camera_height_m",
+                 .help = "of the camera above level ground, which then tells lengths; 0: not known",
+                 .low = 0.0,
+                 .high = 100.0},
+                options.camera_height_m);
   visitor.visit({.name = "distance_components",
                  .help = "components compared for the distance of the published rule (k1); 0: all",
                  .low = 0,
@@ -78,6 +100,9 @@ void visit_options(VisualOdometryOptions& options, OptionVisitor& visitor) {
   visitor.visit(
       {.name = "iterations", .help = "times that the home vector is refined", .low = 0, .high = 20},
       options.iterations);
+  visitor.visit({.name = "nearer_side",
+                 .help = "take out of turns what things nearer on one side of the way do to them"},
+                options.nearer_side);
   visitor.visit({.name = "most_residual",
                  .help = "share of the views' energy that a step may leave unexplained",
                  .low = 0.0,
@@ -116,6 +141,11 @@ std::optional<double> length_scale_m(std::span<const KnownLength> steps) {
 
 VisualOdometry::VisualOdometry(const VisualOdometryOptions& options) : options_(options) {
   validate(options);
+  if (options.camera_height_m > 0.0) ground_.emplace(options.camera_height_m);
+}
+
+double VisualOdometry::scale_m() const {
+  return ground_ ? ground_->scale_m().value_or(options_.scale_m) : options_.scale_m;
 }
 
 std::optional<VisualStep> VisualOdometry::add(OdometryView view) {
@@ -123,6 +153,7 @@ std::optional<VisualStep> VisualOdometry::add(OdometryView view) {
   if (last_) {
     step = visual_step(*last_, view, options_);
     if (step) {
+      if (ground_) ground_->correct(last_->coefficients, view.coefficients, *step);
       pose_ = pose_ * step->before_from_after;
     } else {
       ++breaks_;

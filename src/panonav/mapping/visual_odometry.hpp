@@ -8,6 +8,7 @@
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/homing/fourier_homing.hpp"
 #include "panonav/homing/homing_view.hpp"
+#include "panonav/mapping/ground_lengths.hpp"
 #include "panonav/signature/fourier_signature.hpp"
 
 namespace panonav {
@@ -28,11 +29,18 @@ struct VisualOdometryOptions {
   /// Metres for each unit of length that the views give: the distance R of things around for
   /// `home_vector`, the distance of signatures 1 apart for `published`. See `length_scale_m`.
   double scale_m = 1.5;
+  /// Height of the camera above level ground; with it `VisualOdometry` and maps read lengths from
+  /// the ground, in metres (`GroundLengths`). 0: not known.
+  double camera_height_m = 0.0;
   /// Of `published`: components compared for the distance (k1) and for the turn (k2); 0 takes all.
   int distance_components = 0;
   int turn_components = 0;
   /// Times that the solution of `home_vector` is refined.
   int iterations = 1;
+  /// Turn and direction of `home_vector` are refined by the flow over azimuth (`refine_flow`),
+  /// which tells a turn from things that are nearer on one side of the way. Along a wall that is
+  /// most of the drift.
+  bool nearer_side = true;
   /// A step is not believed when turn and displacement leave more than this share of the energy of
   /// the views unexplained.
   double most_residual = 0.5;
@@ -58,7 +66,7 @@ struct VisualStep {
 
 /// Empty where the views show no motion that can be believed: no structure, or too little in
 /// common. Throws ContractError on views of different shapes; OptionError. Cost: `home_vector`
-/// without the search of displacements, about 60 microseconds for 80 x 15.
+/// without the search of displacements and one iteration of `refine_flow`.
 [[nodiscard]] std::optional<VisualStep> visual_step(const OdometryView& before,
                                                     const OdometryView& after,
                                                     const VisualOdometryOptions& options = {});
@@ -84,12 +92,17 @@ class VisualOdometry {
   /// the pose then stays, and `breaks()` counts. Throws as `visual_step`.
   std::optional<VisualStep> add(OdometryView view);
 
+  /// The view added last; empty before the first.
+  [[nodiscard]] const std::optional<OdometryView>& last() const noexcept { return last_; }
+  /// Metres for each unit of length of the views: as the ground tells, or as it was given.
+  [[nodiscard]] double scale_m() const;
   /// start_from_robot.
   [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }
   [[nodiscard]] int breaks() const noexcept { return breaks_; }
 
  private:
   VisualOdometryOptions options_;
+  std::optional<GroundLengths> ground_;
   std::optional<OdometryView> last_;
   Pose2 pose_;
   int breaks_ = 0;

@@ -1,0 +1,73 @@
+#include "panonav/mapping/ground_lengths.hpp"
+
+#include <array>
+#include <cmath>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/median.hpp"
+#include "panonav/mapping/ground_displacement.hpp"
+#include "panonav/mapping/visual_odometry.hpp"
+
+namespace panonav {
+
+namespace {
+
+// Steps by which the next is judged.
+constexpr std::size_t most_latest = 15;
+constexpr std::size_t least_latest = 3;
+// Before the first of them: times the length that the views' default scale gives.
+constexpr std::array<double, 4> first_guesses{0.5, 1.0, 2.0, 4.0};
+constexpr double most_relative_deviation = 0.2;
+constexpr double most_relative_change = 2.0;  // either way, against the latest steps
+constexpr double least_length = 0.03;         // in camera heights; shorter steps tell no scale
+
+}  // namespace
+
+GroundLengths::GroundLengths(double camera_height_m) : camera_height_m_(camera_height_m) {
+  require(std::isfinite(camera_height_m) && camera_height_m > 0.0, "camera_height_m",
+          camera_height_m, "> 0");
+}
+
+std::optional<double> GroundLengths::scale_m() const {
+  if (latest_scales_m_.size() < least_latest) return std::nullopt;
+  return upper_median(latest_scales_m_);
+}
+
+bool GroundLengths::correct(const HomingView& before, const HomingView& after, VisualStep& step) {
+  Pose2& motion = step.before_from_after;
+  const double length_m = std::hypot(motion.x_m, motion.y_m);
+  if (!(length_m > 0.0)) return true;
+  const auto scaled = [&motion](double factor) {
+    return Pose2{motion.x_m * factor, motion.y_m * factor, motion.heading_rad};
+  };
+  const auto known_m = scale_m();
+  std::optional<GroundDisplacement> found;
+  const auto look_near = [&](double guess_m) {
+    const auto one =
+        ground_displacement(before, after, scaled(guess_m / length_m / camera_height_m_));
+    if (one && (!found || one->difference < found->difference)) found = one;
+  };
+  if (known_m) {
+    look_near(*known_m * step.length_in_views);
+  } else {
+    for (const double guess : first_guesses) look_near(guess * length_m);
+  }
+  if (found) {
+    const double length = std::hypot(found->x, found->y);
+    const double expected = known_m ? *known_m * step.length_in_views / camera_height_m_ : length;
+    if (found->deviation < most_relative_deviation * length &&
+        length < most_relative_change * expected && expected < most_relative_change * length) {
+      if (length > least_length) {
+        latest_scales_m_.push_back(length * camera_height_m_ / step.length_in_views);
+      }
+      if (latest_scales_m_.size() > most_latest) latest_scales_m_.erase(latest_scales_m_.begin());
+      motion = {found->x * camera_height_m_, found->y * camera_height_m_, motion.heading_rad};
+      return true;
+    }
+  }
+  if (!known_m) return false;
+  motion = scaled(*known_m * step.length_in_views / length_m);
+  return true;
+}
+
+}  // namespace panonav

@@ -1,0 +1,183 @@
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "panonav/core/error.hpp"
+#include "panonav/mapping/lattice.hpp"
+#include "panonav/mapping/lattice_solver.hpp"
+#include "panonav/mapping/lattice_springs.hpp"
+#include "panonav/signature/dissimilarity.hpp"
+
+namespace panonav {
+
+namespace {
+
+/// A few nodes of the lattice with the springs among them, numbered anew.
+struct Neighbourhood {
+  std::vector<std::size_t> nodes;
+  std::vector<Pose2> poses;
+  std::vector<SpringTerm> springs;
+  std::vector<std::size_t> spring_numbers;
+};
+
+Neighbourhood neighbourhood_of(const Lattice& lattice, const std::vector<std::size_t>& nodes) {
+  Neighbourhood result{.nodes = nodes};
+  std::map<std::size_t, std::size_t> number;
+  for (const std::size_t node : nodes) {
+    number.emplace(node, result.poses.size());
+    result.poses.push_back(lattice.nodes[node].pose);
+  }
+  for (std::size_t s = 0; s < lattice.springs.size(); ++s) {
+    const LatticeSpring& spring = lattice.springs[s];
+    const auto a = number.find(spring.a);
+    const auto b = number.find(spring.b);
+    if (a == number.end() || b == number.end()) continue;
+    SpringTerm term = spring_term(spring, lattice.errors, true);
+    term.a = a->second;
+    term.b = b->second;
+    result.springs.push_back(term);
+    result.spring_numbers.push_back(s);
+  }
+  return result;
+}
+
+class Extender {
+ public:
+  Extender(Lattice& lattice, const VisualMemory& memory, const LatticeOptions& options)
+      : lattice_(lattice), memory_(memory), options_(options) {
+    for (const LatticeNode& node : lattice.nodes) {
+      require(memory.contains(node.view), "view of the lattice", node.view.value,
+              "a view of the memory");
+      require(number_.empty() || number_.rbegin()->first < node.view, "view of the lattice",
+              node.view.value, "later than the one before");
+      number_.emplace(node.view, number_.size());
+    }
+    for (const ViewId view : memory.views()) {
+      if (!number_.contains(view)) unknown_.push_back(view);
+    }
+    require(unknown_.empty() || number_.empty() || number_.rbegin()->first < unknown_.front(),
+            "new view", unknown_.empty() ? 0.0 : unknown_.front().value,
+            "later than those of the lattice");
+  }
+
+  void add_all() {
+    // The lattice knows nothing of views that come later.
+    std::vector<ViewId> excluded = unknown_;
+    for (const ViewId view : unknown_) {
+      add(view, excluded);
+      excluded.erase(excluded.begin());
+    }
+    std::ranges::sort(lattice_.springs, {}, [](const auto& s) { return NodePair{s.a, s.b}; });
+  }
+
+ private:
+  void add(ViewId view, std::span<const ViewId> excluded) {
+    const std::size_t node = lattice_.nodes.size();
+    std::vector<LatticeSpring> springs = springs_to(view, node, excluded);
+    number_.emplace(view, node);
+    std::map<std::size_t, std::size_t> leads_to;
+    for (const auto& spring : springs) ++leads_to[lattice_.nodes[spring.a].part];
+    if (leads_to.empty()) {
+      lattice_.nodes.push_back({view, {}, lattice_.parts.size()});
+      lattice_.parts.push_back({.views = 1, .handedness_known = false});
+      return;
+    }
+    const std::size_t part =
+        std::ranges::max_element(leads_to, {}, [](const auto& p) { return p.second; })->first;
+    std::erase_if(springs, [&](const auto& s) { return lattice_.nodes[s.a].part != part; });
+    lattice_.nodes.push_back({view, {}, part});
+    ++lattice_.parts[part].views;
+    lattice_.springs.insert(lattice_.springs.end(), springs.begin(), springs.end());
+    place(node, springs);
+    relax_around(node, springs);
+  }
+
+  [[nodiscard]] std::vector<LatticeSpring> springs_to(ViewId view, std::size_t node,
+                                                      std::span<const ViewId> excluded) const {
+    std::vector<LatticeSpring> springs;
+    if (node == 0) return springs;
+    const PackedSignature seen = memory_.packed(view);
+    const auto found = memory_.search(seen, {options_.neighbours, options_.components},
+                                      {.excluded_views = excluded});
+    for (const Match& match : found.matches) {
+      if (match.dissimilarity > lattice_.curve.largest_dissimilarity()) continue;
+      LatticeSpring spring{.a = number_.at(match.view),
+                           .b = node,
+                           .dissimilarity = static_cast<double>(match.dissimilarity)};
+      if (options_.phases) spring.phases = read_phases(homing(match.view), homing(view));
+      if (!agrees(spring)) continue;
+      spring.length = lattice_.curve.distance(spring.dissimilarity);
+      spring.stiffness = lattice_.curve.stiffness(spring.length);
+      springs.push_back(spring);
+    }
+    return springs;
+  }
+
+  [[nodiscard]] HomingView homing(ViewId view) const {
+    const HomingView seen = homing_view(memory_.signature(view));
+    return options_.components > 0 ? first_components(seen, options_.components) : seen;
+  }
+
+  /// Of the places that the springs point to, the one of least energy.
+  void place(std::size_t node, std::span<const LatticeSpring> springs) {
+    std::vector<std::size_t> nodes;
+    for (const auto& spring : springs) nodes.push_back(spring.a);
+    nodes.push_back(node);
+    Neighbourhood around = neighbourhood_of(lattice_, nodes);
+    std::vector<unsigned char> moving(nodes.size(), 0);
+    moving.back() = 1;
+    double least = INFINITY;
+    for (const auto& spring : springs) {
+      Pose2 step{spring.length, 0.0, 0.0};
+      if (spring.phases) {
+        step = {spring.length * std::cos(spring.phases->direction_a_rad),
+                spring.length * std::sin(spring.phases->direction_a_rad), spring.phases->turn_rad};
+      }
+      around.poses.back() = lattice_.nodes[spring.a].pose * step;
+      const auto solution = solve_lattice(around.springs, around.poses, moving);
+      if (solution.energy >= least) continue;
+      least = solution.energy;
+      lattice_.nodes[node].pose = around.poses.back();
+    }
+  }
+
+  /// The new node and those that it hangs on give way; what these hang on stays.
+  void relax_around(std::size_t node, std::span<const LatticeSpring> springs) {
+    std::vector<unsigned char> role(lattice_.nodes.size(), 0);  // 1 stays, 2 gives way
+    role[node] = 2;
+    for (const auto& spring : springs) role[spring.a] = 2;
+    for (const LatticeSpring& spring : lattice_.springs) {
+      if (role[spring.a] == 2 && role[spring.b] == 0) role[spring.b] = 1;
+      if (role[spring.b] == 2 && role[spring.a] == 0) role[spring.a] = 1;
+    }
+    std::vector<std::size_t> nodes;
+    std::vector<unsigned char> moving;
+    for (std::size_t i = 0; i < role.size(); ++i) {
+      if (role[i] == 0) continue;
+      nodes.push_back(i);
+      moving.push_back(role[i] == 2 ? 1 : 0);
+    }
+    Neighbourhood around = neighbourhood_of(lattice_, nodes);
+    const auto solution = solve_lattice(around.springs, around.poses, moving);
+    lattice_.iterations += solution.iterations;
+    for (std::size_t i = 0; i < nodes.size(); ++i) lattice_.nodes[nodes[i]].pose = around.poses[i];
+    for (std::size_t s = 0; s < around.spring_numbers.size(); ++s) {
+      lattice_.springs[around.spring_numbers[s]].weight = solution.weights[s];
+    }
+  }
+
+  Lattice& lattice_;
+  const VisualMemory& memory_;
+  LatticeOptions options_;
+  std::map<ViewId, std::size_t> number_;
+  std::vector<ViewId> unknown_;
+};
+
+}  // namespace
+
+void extend(Lattice& lattice, const VisualMemory& memory, const LatticeOptions& options) {
+  validate(options);
+  Extender(lattice, memory, options).add_all();
+}
+
+}  // namespace panonav
