@@ -43,6 +43,7 @@ class TexturedRoom {
     return values;
   }
 
+  [[nodiscard]] Point2 pillar(std::size_t i) const { return pillars_[i].middle; }
   /// Moves the first pillar.
   void move_pillar(Point2 by) {
     pillars_[0].middle.x_m += by.x_m;

@@ -17,8 +17,10 @@ struct LineSample {
   const double whole = std::floor(column);
   const auto f = static_cast<float>(column - whole);
   const auto size = static_cast<long long>(line.size());
-  auto i = static_cast<long long>(whole) % size;
+  auto i = static_cast<long long>(whole);
   if (i < 0) i += size;
+  if (i >= size) i -= size;
+  if (i < 0 || i >= size) i = (i % size + size) % size;  // a division, which most columns can spare
   const auto at = [&](long long k) {
     long long c = i + k;
     if (c < 0) c += size;

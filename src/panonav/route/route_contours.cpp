@@ -222,16 +222,29 @@ bool RouteContours::fit_pose(RouteContourFix& fix) const {
       sizes.push_back(std::abs(difference) / std::sqrt(variance));
     }
     if (terms.size() < 8) return false;
+    const std::size_t along_terms = terms.size();
+    // From the path itself all lines of sight start at one place, and eq. 5 says nothing of the
+    // heading; but the contours' azimuths do, to a column each.
+    for (std::size_t i = 0; i < fix.columns.size(); ++i) {
+      const double azimuth = fix.columns[i] + fix.pose.heading_rad * columns_per_rad;
+      const double middle =
+          fix.first[i].azimuth +
+          0.5 * wrap_columns(fix.second[i].azimuth - fix.first[i].azimuth, columns_);
+      terms.push_back(
+          {wrap_columns(middle - azimuth, columns_), 1.0, Vector(0.0, 0.0, columns_per_rad)});
+    }
     const double noise = std::max(0.1, 1.4826 * upper_median_in_place(std::span(sizes)));
     Matrix matrix = Matrix::Zero();
     Vector right = Vector::Zero();
     double left = 0.0;
     double weights = 0.0;
-    for (const Term& term : terms) {
+    for (std::size_t i = 0; i < terms.size(); ++i) {
+      const Term& term = terms[i];
       const double ratio = term.difference * std::sqrt(term.weight) / (2.0 * noise);
       const double weight = term.weight / (1.0 + ratio * ratio);
       matrix += weight * term.slope * term.slope.transpose();
       right += weight * term.difference * term.slope;
+      if (i >= along_terms) continue;
       left += weight * term.difference * term.difference;
       weights += weight;
     }

@@ -46,9 +46,12 @@ void cross_route(std::span<const Pose2> path, std::size_t first, Point2 viewpoin
       const auto begin = static_cast<long long>(std::ceil((low + turned) * columns_per_rad - 1e-9));
       const auto end =
           static_cast<long long>(std::floor((low + turned + width) * columns_per_rad + 1e-9));
-      for (long long k = begin; k <= end; ++k) {
-        const auto size = static_cast<long long>(count);
-        const auto c = static_cast<std::size_t>(((k % size) + size) % size);
+      if (begin > end) continue;
+      const auto size = static_cast<long long>(count);
+      long long column = ((begin % size) + size) % size;
+      for (long long k = begin; k <= end; ++k, ++column) {
+        if (column == size) column = 0;
+        const auto c = static_cast<std::size_t>(column);
         const double ux = directions[c].x;
         const double uy = directions[c].y;
         const double across = ex * uy - ey * ux;

@@ -48,6 +48,7 @@ struct RouteLines::Linearised {
   Vector right = Vector::Zero();
   double gain = 1.0;
   double offset = 0.0;
+  double noise = 0.0;      // deviation of a difference, by the median
   double variance = 0.0;   // of a difference, robust
   double deviation = 0.0;  // of what the route shows
   double correlation = 0.0;
@@ -75,8 +76,7 @@ void visit_options(RouteFitOptions& options, OptionVisitor& visitor) {
 RouteLines::RouteLines(const RoutePanorama& route, const RouteFitOptions& options)
     : columns_(route.columns()),
       options_(options),
-      poses_(route.poses().begin(), route.poses().end()),
-      directions_(equal_directions(static_cast<std::size_t>(route.columns()))) {
+      poses_(route.poses().begin(), route.poses().end()) {
   validate(options);
   if (route.size() < 2) {
     throw ContractError("lines of the route", static_cast<double>(route.size()), "2 or more");
@@ -91,6 +91,12 @@ RouteLines::RouteLines(const RoutePanorama& route, const RouteFitOptions& option
     const double sigma_rad = level.sigma * 2.0 * pi / columns_;
     level.half_slope =
         static_cast<std::size_t>(std::lround(usual_distance_m * sigma_rad / (2.0 * spacing_m)));
+    // Two a standard deviation show all that is left of a line.
+    while (2.0 * static_cast<double>(2 * level.stride) <= level.sigma &&
+           static_cast<std::size_t>(columns_) % (2 * level.stride) == 0) {
+      level.stride *= 2;
+    }
+    level.directions = equal_directions(static_cast<std::size_t>(columns_) / level.stride);
     levels_.push_back(std::move(level));
   }
   for (std::size_t i = 0; i < route.size(); ++i) {
@@ -134,17 +140,19 @@ float RouteLines::shown(const Level& level, float along, std::size_t column) con
 bool RouteLines::collect(const Level& level, std::span<const float> seen, const Pose2& pose,
                          const Window& window, std::vector<RouteCrossing>& crossings,
                          std::vector<Term>& terms) const {
+  crossings.resize(level.directions.size());
   cross_route(std::span(poses_).subspan(window.begin, window.end - window.begin), window.begin,
-              pose.position(), directions_, crossings);
+              pose.position(), level.directions, crossings);
   const double columns_per_rad = columns_ / (2.0 * pi);
   const double turn = pose.heading_rad * columns_per_rad;
   const auto row = [&](std::size_t line) {
     return level.values.data() + line * static_cast<std::size_t>(columns_);
   };
   terms.clear();
-  for (std::size_t c = 0; c < crossings.size(); ++c) {
-    const RouteCrossing& crossing = crossings[c];
+  for (std::size_t k = 0; k < crossings.size(); ++k) {
+    const RouteCrossing& crossing = crossings[k];
     if (crossing.along < 0.0F) continue;
+    const std::size_t c = k * level.stride;
     const auto before = std::min(static_cast<std::size_t>(crossing.along), poses_.size() - 2);
     const std::size_t low = before >= level.half_slope ? before - level.half_slope : 0;
     const std::size_t high = std::min(before + 1 + level.half_slope, poses_.size() - 1);
@@ -194,6 +202,9 @@ std::optional<RouteLines::Linearised> RouteLines::linearise(const std::vector<Te
   constexpr double least_noise = 1.0 / 255.0;
   const double noise = std::max(
       least_noise, 1.4826 * static_cast<double>(upper_median_in_place(std::span(scratch))));
+  result.noise = noise;
+  std::array<double, 25> matrix{};  // lower half, row by row
+  std::array<double, 5> right{};
   double left = 0.0;
   double weights = 0.0;
   double x = 0.0;
@@ -206,11 +217,14 @@ std::optional<RouteLines::Linearised> RouteLines::linearise(const std::vector<Te
     // Cauchy's weight; three deviations are usual, more are likely a change of the scene.
     const double ratio = off / (3.0 * noise);
     const double weight = options_.robust ? 1.0 / (1.0 + ratio * ratio) : 1.0;
-    Vector slope;
-    slope << static_cast<double>(term.shown_x), static_cast<double>(term.shown_y),
-        result.gain * static_cast<double>(term.seen_turn), -static_cast<double>(term.seen), -1.0;
-    result.matrix.selfadjointView<Eigen::Lower>().rankUpdate(slope, weight);
-    result.right -= weight * off * slope;
+    const std::array<double, 5> slope{
+        static_cast<double>(term.shown_x), static_cast<double>(term.shown_y),
+        result.gain * static_cast<double>(term.seen_turn), -static_cast<double>(term.seen), -1.0};
+    for (std::size_t i = 0; i < slope.size(); ++i) {
+      const double weighted = weight * slope[i];
+      right[i] -= off * weighted;
+      for (std::size_t j = 0; j <= i; ++j) matrix[5 * i + j] += weighted * slope[j];
+    }
     left += weight * off * off;
     weights += weight;
     const double a = static_cast<double>(term.seen) - seen;
@@ -223,9 +237,50 @@ std::optional<RouteLines::Linearised> RouteLines::linearise(const std::vector<Te
   }
   const double within = (xx - x * x / weights) * (yy - y * y / weights);
   result.correlation = within > 0.0 ? (xy - x * y / weights) / std::sqrt(within) : 0.0;
-  result.matrix.triangularView<Eigen::StrictlyUpper>() = result.matrix.transpose();
+  for (std::size_t i = 0; i < right.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    result.right[row] = right[i];
+    for (std::size_t j = 0; j <= i; ++j) {
+      const auto column = static_cast<Eigen::Index>(j);
+      result.matrix(row, column) = result.matrix(column, row) = matrix[5 * i + j];
+    }
+  }
   result.variance = std::max(left / weights, least_noise * least_noise / 12.0);
   return result;
+}
+
+// By direction in the world: how far what is seen lies outside of all that is shown within `shift`
+// columns, or what is shown outside of all that is seen there, whichever is less; NaN where the
+// path is not crossed.
+std::vector<float> RouteLines::what_no_shift_explains(const std::vector<Term>& terms,
+                                                      std::size_t columns, double gain,
+                                                      double offset, int shift) {
+  const float nothing = std::numeric_limits<float>::quiet_NaN();
+  std::vector<float> shown(columns, nothing);
+  std::vector<float> seen(columns, nothing);
+  for (const Term& term : terms) {
+    shown[term.direction] = term.shown;
+    seen[term.direction] = static_cast<float>(gain * static_cast<double>(term.seen) + offset);
+  }
+  const auto outside = [&](const std::vector<float>& values, const std::vector<float>& others,
+                           std::size_t c) {
+    float low = others[c];
+    float high = others[c];
+    for (int k = -shift; k <= shift; ++k) {
+      const auto size = static_cast<long long>(columns);
+      const auto i = static_cast<std::size_t>((static_cast<long long>(c) + k + size) % size);
+      if (!std::isfinite(others[i])) continue;
+      low = std::min(low, others[i]);
+      high = std::max(high, others[i]);
+    }
+    return std::max({0.0F, low - values[c], values[c] - high});
+  };
+  std::vector<float> left(columns, nothing);
+  for (const Term& term : terms) {
+    const std::size_t c = term.direction;
+    left[c] = std::min(outside(seen, shown, c), outside(shown, seen, c));
+  }
+  return left;
 }
 
 std::optional<RouteFix> RouteLines::fit(std::span<const float> line, const Pose2& predicted) const {
@@ -237,7 +292,7 @@ std::optional<RouteFix> RouteLines::fit(std::span<const float> line, const Pose2
   if (!near) return std::nullopt;
   RouteFix fix;
   fix.pose = predicted;
-  std::vector<RouteCrossing> crossings(line.size());
+  std::vector<RouteCrossing> crossings;
   std::vector<Term> terms;
   std::vector<float> scratch;
   terms.reserve(line.size());
@@ -248,7 +303,7 @@ std::optional<RouteFix> RouteLines::fit(std::span<const float> line, const Pose2
     seen = smoothed_line(line, level.sigma);
     const bool last = &level == &levels_.back();
     const double near_enough_m =
-        last ? 1e-4 : 0.05 * usual_distance_m * level.sigma * 2.0 * pi / columns_;
+        last ? 3e-4 : 0.05 * usual_distance_m * level.sigma * 2.0 * pi / columns_;
     for (int step = 0; step < options_.most_steps; ++step) {
       if (!collect(level, seen, fix.pose, *near, crossings, terms)) return std::nullopt;
       normal = linearise(terms, scratch);
@@ -282,15 +337,15 @@ std::optional<RouteFix> RouteLines::fit(std::span<const float> line, const Pose2
           normal->variance * inverse(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
     }
   }
-  fix.unexplained.assign(line.size(), std::numeric_limits<float>::quiet_NaN());
+  fix.noise = normal->noise;
+  const int shift = std::max(1, columns_ / 360);
   const double turn = fix.pose.heading_rad * columns_ / (2.0 * pi);
-  for (const Term& term : terms) {
+  const auto left = what_no_shift_explains(terms, line.size(), normal->gain, normal->offset, shift);
+  fix.unexplained.resize(line.size());
+  for (std::size_t c = 0; c < left.size(); ++c) {
     const auto size = static_cast<long long>(line.size());
-    const long long c =
-        (std::llround(static_cast<double>(term.direction) - turn) % size + size) % size;
-    fix.unexplained[static_cast<std::size_t>(c)] = static_cast<float>(
-        std::abs(static_cast<double>(term.shown) - normal->gain * static_cast<double>(term.seen) -
-                 normal->offset));
+    const long long at = (std::llround(static_cast<double>(c) - turn) % size + size) % size;
+    fix.unexplained[static_cast<std::size_t>(at)] = left[c];
   }
   return fix;
 }
@@ -302,7 +357,7 @@ std::vector<float> RouteLines::synthesise(const Pose2& pose) const {
   if (!near) return line;
   std::vector<RouteCrossing> crossings(line.size());
   cross_route(std::span(poses_).subspan(near->begin, near->end - near->begin), near->begin,
-              pose.position(), directions_, crossings);
+              pose.position(), levels_.back().directions, crossings);
   std::vector<float> world(line.size(), nothing);
   for (std::size_t c = 0; c < line.size(); ++c) {
     if (crossings[c].along >= 0.0F) world[c] = shown(levels_.back(), crossings[c].along, c);

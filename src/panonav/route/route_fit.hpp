@@ -33,7 +33,10 @@ struct RouteFix {
   /// Of the line and what the route shows from there, -1 .. 1; changed parts count less, too.
   double correlation = 0.0;
   int columns = 0;  ///< directions in which the line of sight crosses the path
-  /// By column of the line: what the fit leaves there, 0 .. 1; NaN where nothing is crossed.
+  /// Standard deviation of what is seen from what is shown, 0 .. 1; robust, at least a grey level.
+  double noise = 0.0;
+  /// By column of the line: what the fit leaves there and a shift by a degree does not explain, 0
+  /// .. 1; NaN where nothing is crossed. Edges in depth are off by that much between lines.
   std::vector<float> unexplained;
 };
 
@@ -79,9 +82,11 @@ class RouteLines {
 
  private:
   struct Level {
-    double sigma = 0.0;          // of the smoothing, in columns
-    std::size_t half_slope = 0;  // lines to either side between which the slope is taken
-    std::vector<float> values;   // line by line, in the world's frame
+    double sigma = 0.0;                  // of the smoothing, in columns
+    std::size_t half_slope = 0;          // lines to either side between which the slope is taken
+    std::size_t stride = 1;              // columns between those that count: smooth lines need few
+    std::vector<Direction2> directions;  // of these
+    std::vector<float> values;           // line by line, in the world's frame
   };
   // Lines first .. last are in reach.
   struct Window {
@@ -98,11 +103,13 @@ class RouteLines {
                              std::vector<Term>& terms) const;
   [[nodiscard]] std::optional<Linearised> linearise(const std::vector<Term>& terms,
                                                     std::vector<float>& scratch) const;
+  [[nodiscard]] static std::vector<float> what_no_shift_explains(const std::vector<Term>& terms,
+                                                                 std::size_t columns, double gain,
+                                                                 double offset, int shift);
 
   int columns_;
   RouteFitOptions options_;
   std::vector<Pose2> poses_;
-  std::vector<Direction2> directions_;
   std::vector<Level> levels_;  // coarse first
 };
 

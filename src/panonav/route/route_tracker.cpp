@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "panonav/geometry/angles.hpp"
+#include "panonav/route/route_place.hpp"
 
 namespace panonav {
 
@@ -87,27 +88,8 @@ double RouteTracker::learnt_correlation(const RoutePanorama& route,
 }
 
 TrackedRouteFix RouteTracker::placed(RouteFix fix, RouteFixOrigin origin) const {
-  TrackedRouteFix placed{std::move(fix), origin};
-  const auto path = lines_.poses();
-  const Point2 at = placed.fix.pose.position();
-  double least = std::numeric_limits<double>::infinity();
-  double way = 0.0;
-  for (std::size_t i = 0; i + 1 < path.size(); ++i) {
-    const double ex = path[i + 1].x_m - path[i].x_m;
-    const double ey = path[i + 1].y_m - path[i].y_m;
-    const double length = std::hypot(ex, ey);
-    const double px = at.x_m - path[i].x_m;
-    const double py = at.y_m - path[i].y_m;
-    const double share = std::clamp((px * ex + py * ey) / (length * length), 0.0, 1.0);
-    const double off = std::hypot(px - share * ex, py - share * ey);
-    if (off < least) {
-      least = off;
-      placed.along_m = way + share * length;
-      placed.lateral_m = ex * py - ey * px >= 0.0 ? off : -off;
-    }
-    way += length;
-  }
-  return placed;
+  const RoutePlace place = place_on_route(lines_.poses(), fix.pose.position());
+  return {std::move(fix), origin, place.along_m, place.lateral_m};
 }
 
 std::optional<RouteFix> RouteTracker::recover(std::span<const float> line,
@@ -190,8 +172,20 @@ std::optional<TrackedRouteFix> RouteTracker::track(std::span<const float> line, 
       if (believed(fix)) found = placed(*std::move(fix), RouteFixOrigin::recovery);
     }
   }
-  if (!found) found = search(line);
-  if (found) pose_ = found->fix.pose;
+  if (!found) {
+    auto anywhere = search(line);
+    const bool agrees = anywhere && elsewhere_ &&
+                        distance((*elsewhere_ * step).position(), anywhere->fix.pose.position()) <=
+                            options_.recovery_m;
+    elsewhere_.reset();
+    if (anywhere) elsewhere_ = anywhere->fix.pose;
+    // A robot that was followed until now is seldom carried away; a line is sooner mistaken.
+    if (!pose_ || agrees) found = std::move(anywhere);
+  }
+  if (found) {
+    pose_ = found->fix.pose;
+    elsewhere_.reset();
+  }
   return found;
 }
 

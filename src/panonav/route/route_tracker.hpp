@@ -49,7 +49,8 @@ class RouteTracker {
                         const RouteFitOptions& fit = {});
 
   /// `step`: how the robot moved since the last line, in the frame it had then [Y03 section 4.1].
-  /// Empty: not on this route, as far as the line tells; the odometry is then carried on. Throws
+  /// Empty: not on this route, as far as the line tells; the odometry is then carried on. A place
+  /// far from the prediction is believed once two lines one after the other agree on it. Throws
   /// ContractError on a wrong length.
   std::optional<TrackedRouteFix> track(std::span<const float> line, const Pose2& step);
 
@@ -57,9 +58,15 @@ class RouteTracker {
   [[nodiscard]] std::optional<TrackedRouteFix> search(std::span<const float> line) const;
 
   /// Forgets where the robot is.
-  void reset() noexcept { pose_.reset(); }
+  void reset() noexcept {
+    pose_.reset();
+    elsewhere_.reset();
+  }
   /// Takes it from elsewhere.
-  void set_pose(const Pose2& pose) noexcept { pose_ = pose; }
+  void set_pose(const Pose2& pose) noexcept {
+    pose_ = pose;
+    elsewhere_.reset();
+  }
   [[nodiscard]] const std::optional<Pose2>& pose() const noexcept { return pose_; }
   [[nodiscard]] double least_correlation() const noexcept { return least_correlation_; }
   [[nodiscard]] const RouteLines& lines() const noexcept { return lines_; }
@@ -76,6 +83,7 @@ class RouteTracker {
   RouteLines lines_;
   double least_correlation_ = 0.0;
   std::optional<Pose2> pose_;
+  std::optional<Pose2> elsewhere_;  // where the last line alone would have put the robot
 };
 
 }  // namespace panonav

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "panonav/core/options.hpp"
+#include "panonav/geometry/pose2.hpp"
+
+namespace panonav {
+
+/// Proportional control of a robot with differential drive.
+struct SteeringOptions {
+  double turn_gain = 0.8;      ///< of the error of direction, turned in one step
+  double most_turn_rad = 0.5;  ///< in one step
+  double travel_gain = 0.8;    ///< of the way that is left, driven in one step
+  double step_m = 0.05;        ///< driven in one step at most
+  friend bool operator==(const SteeringOptions&, const SteeringOptions&) = default;
+};
+void visit_options(SteeringOptions& options, OptionVisitor& visitor);
+
+/// The next step towards a goal, as an odometry step: turns by a share of the error of direction
+/// and drives by a share of the way that is left, less the farther the goal is off to the side, and
+/// not at all while it lies behind [Y03 section 5.2]. Throws OptionError.
+[[nodiscard]] Pose2 steer_to(const Pose2& robot, Point2 goal, const SteeringOptions& options = {});
+
+struct PathFollowerOptions {
+  double look_ahead_m = 0.3;  ///< the robot steers to the place of the path so far ahead of it
+  double arrived_m = 0.02;    ///< so near to the end of the path the robot has arrived
+  SteeringOptions steering;
+  friend bool operator==(const PathFollowerOptions&, const PathFollowerOptions&) = default;
+};
+void visit_options(PathFollowerOptions& options, OptionVisitor& visitor);
+
+/// Repeats a path: steers to the place a little ahead of the robot's own on it (pure pursuit). The
+/// robot's place moves on along the path from step to step, so that a path may cross and overlap
+/// itself. To drive a path back, give it in reverse.
+class PathFollower {
+ public:
+  /// Throws OptionError, and ContractError on a path of fewer than two places or a number that is
+  /// not finite.
+  explicit PathFollower(std::span<const Point2> path, const PathFollowerOptions& options = {});
+
+  /// The next step of a robot that is at `robot`, as an odometry step; empty when it has arrived.
+  /// Cost: O(places of the path within twice the look-ahead).
+  [[nodiscard]] std::optional<Pose2> next_step(const Pose2& robot);
+
+  /// Way along the path to the robot's place.
+  [[nodiscard]] double along_m() const noexcept { return along_m_; }
+  [[nodiscard]] double length_m() const noexcept { return way_m_.back(); }
+
+ private:
+  [[nodiscard]] Point2 place_at(double along_m) const;
+  void advance(Point2 robot);
+
+  PathFollowerOptions options_;
+  std::vector<Point2> path_;
+  std::vector<double> way_m_;  // to each place
+  double along_m_ = 0.0;
+};
+
+}  // namespace panonav

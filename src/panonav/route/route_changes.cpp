@@ -1,0 +1,55 @@
+#include "panonav/route/route_changes.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "panonav/geometry/angles.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr double pi = std::numbers::pi;
+constexpr int least_pictures = 5;
+constexpr double usual_deviations = 3.0;
+
+}  // namespace
+
+std::vector<AzimuthRange> RouteChanges::add(const RouteFix& fix) {
+  const auto limit = static_cast<float>(usual_deviations * fix.noise);
+  std::array<int, sectors> above{};
+  std::array<int, sectors> all{};
+  const std::size_t columns = fix.unexplained.size();
+  for (std::size_t c = 0; c < columns; ++c) {
+    const float value = fix.unexplained[c];
+    if (!std::isfinite(value)) continue;
+    const double azimuth =
+        fix.pose.heading_rad + 2.0 * pi * static_cast<double>(c) / static_cast<double>(columns);
+    const double share = azimuth / (2.0 * pi) - std::floor(azimuth / (2.0 * pi));
+    const auto sector = std::min(sectors - 1, static_cast<std::size_t>(share * sectors));
+    ++all[sector];
+    above[sector] += value > limit ? 1 : 0;
+  }
+  // A thing beside the route goes from sector to sector as the robot passes it.
+  const auto before = pictures_;
+  for (std::size_t s = 0; s < sectors; ++s) {
+    const bool high = all[s] > 0 && 2 * above[s] >= all[s];
+    pictures_[s] = high ? 1 + std::max({before[(s + sectors - 1) % sectors], before[s],
+                                        before[(s + 1) % sectors]})
+                        : 0;
+  }
+  const auto changed = [&](std::size_t s) { return pictures_[s % sectors] >= least_pictures; };
+  std::vector<AzimuthRange> ranges;
+  for (std::size_t s = 0; s < sectors; ++s) {
+    if (!changed(s) || changed(s + sectors - 1)) continue;
+    std::size_t end = s + 1;
+    while (end < s + sectors && changed(end)) ++end;
+    const double width = 2.0 * pi / sectors;
+    ranges.push_back({wrap_angle(static_cast<double>(s) * width - fix.pose.heading_rad),
+                      wrap_angle(static_cast<double>(end) * width - fix.pose.heading_rad)});
+  }
+  return ranges;
+}
+
+}  // namespace panonav
