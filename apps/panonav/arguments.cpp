@@ -108,6 +108,24 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
+/// "route record": a verb of two words; the second one is empty where there is none.
+std::pair<std::string_view, std::string_view> words_of(const Verb& verb) {
+  const std::size_t blank = verb.name.find(' ');
+  if (blank == std::string_view::npos) return {verb.name, {}};
+  return {verb.name.substr(0, blank), verb.name.substr(blank + 1)};
+}
+
+/// All verbs of two words that begin with this one, with commas between.
+std::string verbs_beginning_with(std::span<const Verb> verbs, std::string_view first) {
+  std::string all;
+  for (const auto& verb : verbs) {
+    const auto words = words_of(verb);
+    if (words.first != first || words.second.empty()) continue;
+    all += (all.empty() ? "" : ", ") + std::string(verb.name);
+  }
+  return all;
+}
+
 std::string unknown_verb(std::span<const Verb> verbs, const std::string& typed) {
   std::string message = "'" + typed + "' is no verb";
   for (const auto& verb : verbs) {
@@ -297,9 +315,11 @@ bool Arguments::given(const std::string& section, const std::string& name) const
 }
 
 std::string_view verb_in(std::span<const Verb> verbs, int argc, const char* const* argv) {
-  if (argc < 2) return {};
   for (const auto& verb : verbs) {
-    if (verb.name == argv[1]) return verb.name;
+    const auto [first, second] = words_of(verb);
+    if (argc >= 2 && first == argv[1] && (second.empty() || (argc >= 3 && second == argv[2]))) {
+      return verb.name;
+    }
   }
   return {};
 }
@@ -318,7 +338,15 @@ std::optional<ParsedCommand> parse(std::span<const Verb> verbs, int argc, const 
       "Exit codes: 0 done, 1 no answer (lost), 2 bad input, 3 fault of the program.");
 
   if (argc >= 2 && argv[1][0] != '-' && verb_in(verbs, argc, argv).empty()) {
-    throw UsageError(unknown_verb(verbs, argv[1]));
+    const std::string longer = verbs_beginning_with(verbs, argv[1]);
+    if (longer.empty()) throw UsageError(unknown_verb(verbs, argv[1]));
+    if (argc < 3) {
+      throw UsageError("'" + std::string(argv[1]) + "' wants a second word: " + longer);
+    }
+    if (argv[2][0] != '-') {
+      throw UsageError("'" + std::string(argv[1]) + " " + argv[2] +
+                       "' is no verb; allowed: " + longer);
+    }
   }
 
   struct Declared {
@@ -328,8 +356,21 @@ std::optional<ParsedCommand> parse(std::span<const Verb> verbs, int argc, const 
     Run run;
   };
   std::deque<Declared> declared;
+  std::map<std::string_view, CLI::App*> first_words;
   for (const auto& verb : verbs) {
-    CLI::App* sub = app.add_subcommand(std::string(verb.name), std::string(verb.summary));
+    const auto [first, second] = words_of(verb);
+    CLI::App* parent = &app;
+    if (!second.empty()) {
+      parent = first_words[first];
+      if (parent == nullptr) {
+        parent = app.add_subcommand(std::string(first),
+                                    "Verbs of two words: " + verbs_beginning_with(verbs, first));
+        parent->group("Verbs")->require_subcommand(1);
+        first_words[first] = parent;
+      }
+    }
+    CLI::App* sub = parent->add_subcommand(std::string(second.empty() ? first : second),
+                                           std::string(verb.summary));
     sub->group("Verbs");
     auto& entry = declared.emplace_back();
     entry.app = sub;

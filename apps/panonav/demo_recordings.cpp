@@ -23,12 +23,14 @@ namespace fs = std::filesystem;
 constexpr std::string_view mark = "made_by_panonav_demo.txt";
 
 /// Everything else that a demo makes.
-constexpr std::array<std::string_view, 15> made{
+constexpr std::array<std::string_view, 19> made{
     "memory_run",     "query_run",          "elsewhere_run",
     "office.panonav", "office.panonav-wal", "office.panonav-shm",
     "mirror.png",     "calibration.png",    "cylinder.png",
     "map.png",        "areas.png",          "similarity.png",
-    "homing.png",     "way_home.png",       "index.html"};
+    "homing.png",     "way_home.png",       "arranged.png",
+    "drive.png",      "route.png",          "route_panorama.png",
+    "index.html"};
 
 SimulationArguments simulation_of(const DemoOptions& options, int stream) {
   SimulationArguments wanted;

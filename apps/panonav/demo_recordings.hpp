@@ -23,6 +23,7 @@ struct DemoOptions {
   [[nodiscard]] double spacing_m() const noexcept { return quick ? 0.5 : 0.25; }
   [[nodiscard]] int questions() const noexcept { return quick ? 10 : 40; }
   [[nodiscard]] int runs_home() const noexcept { return quick ? 3 : 12; }
+  [[nodiscard]] double route_m() const noexcept { return quick ? 3.0 : 10.0; }
 };
 
 /// What the demonstration works on: pictures of a simulated mirror camera with its sensor's noise,

@@ -22,7 +22,7 @@ using Run = std::function<ExitCode(Session&)>;
 
 /// One verb of the command line.
 struct Verb {
-  std::string_view name;
+  std::string_view name;     ///< one word, or two with a blank between: "route record"
   std::string_view summary;  ///< one plain line
   std::string_view details;  ///< what a user must know beyond the options; may be empty
   std::string_view example;  ///< one or more command lines that work as they stand

@@ -9,8 +9,10 @@
 
 #include "arguments.hpp"
 #include "demo_homing.hpp"
+#include "demo_maps.hpp"
 #include "demo_pictures.hpp"
 #include "demo_recordings.hpp"
+#include "demo_route.hpp"
 #include "memorising.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/evaluation/statistics.hpp"
@@ -242,6 +244,9 @@ ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
   show_levels(memory, plan, shown_view(asked), wanted.spacing_m(), out, page);
   const DemoHoming homing = show_homing(recordings->office_scene, plan, wanted.runs_home(),
                                         wanted.seed, out, session, page);
+  const DemoMaps maps = show_maps(memory, wanted.seed, wanted.quick, out, session, page);
+  const DemoRoute route =
+      show_route(recordings->office_scene, plan, wanted.route_m(), wanted.seed, out, session, page);
   show_what_next(*recordings, out, page);
   page.write(out);
 
@@ -263,6 +268,14 @@ ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
         {"runs_home", homing.runs.size()},
         {"arrived_home", homing.arrived},
         {"home_error_m", median(homing.distances_m)},
+        {"arranged_shape_difference", maps.lattice
+                                          ? nlohmann::ordered_json(maps.lattice->shape_difference)
+                                          : nlohmann::ordered_json()},
+        {"drive_shape_difference", maps.map_error},
+        {"wheels_shape_difference", maps.wheels_error},
+        {"route_runs", route.runs.size()},
+        {"route_completed", route.completed},
+        {"route_distance_m", median_or_null(route.lateral_m)},
         {"seconds",
          seconds}}.dump());
     return ExitCode::done;
@@ -277,6 +290,14 @@ ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
   session.print("  home from one metre away: " + std::to_string(homing.arrived) + " of " +
                 std::to_string(homing.runs.size()) + " runs ended within 10 cm; median " +
                 fixed(100.0 * median(homing.distances_m), 1) + " cm");
+  session.print("  arranged without positions: shape difference " +
+                (maps.lattice ? fixed(maps.lattice->shape_difference, 3) : std::string("none")) +
+                "; map from a drive: " + fixed(maps.map_error, 3) + ", its wheels alone " +
+                fixed(maps.wheels_error, 3));
+  session.print("  a route of " + fixed(route.length_m, 0) + " m repeated from 0.3 m off: " +
+                std::to_string(route.completed) + " of " + std::to_string(route.runs.size()) +
+                " runs reached its end; distance from it: median " +
+                median_text(route.lateral_m, 100.0, 1, "cm"));
   session.print("Open " + session.strong((out / "index.html").string()) + " in a browser.");
   return ExitCode::done;
 }
@@ -300,7 +321,7 @@ Run declare(Arguments& arguments) {
 
 Verb demo_verb() {
   return {"demo", "The whole story on a simulated office, with a report to look at",
-          "Takes under a minute. Needs nothing but this program and gnuplot. What an earlier demo "
+          "Takes about a minute. Needs nothing but this program and gnuplot. What an earlier demo "
           "left in the folder\n"
           "is written anew; a folder that holds anything else is refused.",
           "  panonav demo\n  panonav demo --seed 5 -o other_office", declare};

@@ -39,6 +39,24 @@ std::vector<NamedChain> chains_of(const MemoryFile& memory) {
   return chains;
 }
 
+struct NamedRoute {
+  std::string name;
+  std::size_t lines = 0;
+  double length_m = 0.0;
+  std::uint64_t bytes = 0;
+};
+
+std::vector<NamedRoute> routes_of(const MemoryFile& memory) {
+  std::vector<NamedRoute> routes;
+  for (auto& name : memory.route_names()) {
+    const auto route = memory.route(name);
+    if (!route) continue;
+    const auto bytes = memory.route_bytes(name);
+    routes.push_back({std::move(name), route->size(), route->length_m(), bytes});
+  }
+  return routes;
+}
+
 ordered_json as_json(const MemoryFile& memory, const MemoryFileInfo& info) {
   const auto& header = memory.header();
   const auto& steps = header.preprocessing;
@@ -71,6 +89,11 @@ ordered_json as_json(const MemoryFile& memory, const MemoryFileInfo& info) {
                       {"bytes", chain_bytes(chain)}});
   }
   json["chains"] = std::move(chains);
+  auto routes = ordered_json::array();
+  for (const auto& [name, lines, length_m, bytes] : routes_of(memory)) {
+    routes.push_back({{"name", name}, {"lines", lines}, {"length_m", length_m}, {"bytes", bytes}});
+  }
+  json["routes"] = std::move(routes);
   if (header.elevations) {
     json["elevations_rad"] = {header.elevations->bottom_rad, header.elevations->top_rad};
   }
@@ -105,6 +128,13 @@ ExitCode show(const std::string& path, Session& session) {
     session.print("  chain       " + name + ": " + std::to_string(chain.snapshots.size()) +
                   " snapshots over " + fixed(chain_length_m(chain), 1) + " m, " +
                   fixed(bytes_per_metre(chain), 0) + " bytes a metre");
+  }
+  for (const auto& [name, lines, length_m, bytes] : routes_of(memory)) {
+    session.print("  route       " + name + ": " + std::to_string(lines) + " lines over " +
+                  fixed(length_m, 1) + " m, " +
+                  (length_m > 0.0
+                       ? fixed(1e-3 * static_cast<double>(bytes) / length_m, 2) + " MB a kilometre"
+                       : std::to_string(bytes) + " bytes"));
   }
   return ExitCode::done;
 }

@@ -148,9 +148,13 @@ void print_result(const MapArguments& wanted, const Dataset& recording, const Ma
     session.print(session.bad("The map is in " + std::to_string(sizes.size()) + " parts") +
                   " that nothing connects, of so many places: " + text);
   }
-  if (!run.wheels) {
+  const double height_m = wanted.settings.odometry.camera_height_m;
+  if (!run.wheels && height_m > 0.0) {
+    session.print("Lengths are read from the ground, " + short_number(height_m) +
+                  " m below the camera.");
+  } else if (!run.wheels) {
     session.print("Lengths are read from the views: one unit counts as " +
-                  short_number(run.scale_m) + " m (--scale-m).");
+                  short_number(run.scale_m) + " m (--scale-m, --camera-height-m).");
   }
 #ifdef PANONAV_COMMAND_SIMULATES
   if (comparison) print_comparison(*comparison, run, session);
@@ -228,9 +232,12 @@ Verb map_verb() {
           "that are\n"
           "passed again close the loop. Where the data set has odometry, the lengths of steps are "
           "its; all\n"
-          "else comes from the views. What nothing connects is kept as separate parts.",
+          "else comes from the views. Without odometry, --camera-height-m makes metres of lengths. "
+          "What\n"
+          "nothing connects is kept as separate parts.",
           "  panonav map run office.panonav\n"
           "  panonav map run office.panonav --picture map.png --graphml map.graphml --tum map.tum\n"
+          "  panonav map walk walk.panonav --camera-height-m 0.6\n"
           "  panonav map walk walk.panonav --capture-difference 0.1 --json",
           declare};
 }

@@ -177,13 +177,67 @@ std::pair<PaperText, Reproduction> run_s06(const ReproduceArguments& wanted, Ses
   return {text, reproduce_s06(options, session.executor(), progress)};
 }
 
-constexpr std::array<std::string_view, 3> papers{"m03", "m04", "s06"};
+std::pair<PaperText, Reproduction> run_f11(const ReproduceArguments& wanted, Session& session,
+                                           const ReproductionProgress& progress) {
+  refuse(wanted.queries.has_value(), "--queries", wanted);
+  refuse(wanted.rows.has_value(), "--rows", wanted);
+  refuse(wanted.only.has_value(), "--only", wanted);
+  MappingReproductionOptions options{.out = wanted.out, .data = data_folder(wanted)};
+  if (wanted.quick) options = quick_run(options);
+  if (wanted.seed) options.seed = *wanted.seed;
+  if (wanted.runs) options.runs = *wanted.runs;
+  if (wanted.scenes) {
+    options.scenes = *wanted.scenes;
+    if (options.scenes < 2) {
+      throw OptionError("--scenes is '" + std::to_string(options.scenes) +
+                        "'; allowed for f11: from 2");
+    }
+  }
+  const PaperText text{
+      "Visual odometry and topological maps: the experiments of [F11]",
+      "Fernandez, Paya, Reinoso, Amoros 2011, run in " + std::to_string(options.scenes) +
+          " variants of two simulated places; loops closed, which its authors left to later work; "
+          "a corridor of identical doors, Gazebo worlds and recordings where they are at hand, "
+          "maps of up to " +
+          std::to_string(options.most_views) + " views. Published figures beside ours."};
+  return {text, reproduce_f11(options, session.executor(), progress)};
+}
+
+std::pair<PaperText, Reproduction> run_y03(const ReproduceArguments& wanted, Session& session,
+                                           const ReproductionProgress& progress) {
+  refuse(wanted.queries.has_value(), "--queries", wanted);
+  refuse(wanted.rows.has_value(), "--rows", wanted);
+  refuse(wanted.only.has_value(), "--only", wanted);
+  RouteReproductionOptions options{.out = wanted.out, .data = data_folder(wanted)};
+  if (wanted.quick) options = quick_run(options);
+  if (wanted.seed) options.seed = *wanted.seed;
+  if (wanted.runs) options.runs = *wanted.runs;
+  if (wanted.scenes) {
+    options.scenes = *wanted.scenes;
+    if (options.scenes < 2) {
+      throw OptionError("--scenes is '" + std::to_string(options.scenes) +
+                        "'; allowed for y03: from 2");
+    }
+    options.swept = std::min(options.swept, options.scenes);
+  }
+  const PaperText text{
+      "Route panoramas: the experiments of [Y03]",
+      "Yagi, Imai, Yachida 2003, run in " + std::to_string(options.scenes) +
+          " variants of a simulated lab seen through a mirror camera with its noise; pictures are "
+          "of the first. Then routes of 60 m, each recorded once and repeated in closed loop, " +
+          std::to_string(options.runs) +
+          " runs in each place, and a real route; Gazebo worlds and the recording where they are "
+          "at hand. Published figures beside ours."};
+  return {text, reproduce_y03(options, session.executor(), progress)};
+}
+
+constexpr std::array<std::string_view, 5> papers{"f11", "m03", "m04", "s06", "y03"};
 
 void reproduce_paper(const ReproduceArguments& wanted, Session& session) {
   if (std::ranges::find(papers, wanted.paper) == papers.end()) {
     throw OptionError("PAPER is '" + wanted.paper +
-                      "'; allowed: m03 (Monte-Carlo localisation), m04 (localisation), s06 "
-                      "(homing), all; f11 y03 are to come");
+                      "'; allowed: f11 (visual odometry and maps), m03 (Monte-Carlo "
+                      "localisation), m04 (localisation), s06 (homing), y03 (routes), all");
   }
   Progress progress("reproduce " + wanted.paper, 100);
   std::size_t shown_percent = 0;
@@ -194,6 +248,8 @@ void reproduce_paper(const ReproduceArguments& wanted, Session& session) {
   };
   const auto [text, result] = wanted.paper == "m04"   ? run_m04(wanted, session, report)
                               : wanted.paper == "m03" ? run_m03(wanted, session, report)
+                              : wanted.paper == "f11" ? run_f11(wanted, session, report)
+                              : wanted.paper == "y03" ? run_y03(wanted, session, report)
                                                       : run_s06(wanted, session, report);
   progress.clear();
   const std::string json = to_json(result.rows);
@@ -231,10 +287,10 @@ ExitCode reproduce(const ReproduceArguments& wanted, Session& session) {
     one.paper = paper;
     one.out = (std::filesystem::path(wanted.out) / paper).string();
     // What means nothing to a paper.
-    if (paper != "m03") one.runs = std::nullopt;
+    if (paper == "m04" || paper == "s06") one.runs = std::nullopt;
     if (paper == "m04") one.data = std::nullopt;
     if (paper != "m04") one.queries = std::nullopt;
-    if (paper == "s06") one.rows = std::nullopt;
+    if (paper != "m03" && paper != "m04") one.rows = std::nullopt;
     reproduce_paper(one, session);
   }
   return ExitCode::done;
@@ -242,31 +298,40 @@ ExitCode reproduce(const ReproduceArguments& wanted, Session& session) {
 
 Run declare(Arguments& arguments) {
   auto wanted = std::make_shared<ReproduceArguments>();
-  arguments.positional("PAPER", wanted->paper, "m03, m04, s06 or all");
+  arguments.positional("PAPER", wanted->paper, "f11, m03, m04, s06, y03 or all");
   arguments.option("-o,--out", wanted->out, "Folder for the report (default: reproduction)");
   arguments.flag("--quick", wanted->quick, "A smoke run: few scenes, few questions or runs");
   const ReproductionOptions m04;
   const TrackingReproductionOptions m03;
   const HomingReproductionOptions s06;
-  const auto defaults = [](auto m03_value, auto m04_value, auto s06_value) {
-    return " (default: " + std::to_string(m03_value) + " for m03, " + std::to_string(m04_value) +
-           " for m04, " + std::to_string(s06_value) + " for s06";
+  const MappingReproductionOptions f11;
+  const RouteReproductionOptions y03;
+  const auto defaults = [](auto f11_value, auto m03_value, auto m04_value, auto s06_value,
+                           auto y03_value) {
+    return " (default: " + std::to_string(f11_value) + " for f11, " + std::to_string(m03_value) +
+           " for m03, " + std::to_string(m04_value) + " for m04, " + std::to_string(s06_value) +
+           " for s06, " + std::to_string(y03_value) + " for y03";
   };
   const auto fallback = [](int value) { return " (default: " + std::to_string(value); };
   arguments.option("--seed", wanted->seed,
-                   "First of the scene seeds" + defaults(m03.seed, m04.seed, s06.seed) + ")");
+                   "First of the scene seeds" +
+                       defaults(f11.seed, m03.seed, m04.seed, s06.seed, y03.seed) + ")");
   arguments.option("--scenes", wanted->scenes, 1,
-                   "Variants of the scene" + defaults(m03.scenes, m04.scenes, s06.scenes) + ")");
+                   "Variants of the scene" +
+                       defaults(f11.scenes, m03.scenes, m04.scenes, s06.scenes, y03.scenes) + ")");
   arguments.option("--queries", wanted->queries, 1,
                    "m04: questions in each" + fallback(m04.queries) + "; from 1)");
   arguments.option("--runs", wanted->runs, 2,
-                   "m03: runs in each variant of an office" + fallback(m03.runs) + "; from 2)");
+                   "m03: runs in each variant of an office" + fallback(m03.runs) +
+                       "); f11: paths in each Gazebo world" + fallback(f11.runs) +
+                       "); y03: runs along routes of 60 m in each place" + fallback(y03.runs) +
+                       "); from 2");
   arguments.option("--rows", wanted->rows, 1,
                    "m03, m04: rows of the views" + fallback(m03.rows) + "; from 1)");
-  arguments.option(
-      "--data", wanted->data,
-      "m03, s06: folder with the recordings and Gazebo worlds (default: the environment's "
-      "PANONAV_DATA; without it they are left out)");
+  arguments.option("--data", wanted->data,
+                   "f11, m03, s06, y03: folder with the recordings and Gazebo worlds (default: the "
+                   "environment's "
+                   "PANONAV_DATA; without it they are left out)");
   const auto parts = tracking_reproduction_parts();
   arguments.choice("--only", wanted->only, {parts.begin(), parts.end()},
                    "m03: this part of the experiments (default: all)");
@@ -280,7 +345,8 @@ Verb reproduce_verb() {
           "Writes pictures, results.json, results.md and index.html into the folder. The full run "
           "takes some minutes.",
           "  panonav reproduce m03\n  panonav reproduce m04 --quick --json -o smoke\n"
-          "  panonav reproduce s06 -o homing",
+          "  panonav reproduce s06 -o homing\n  panonav reproduce f11 -o maps\n  panonav reproduce "
+          "y03 -o routes",
           declare};
 }
 

@@ -9,6 +9,7 @@ namespace panonav::command {
 /// Every verb, in the order in which a newcomer meets them.
 [[nodiscard]] std::vector<Verb> all_verbs();
 
+[[nodiscard]] Verb arrange_verb();
 [[nodiscard]] Verb calibrate_verb();
 [[nodiscard]] Verb catchment_verb();
 [[nodiscard]] Verb demo_verb();
@@ -21,6 +22,8 @@ namespace panonav::command {
 [[nodiscard]] Verb memorise_verb();
 [[nodiscard]] Verb prune_verb();
 [[nodiscard]] Verb reproduce_verb();
+[[nodiscard]] Verb route_follow_verb();
+[[nodiscard]] Verb route_record_verb();
 [[nodiscard]] Verb simulate_verb();
 [[nodiscard]] Verb track_verb();
 [[nodiscard]] Verb unwrap_verb();

@@ -100,5 +100,24 @@ TEST_F(Map, WrongUseIsRefused) {
   EXPECT_NE(refusal({"prune", folder_ / "none.panonav"}).find("none.panonav"), std::string::npos);
 }
 
+TEST(MapOfADrive, TheHeightOfTheCameraTellsMetres) {
+  const TemporaryFolder folder;
+  const std::string run = folder / "run";
+  const auto made = run_panonav({"simulate", "loop", run, "--path", "tour", "--heading", "path",
+                                 "--spacing-m", "0.2", "--kind", "panorama", "--columns", "256"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const auto scale_with = [&](const std::string& memory, std::vector<std::string> more) {
+    std::vector<std::string> arguments{"map",   run,      memory,      "--wheel-lengths",
+                                       "false", "--json", "--scale-m", "4"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const auto result = run_panonav(arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return json::parse(result.out)["truth"]["scale"].get<double>();
+  };
+  // Narrow rooms: what stands on the ground makes lengths up to 15 % too long.
+  EXPECT_NEAR(scale_with(folder / "ground.panonav", {"--camera-height-m", "0.6"}), 1.0, 0.2);
+  EXPECT_LT(scale_with(folder / "guess.panonav", {}), 0.7) << "guard: the guess is wrong";
+}
+
 }  // namespace
 }  // namespace panonav::testing

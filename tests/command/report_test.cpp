@@ -51,7 +51,10 @@ TEST(Demo, TellsTheWholeStoryTwiceAndLeavesAMemoryThatAnswers) {
   EXPECT_LE(said["known_elsewhere"].get<double>(), 0.1);
   EXPECT_EQ(said["runs_home"], 3);
   EXPECT_GE(said["arrived_home"].get<int>(), 2);
-  EXPECT_EQ(readable_pictures(out), 8);
+  EXPECT_EQ(readable_pictures(out), 12);
+  EXPECT_LT(said["arranged_shape_difference"].get<double>(), 0.2);
+  EXPECT_LT(said["drive_shape_difference"].get<double>(), 0.1);
+  EXPECT_EQ(said["route_runs"], 2);
 
   const auto info = run_panonav({"info", out + "/office.panonav", "--json"});
   ASSERT_EQ(info.exit_code, 0) << info.err;
@@ -117,7 +120,7 @@ TEST(Reproduce, WritesTheTableThreeTimesAndAllPictures) {
 
 TEST(Reproduce, RefusesBadInput) {
   const TemporaryFolder folder;
-  EXPECT_NE(refusal({"reproduce", "m99", "-o", folder / "x"}).find("PAPER is 'm99'; allowed: m03"),
+  EXPECT_NE(refusal({"reproduce", "m99", "-o", folder / "x"}).find("PAPER is 'm99'; allowed: f11"),
             std::string::npos);
   EXPECT_FALSE(fs::exists(folder / "x"));
   std::ofstream(folder.path() / "file") << "mine";
@@ -126,6 +129,13 @@ TEST(Reproduce, RefusesBadInput) {
   EXPECT_NE(refusal({"reproduce", "m04", "--scenes", "1"}).find("--scenes is '1'"),
             std::string::npos);
   EXPECT_NE(refusal({"reproduce", "m04", "--only", "office"}).find("--only has no meaning for m04"),
+            std::string::npos);
+  EXPECT_NE(
+      refusal({"reproduce", "y03", "--queries", "3"}).find("--queries has no meaning for y03"),
+      std::string::npos);
+  EXPECT_NE(refusal({"reproduce", "y03", "--scenes", "1"}).find("allowed for y03: from 2"),
+            std::string::npos);
+  EXPECT_NE(refusal({"reproduce", "y03", "--quick", "-o", folder / "file/x"}).find("file/x"),
             std::string::npos);
   EXPECT_NE(refusal({"reproduce", "m03", "--queries", "3"}).find("--queries has no meaning"),
             std::string::npos);

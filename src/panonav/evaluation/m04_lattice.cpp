@@ -191,7 +191,7 @@ class LatticeExperiment {
     const bool coarse = side == 10;
     std::vector<MapPlot> panels{
         map_of(with_mu("motion and phases", ours.shape_difference), grid, ours.aligned),
-        map_of(with_mu("motion alone", blind.with_reflection), grid, blind.aligned)};
+        map_of(with_mu("motion without phases", blind.with_reflection), grid, blind.aligned)};
     if (coarse) {
       const auto plain =
           compare_with_grid(grid, arrange(grid.memory, plain_options(), {}, executor_));

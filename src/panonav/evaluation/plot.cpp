@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/evaluation/picture_plot.hpp"
 
 extern char** environ;
 
@@ -335,6 +336,40 @@ void write_plot(const std::filesystem::path& path, const HeatMap& plot) {
   }
   const double ratio = std::clamp(static_cast<double>(plot.rows) / plot.columns, 0.2, 1.2);
   draw(path, {900, static_cast<int>(700 * ratio) + 150}, body.str());
+}
+
+void write_plot(const std::filesystem::path& path, const PicturePlot& plot) {
+  require(plot.columns >= 1 && plot.rows >= 1 &&
+              plot.values.size() ==
+                  static_cast<std::size_t>(plot.columns) * static_cast<std::size_t>(plot.rows),
+          "number of picture values", static_cast<double>(plot.values.size()),
+          "columns * rows >= 1");
+  std::string rows;
+  const double dx = (plot.x_range.second - plot.x_range.first) / plot.columns;
+  const double dy = (plot.y_range.second - plot.y_range.first) / plot.rows;
+  for (int j = 0; j < plot.rows; ++j) {
+    for (int i = 0; i < plot.columns; ++i) {
+      const float value = plot.values[static_cast<std::size_t>(j) * plot.columns + i];
+      const bool known = std::isfinite(value);
+      const auto grey = [&](double missing) {
+        return std::to_string(std::lround(
+            255.0 * std::clamp(known ? static_cast<double>(value) : missing, 0.0, 1.0)));
+      };
+      rows += number(plot.x_range.first + (i + 0.5) * dx) + " " +
+              number(plot.y_range.first + (j + 0.5) * dy) + " " + grey(0.55) + " " + grey(0.7) +
+              " " + grey(0.9) + "\n";
+    }
+  }
+  std::ostringstream body;
+  write_block(body, "pixels", rows);
+  body << "set title " << quoted(plot.title) << "\nset xlabel " << quoted(plot.x_label)
+       << "\nset ylabel " << quoted(plot.y_label) << "\nset tics out nomirror\nset xrange ["
+       << number(plot.x_range.first) << ":" << number(plot.x_range.second) << "]\nset yrange ["
+       << number(plot.y_range.first) << ":" << number(plot.y_range.second) << "]\n";
+  if (plot.x_tick != 0.0) body << "set xtics " << number(plot.x_tick) << "\n";
+  if (plot.y_tick != 0.0) body << "set ytics " << number(plot.y_tick) << "\n";
+  body << "plot $pixels using 1:2:3:4:5 with rgbimage notitle\n";
+  draw(path, {1000, 480}, body.str());
 }
 
 void write_plot(const std::filesystem::path& path, const MapPlot& plot) {

@@ -98,4 +98,51 @@ struct HomingReproductionOptions {
                                          Executor& executor,
                                          const ReproductionProgress& progress = {});
 
+struct MappingReproductionOptions {
+  std::filesystem::path out;  ///< folder for pictures; made when it is not there
+  int scenes = 20;            ///< variants of `loop` and of `lab`, >= 2; fewer of the others
+  int runs = 20;              ///< paths in each Gazebo world, >= 1
+  int views = 200;            ///< of the first set, >= 10; the second has three quarters of them
+  int most_views = 10'000;    ///< of the largest map, >= 100
+  int columns = 512;          ///< of the views
+  std::uint64_t seed = 1;     ///< of the first scene; the others follow it
+  /// Folder of the recordings and Gazebo worlds (docs/formats.md); empty: these are left out.
+  std::filesystem::path data;
+};
+
+/// The same as a smoke run: two scenes, small maps.
+[[nodiscard]] MappingReproductionOptions quick_run(MappingReproductionOptions options);
+
+/// Visual odometry and topological maps as in [F11] (figures 4 to 6), and what its authors left to
+/// later work: closed loops, maps of many views, other worlds and recordings. Same options: same
+/// rows, but for times (units ms, us, s), and same pictures on any number of threads. Throws
+/// ContractError, FileError.
+[[nodiscard]] Reproduction reproduce_f11(const MappingReproductionOptions& options,
+                                         Executor& executor,
+                                         const ReproductionProgress& progress = {});
+
+struct RouteReproductionOptions {
+  std::filesystem::path out;  ///< folder for pictures; made when it is not there
+  int scenes = 50;            ///< variants of the lab, >= 2
+  int swept = 10;             ///< of these take part in the sweeps, 1 to scenes
+  int runs = 50;              ///< along routes of 60 m in each place, >= 2
+  std::uint64_t seed = 801;   ///< of the first scene; the others follow it
+  /// Folder of the recording and Gazebo worlds (docs/formats.md); empty: these are left out.
+  std::filesystem::path data;
+};
+
+/// The same as a smoke run: two variants, two runs.
+[[nodiscard]] RouteReproductionOptions quick_run(RouteReproductionOptions options);
+
+/// Route panoramas as in [Y03] section 5: a drive across a straight path through the lab, in the
+/// scene as memorised and changed, by the direct fit and by the dual contours as published; sparse
+/// lines, a wrong scale of the odometry, a closed loop to a goal off the path; sweeps over the
+/// spacing of the lines, the distance from the path and the margin of the contours. Then what the
+/// paper leaves to others: routes of 60 m repeated in closed loop through `loop` and Gazebo worlds,
+/// their size in a file, a real route. Same options: same rows, but for times (unit ms), and same
+/// pictures on any number of threads. Throws ContractError, FileError.
+[[nodiscard]] Reproduction reproduce_y03(const RouteReproductionOptions& options,
+                                         Executor& executor,
+                                         const ReproductionProgress& progress = {});
+
 }  // namespace panonav

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+
+#include "lattice_picture.hpp"
+#include "panonav/evaluation/mapping_run.hpp"
+#include "report_page.hpp"
+#include "session.hpp"
+
+namespace panonav::command {
+
+/// What the memory's views tell about how they lie.
+struct DemoMaps {
+  std::optional<LatticeComparison> lattice;  ///< the office, its views in no order
+  double map_error = 1.0;                    ///< shape difference of a map from a drive
+  double wheels_error = 1.0;                 ///< of the wheels on the same drive
+  std::size_t closures = 0;
+};
+
+/// Arranges the views of `office` without their poses, makes a map of a drive through rooms of
+/// another place, and adds a section with both pictures to the page.
+DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick,
+                   const std::filesystem::path& out, Session& session, ReportPage& page);
+
+}  // namespace panonav::command

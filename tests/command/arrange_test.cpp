@@ -1,0 +1,90 @@
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "command_runner.hpp"
+#include "landmark_world.hpp"
+#include "panonav/storage/memory_file.hpp"
+
+namespace panonav::testing {
+namespace {
+
+using nlohmann::json;
+
+std::string text_of(const std::string& path) {
+  std::ifstream file(path);
+  std::stringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+/// A memory of a grid of places.
+class Arrange : public ::testing::Test {
+ protected:
+  Arrange() {
+    std::filesystem::create_directory(folder / "run");
+    poses = grid_poses(6);
+    for (Pose2& pose : poses) {
+      pose = {0.5 + 0.3 * pose.x_m, 0.5 + 0.3 * pose.y_m, wrap_angle(7.0 * pose.x_m + pose.y_m)};
+    }
+    write_dataset(folder / "run", world, poses);
+    const auto made = run_panonav({"memorise", folder / "run", memory});
+    EXPECT_EQ(made.exit_code, 0) << made.err;
+  }
+  TemporaryFolder folder;
+  LandmarkWorld world{4};
+  std::vector<Pose2> poses;
+  std::string memory = folder / "run.panonav";
+};
+
+TEST_F(Arrange, StoresAndTellsTheMap) {
+  const auto result = run_panonav({"arrange", memory, "--json", "--graphml", folder / "map.graphml",
+                                   "--tum", folder / "map.tum"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto answer = json::parse(result.out);
+  EXPECT_EQ(answer["views"], poses.size());
+  ASSERT_EQ(answer["nodes"].size(), poses.size());
+  EXPECT_EQ(answer["metric"], false);
+  ASSERT_GE(answer["parts"].size(), 1U);
+  EXPECT_EQ(answer["parts"][0]["handedness_known"], true);
+  std::size_t counted = 0;
+  for (const auto& part : answer["parts"]) counted += part["views"].get<std::size_t>();
+  EXPECT_EQ(counted, poses.size());
+  ASSERT_FALSE(answer["truth"].is_null());
+  EXPECT_LT(answer["truth"]["shape_difference"], 0.1);
+  EXPECT_GT(answer["truth"]["trustworthiness"], 0.8);
+
+  const auto file = MemoryFile::open(memory, Access::read_only);
+  const auto map = file.map("lattice");
+  ASSERT_TRUE(map.has_value());
+  EXPECT_EQ(map->nodes.size(), poses.size());
+  EXPECT_EQ(map->edges.size(), answer["springs"]);
+  EXPECT_GT(file.info().links, 0U);
+  EXPECT_NE(text_of(folder / "map.graphml").find("<graphml"), std::string::npos);
+  const auto poses_and_header = lines(text_of(folder / "map.tum"));
+  ASSERT_FALSE(poses_and_header.empty());
+  EXPECT_EQ(poses_and_header.front().front(), '#');
+  EXPECT_EQ(poses_and_header.size() - 1, answer["parts"][0]["views"]);
+}
+
+TEST_F(Arrange, LeavesTheMemoryAsItIsWhenToldSo) {
+  const auto result = run_panonav({"arrange", memory, "--no-save"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.out.find("views arranged"), std::string::npos);
+  const auto file = MemoryFile::open(memory, Access::read_only);
+  EXPECT_FALSE(file.map("lattice").has_value());
+  EXPECT_EQ(file.info().links, 0U);
+}
+
+TEST_F(Arrange, RefusesInOneLine) {
+  EXPECT_NE(refusal({"arrange", folder / "none.panonav"}).find("none.panonav"), std::string::npos);
+  EXPECT_NE(refusal({"arrange", memory, "--odometry", folder / "run"}).find("odometry"),
+            std::string::npos);
+  EXPECT_NE(refusal({"arrange", memory, "--neighbours", "0"}).find("neighbours"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace panonav::testing
