@@ -4,6 +4,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/io/atomic_file.hpp"
+#include "session.hpp"
 
 namespace panonav::command {
 
@@ -146,6 +147,11 @@ void ReportPage::write(const std::filesystem::path& folder) const {
       .append(body_)
       .append("</body>\n</html>\n");
   write_file(folder / "index.html", std::string_view(page));
+}
+
+void tell_report(const std::filesystem::path& folder, Session& session) {
+  if (session.json()) return;
+  session.print("Open " + session.strong((folder / "index.html").string()) + " in a browser.");
 }
 
 }  // namespace panonav::command

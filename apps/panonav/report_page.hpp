@@ -8,6 +8,8 @@
 
 namespace panonav::command {
 
+class Session;
+
 /// A picture of a report: a file in the folder of the page, and what a person should see in it.
 struct ReportPicture {
   std::string file;
@@ -18,6 +20,9 @@ struct ReportPicture {
 /// an earlier report of the same verb, which holds `own_file`.
 void prepare_report_folder(const std::filesystem::path& folder, std::string_view own_file,
                            std::string_view verb);
+
+/// Tells people to open the report in `folder`; says nothing to machines.
+void tell_report(const std::filesystem::path& folder, Session& session);
 
 /// One HTML page that needs nothing but the pictures beside it: no scripts, nothing from the
 /// network.

@@ -9,6 +9,7 @@
 #include "catchment_survey.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "report_page.hpp"
 #include "verbs.hpp"
 
 namespace panonav::command {
@@ -253,10 +254,7 @@ ExitCode catchment(const Arguments& arguments, const CatchmentArguments& wanted,
   }
   if (wanted.report) {
     write_catchment_report(*wanted.report, goals, places, result, settings.homing, goal);
-    if (!session.json()) {
-      session.print("Open " + session.strong((fs::path(*wanted.report) / "index.html").string()) +
-                    " in a browser.");
-    }
+    tell_report(*wanted.report, session);
   }
   return std::isfinite(result.component) ? ExitCode::done : ExitCode::no_answer;
 }

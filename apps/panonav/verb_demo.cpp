@@ -298,7 +298,7 @@ ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
                 std::to_string(route.completed) + " of " + std::to_string(route.runs.size()) +
                 " runs reached its end; distance from it: median " +
                 median_text(route.lateral_m, 100.0, 1, "cm"));
-  session.print("Open " + session.strong((out / "index.html").string()) + " in a browser.");
+  tell_report(out, session);
   return ExitCode::done;
 }
 

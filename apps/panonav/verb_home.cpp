@@ -13,6 +13,7 @@
 #include "verbs.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES
 #include "home_report.hpp"
+#include "report_page.hpp"
 #endif
 
 namespace panonav::command {
@@ -121,10 +122,7 @@ ExitCode answer_all(const HomeArguments& wanted, const Goal& goal, const Dataset
   if (wanted.report) {
     write_home_report(*wanted.report, goal, answers,
                       [&](std::size_t i) { return read(recording.entries[i]); });
-    if (!session.json()) {
-      session.print("Open " + session.strong((fs::path(*wanted.report) / "index.html").string()) +
-                    " in a browser.");
-    }
+    tell_report(*wanted.report, session);
   }
 #else
   (void)wanted;

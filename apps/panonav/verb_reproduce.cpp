@@ -103,20 +103,26 @@ void refuse(bool given, const std::string& flag, const ReproduceArguments& wante
   if (given) throw OptionError(flag + " has no meaning for " + wanted.paper);
 }
 
+/// Where they are to begin and how many variants, as wanted; intervals need two of them.
+template <typename Options>
+void set_scenes(const ReproduceArguments& wanted, Options& options) {
+  if (wanted.quick) options = quick_run(options);
+  if (wanted.seed) options.seed = *wanted.seed;
+  if (!wanted.scenes) return;
+  options.scenes = *wanted.scenes;
+  if (options.scenes < 2) {
+    throw OptionError("--scenes is '" + std::to_string(options.scenes) + "'; allowed for " +
+                      wanted.paper + ": from 2");
+  }
+}
+
 std::pair<PaperText, Reproduction> run_m04(const ReproduceArguments& wanted, Session& session,
                                            const ReproductionProgress& progress) {
   refuse(wanted.runs.has_value(), "--runs", wanted);
   refuse(wanted.data.has_value(), "--data", wanted);
   refuse(wanted.only.has_value(), "--only", wanted);
-  ReproductionOptions options{.out = wanted.out, .seed = wanted.seed.value_or(1)};
-  if (wanted.quick) options = quick_run(options);
-  if (wanted.scenes) {
-    options.scenes = *wanted.scenes;
-    if (options.scenes < 2) {
-      throw OptionError("--scenes is '" + std::to_string(options.scenes) +
-                        "'; allowed for m04: from 2");
-    }
-  }
+  ReproductionOptions options{.out = wanted.out};
+  set_scenes(wanted, options);
   if (wanted.queries) options.queries = *wanted.queries;
   if (wanted.rows) options.rows = *wanted.rows;
   const PaperText text{
@@ -158,15 +164,7 @@ std::pair<PaperText, Reproduction> run_s06(const ReproduceArguments& wanted, Ses
   refuse(wanted.rows.has_value(), "--rows", wanted);
   refuse(wanted.only.has_value(), "--only", wanted);
   HomingReproductionOptions options{.out = wanted.out, .data = data_folder(wanted)};
-  if (wanted.quick) options = quick_run(options);
-  if (wanted.seed) options.seed = *wanted.seed;
-  if (wanted.scenes) {
-    options.scenes = *wanted.scenes;
-    if (options.scenes < 2) {
-      throw OptionError("--scenes is '" + std::to_string(options.scenes) +
-                        "'; allowed for s06: from 2");
-    }
-  }
+  set_scenes(wanted, options);
   const PaperText text{
       "Visual homing: the experiments of [S06]",
       "Stürzl, Mallot 2006, run in " + std::to_string(options.scenes) +
@@ -183,16 +181,8 @@ std::pair<PaperText, Reproduction> run_f11(const ReproduceArguments& wanted, Ses
   refuse(wanted.rows.has_value(), "--rows", wanted);
   refuse(wanted.only.has_value(), "--only", wanted);
   MappingReproductionOptions options{.out = wanted.out, .data = data_folder(wanted)};
-  if (wanted.quick) options = quick_run(options);
-  if (wanted.seed) options.seed = *wanted.seed;
+  set_scenes(wanted, options);
   if (wanted.runs) options.runs = *wanted.runs;
-  if (wanted.scenes) {
-    options.scenes = *wanted.scenes;
-    if (options.scenes < 2) {
-      throw OptionError("--scenes is '" + std::to_string(options.scenes) +
-                        "'; allowed for f11: from 2");
-    }
-  }
   const PaperText text{
       "Visual odometry and topological maps: the experiments of [F11]",
       "Fernandez, Paya, Reinoso, Amoros 2011, run in " + std::to_string(options.scenes) +
@@ -209,17 +199,9 @@ std::pair<PaperText, Reproduction> run_y03(const ReproduceArguments& wanted, Ses
   refuse(wanted.rows.has_value(), "--rows", wanted);
   refuse(wanted.only.has_value(), "--only", wanted);
   RouteReproductionOptions options{.out = wanted.out, .data = data_folder(wanted)};
-  if (wanted.quick) options = quick_run(options);
-  if (wanted.seed) options.seed = *wanted.seed;
+  set_scenes(wanted, options);
   if (wanted.runs) options.runs = *wanted.runs;
-  if (wanted.scenes) {
-    options.scenes = *wanted.scenes;
-    if (options.scenes < 2) {
-      throw OptionError("--scenes is '" + std::to_string(options.scenes) +
-                        "'; allowed for y03: from 2");
-    }
-    options.swept = std::min(options.swept, options.scenes);
-  }
+  options.swept = std::min(options.swept, options.scenes);
   const PaperText text{
       "Route panoramas: the experiments of [Y03]",
       "Yagi, Imai, Yachida 2003, run in " + std::to_string(options.scenes) +

@@ -12,6 +12,7 @@
 #include "session.hpp"
 #include "verbs.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES
+#include "report_page.hpp"
 #include "route_report.hpp"
 #endif
 
@@ -179,12 +180,7 @@ ExitCode follow_run(const FollowArguments& wanted, Session& session) {
 #ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) {
     write_follow_report(*wanted.report, name, tracker.lines(), images, summary);
-    if (!session.json()) {
-      session.print(
-          "Open " +
-          session.strong((std::filesystem::path(*wanted.report) / "index.html").string()) +
-          " in a browser.");
-    }
+    tell_report(*wanted.report, session);
   }
 #endif
   return summary.on_route > 0 ? ExitCode::done : ExitCode::no_answer;

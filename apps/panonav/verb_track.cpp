@@ -14,6 +14,7 @@
 #include "tracked_run.hpp"
 #include "verbs.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES
+#include "report_page.hpp"
 #include "track_report.hpp"
 #endif
 
@@ -281,12 +282,7 @@ ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Ses
 #ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) {
     write_track_report(*wanted.report, memory, localiser.model().spacing_m, images, summary);
-    if (!session.json()) {
-      session.print(
-          "Open " +
-          session.strong((std::filesystem::path(*wanted.report) / "index.html").string()) +
-          " in a browser.");
-    }
+    tell_report(*wanted.report, session);
   }
 #endif
   return summary.localised > 0 ? ExitCode::done : ExitCode::no_answer;
