@@ -9,6 +9,7 @@
 #include "panonav/core/median.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/positions.hpp"
 #include "panonav/geometry/voronoi.hpp"
 
 namespace panonav::command {
@@ -166,9 +167,7 @@ CatchmentResult survey_catchment(const RecordedViews& goals, const RecordedViews
   CatchmentResult result;
   const auto goal_poses = placed(goals);
   const auto place_poses = placed(places);
-  std::vector<Point2> positions;
-  for (const Pose2& pose : place_poses) positions.push_back(pose.position());
-  result.spacing_m = VoronoiCells(positions).spacing_m();
+  result.spacing_m = VoronoiCells(positions_of(place_poses)).spacing_m();
   if (!(result.spacing_m > 0.0)) throw FileError(name, "has no two places that differ");
   const auto vectors = all_vectors(goals, places, settings.homing, "homing", session);
 

@@ -8,6 +8,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/evaluation/plot.hpp"
 #include "panonav/evaluation/statistics.hpp"
+#include "panonav/geometry/positions.hpp"
 #include "panonav/io/image_file.hpp"
 
 namespace panonav::command {
@@ -43,8 +44,7 @@ void draw_runs(const FloorPlan& plan, const std::vector<HomingRun>& runs,
   for (const HomingRun& run : runs) {
     homes.squares.push_back(run.goal.position());
     starts.circles.push_back(run.path.front().position());
-    std::vector<Point2> line;
-    for (const Pose2& pose : run.path) line.push_back(pose.position());
+    std::vector<Point2> line = positions_of(run.path);
     if (line.size() > 1) (run.succeeds(close_m) ? good : bad).lines.push_back(std::move(line));
   }
   write_plot(path, MapPlot{.title = "Runs home in the office, from above: x and y in metres",

@@ -7,6 +7,7 @@
 
 #include "panonav/evaluation/plot.hpp"
 #include "panonav/evaluation/surroundings.hpp"
+#include "panonav/geometry/positions.hpp"
 #include "panonav/mapping/lattice.hpp"
 #include "panonav/simulation/scenes.hpp"
 

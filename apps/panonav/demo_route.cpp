@@ -6,25 +6,20 @@
 #include "panonav/evaluation/picture_plot.hpp"
 #include "panonav/evaluation/plot.hpp"
 #include "panonav/evaluation/statistics.hpp"
+#include "panonav/geometry/positions.hpp"
 
 namespace panonav::command {
 
 namespace {
 
-std::vector<Point2> positions(std::span<const Pose2> poses) {
-  std::vector<Point2> points;
-  for (const Pose2& pose : poses) points.push_back(pose.position());
-  return points;
-}
-
 void draw_runs(const FloorPlan& plan, std::span<const Pose2> way, const std::vector<RouteRun>& runs,
                const std::filesystem::path& path) {
-  MapLayer route{.label = "remembered route", .colour = "#000000", .lines = {positions(way)}};
+  MapLayer route{.label = "remembered route", .colour = "#000000", .lines = {positions_of(way)}};
   MapLayer forward{.label = "driven forward", .colour = "#0072b2"};
   MapLayer back{.label = "driven back", .colour = "#009e73"};
   MapLayer starts{.label = "starts", .colour = "#e0201b"};
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    (i == 0 ? forward : back).lines.push_back(positions(runs[i].truth));
+    (i == 0 ? forward : back).lines.push_back(positions_of(runs[i].truth));
     starts.circles.push_back(runs[i].truth.front().position());
   }
   write_plot(path, MapPlot{.title = "A route through the office, from above: x and y in metres",

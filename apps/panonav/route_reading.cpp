@@ -5,6 +5,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/positions.hpp"
 #include "panonav/motion/headed_path.hpp"
 
 namespace panonav::command {
@@ -126,9 +127,7 @@ std::vector<Pose2> dataset_poses(const Dataset& dataset) {
     poses.push_back({entry.pose->x_m, entry.pose->y_m, entry.pose->heading_rad.value_or(0.0)});
   }
   if (headings || poses.size() < 2) return headings ? poses : std::vector<Pose2>{};
-  std::vector<Point2> positions;
-  for (const Pose2& pose : poses) positions.push_back(pose.position());
-  return headed_along_way(positions);
+  return headed_along_way(positions_of(poses));
 }
 
 std::vector<Pose2> odometry_poses(const Dataset& dataset) {

@@ -9,6 +9,7 @@
 #include "panonav/evaluation/plot.hpp"
 #include "panonav/evaluation/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/positions.hpp"
 #include "report_page.hpp"
 #include "session.hpp"
 
@@ -29,15 +30,9 @@ void put_line(std::span<const float> line, float* to) {
   }
 }
 
-std::vector<Point2> positions(std::span<const Pose2> path) {
-  std::vector<Point2> points;
-  for (const Pose2& pose : path) points.push_back(pose.position());
-  return points;
-}
-
 MapLayer path_layer(std::span<const Pose2> path) {
   MapLayer layer{.label = "remembered route", .colour = "#999999"};
-  layer.lines.push_back(positions(path));
+  layer.lines.push_back(positions_of(path));
   return layer;
 }
 

@@ -17,6 +17,7 @@
 #include "panonav/evaluation/statistics.hpp"
 #include "panonav/evaluation/surroundings.hpp"
 #include "panonav/geometry/alignment.hpp"
+#include "panonav/geometry/positions.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/panorama_reader.hpp"
@@ -73,14 +74,6 @@ std::vector<Pose2> two_loops(const PlaceRecording& place, double length_m, doubl
   }
   const auto views = static_cast<std::size_t>(std::lround(length_m / spacing_m));
   return drive(place, way, spacing_m, views);
-}
-
-MapLayer obstacles(const FreeSpace& space) {
-  MapLayer layer{.label = "no place for the robot", .colour = "#c0c0c0"};
-  for (const GridPosition& place : grid_positions(space.low(), space.high(), 0.1)) {
-    if (!space.is_free(place.position)) layer.dots.push_back(place.position);
-  }
-  return layer;
 }
 
 /// A data set's views with what is known of their places.
@@ -362,8 +355,9 @@ void reproduce_mapping_in_world(const MappingReproductionOptions& options, const
       wrong += mapped->wrong_closures;
     }
     if (run < 4) {
+      const FreeSpace& space = *place.free_space;
       MapPlot map{.title = name + ", path " + std::to_string(run + 1),
-                  .layers = {obstacles(*place.free_space)}};
+                  .layers = {obstacle_layer(space, space.low(), space.high(), 0.1)}};
       map.layers.push_back({.label = "truth", .colour = "#000000", .lines = {open.truth}});
       std::vector<Point2> wheel_line;
       const Alignment wheel_alignment = align(wheels, open.truth);

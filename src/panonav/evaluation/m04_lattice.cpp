@@ -11,6 +11,7 @@
 #include "panonav/evaluation/plot.hpp"
 #include "panonav/evaluation/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/positions.hpp"
 #include "panonav/signature/dissimilarity.hpp"
 #include "panonav/simulation/scenes.hpp"
 
@@ -78,12 +79,6 @@ MapPlot map_of(const std::string& title, const ViewGrid& grid, std::span<const P
 std::string with_mu(const std::string& title, double mu) {
   const double rounded = std::round(mu * 1e4) / 1e4;
   return title + ", mu " + to_text(rounded);
-}
-
-std::vector<Point2> true_positions(const ViewGrid& grid) {
-  std::vector<Point2> positions;
-  for (const Pose2& pose : grid.poses) positions.push_back(pose.position());
-  return positions;
 }
 
 class LatticeExperiment {
@@ -163,7 +158,7 @@ class LatticeExperiment {
     draw("fig15_lattice.png",
          "Views of the hall as they were taken and as they arrange themselves, unordered and "
          "without motion: by phases, and by dissimilarity alone as published.",
-         {map_of("as taken", grid, true_positions(grid)),
+         {map_of("as taken", grid, positions_of(grid.poses)),
           map_of(with_mu("phases", ours.shape_difference), grid, ours.aligned),
           map_of(with_mu("dissimilarity alone", published.with_reflection), grid,
                  published.aligned)});

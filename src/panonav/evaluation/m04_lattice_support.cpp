@@ -7,6 +7,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/evaluation/m04_support.hpp"
 #include "panonav/geometry/alignment.hpp"
+#include "panonav/geometry/positions.hpp"
 #include "panonav/mapping/lattice_graph.hpp"
 #include "panonav/simulation/furniture.hpp"
 
@@ -33,12 +34,6 @@ std::size_t view_at(const ViewGrid& grid, GridPlace place) {
 
 bool is_inside(const ViewGrid& grid, GridPlace place) {
   return place.i > 0 && place.j > 0 && place.i < grid.columns - 1 && place.j < grid.rows - 1;
-}
-
-std::vector<Point2> true_positions(const ViewGrid& grid) {
-  std::vector<Point2> positions;
-  for (const Pose2& pose : grid.poses) positions.push_back(pose.position());
-  return positions;
 }
 
 /// The alignment with the scale that makes both sets equally large: least squares would shrink a
@@ -151,7 +146,7 @@ std::vector<CoarseMotion> coarse_motion(const ViewGrid& grid, double distance_sh
 }
 
 GridComparison compare_with_grid(const ViewGrid& grid, const Lattice& lattice) {
-  const auto truth = true_positions(grid);
+  const auto truth = positions_of(grid.poses);
   std::vector<Point2> arranged;
   for (const auto& node : lattice.nodes) {
     // Views of other parts have no place among these; the frame's origin stands for none.

@@ -167,12 +167,6 @@ double shape_error(std::span<const Point2> estimate, std::span<const Point2> tru
   return shape_difference(estimate, truth).value;
 }
 
-std::vector<Point2> positions_of(std::span<const Pose2> poses) {
-  std::vector<Point2> points;
-  for (const Pose2& pose : poses) points.push_back(pose.position());
-  return points;
-}
-
 std::vector<Point2> laid_over(std::span<const Point2> estimate, std::span<const Point2> truth) {
   const Alignment alignment = align(estimate, truth, {.allow_scale = true});
   std::vector<Point2> points;

@@ -79,6 +79,5 @@ struct MappingRunOptions {
 /// Points of a map laid over the truth, for pictures.
 [[nodiscard]] std::vector<Point2> laid_over(std::span<const Point2> estimate,
                                             std::span<const Point2> truth);
-[[nodiscard]] std::vector<Point2> positions_of(std::span<const Pose2> poses);
 
 }  // namespace panonav

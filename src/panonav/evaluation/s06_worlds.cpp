@@ -11,6 +11,8 @@
 #include "panonav/evaluation/m03_support.hpp"
 #include "panonav/evaluation/plot.hpp"
 #include "panonav/evaluation/statistics.hpp"
+#include "panonav/evaluation/surroundings.hpp"
+#include "panonav/geometry/positions.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/simulation/load_gazebo.hpp"
 #include "panonav/simulation/scenes.hpp"
@@ -29,21 +31,6 @@ std::size_t successes(const std::vector<HomingRun>& runs) {
   }));
 }
 
-// Where the robot cannot be, as small dots.
-MapLayer obstacles(const FreeSpace& space, Point2 low, Point2 high, double spacing_m) {
-  MapLayer layer{.label = "no place for the robot", .colour = "#b0b0b0"};
-  for (const GridPosition& place : grid_positions(low, high, spacing_m)) {
-    if (!space.is_free(place.position)) layer.dots.push_back(place.position);
-  }
-  return layer;
-}
-
-std::vector<Point2> positions(const HomingRun& run) {
-  std::vector<Point2> line;
-  for (const Pose2& pose : run.path) line.push_back(pose.position());
-  return line;
-}
-
 MapPlot map_of_failure(const HomingPlace& place, const HomingRun& run, std::size_t number) {
   constexpr double margin_m = 0.6;
   Point2 low = run.goal.position();
@@ -54,9 +41,9 @@ MapPlot map_of_failure(const HomingPlace& place, const HomingRun& run, std::size
   }
   MapPlot map;
   map.title = "run " + std::to_string(number) + ": " + reason_of_failure(run);
-  map.layers.push_back(obstacles(*place.free_space, {low.x_m - margin_m, low.y_m - margin_m},
-                                 {high.x_m + margin_m, high.y_m + margin_m}, 0.05));
-  map.layers.push_back({.label = "way", .colour = "#d62728", .lines = {positions(run)}});
+  map.layers.push_back(obstacle_layer(*place.free_space, {low.x_m - margin_m, low.y_m - margin_m},
+                                      {high.x_m + margin_m, high.y_m + margin_m}, 0.05));
+  map.layers.push_back({.label = "way", .colour = "#d62728", .lines = {positions_of(run.path)}});
   map.layers.push_back(
       {.label = "start", .colour = "#1f77b4", .circles = {run.path.front().position()}});
   map.layers.push_back(
@@ -70,12 +57,12 @@ MapPlot map_of_all(const HomingPlace& place, const std::vector<HomingRun>& runs,
   MapPlot map;
   map.title = "Runs home in " + name;
   map.layers.push_back(
-      obstacles(*place.free_space, place.free_space->low(), place.free_space->high(), 0.1));
+      obstacle_layer(*place.free_space, place.free_space->low(), place.free_space->high(), 0.1));
   MapLayer reached{.label = "reached home", .colour = "#2ca02c"};
   MapLayer failed{.label = "did not", .colour = "#d62728"};
   MapLayer goals{.label = "goals", .colour = "#000000"};
   for (const HomingRun& run : runs) {
-    (run.succeeds(homing_success_m) ? reached : failed).lines.push_back(positions(run));
+    (run.succeeds(homing_success_m) ? reached : failed).lines.push_back(positions_of(run.path));
     goals.squares.push_back(run.goal.position());
   }
   map.layers.push_back(std::move(reached));

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "panonav/core/error.hpp"
+#include "panonav/motion/path.hpp"
 #include "panonav/signature/fourier_signature.hpp"
 
 namespace panonav {
@@ -147,6 +148,14 @@ std::vector<MapLayer> furniture_layers(const Scene& scene) {
                                      {box.low.x_m, box.high.y_m}});
   }
   return {lower, higher};
+}
+
+MapLayer obstacle_layer(const FreeSpace& space, Point2 low, Point2 high, double spacing_m) {
+  MapLayer layer{.label = "no place for the robot", .colour = "#b0b0b0"};
+  for (const GridPosition& place : grid_positions(low, high, spacing_m)) {
+    if (!space.is_free(place.position)) layer.dots.push_back(place.position);
+  }
+  return layer;
 }
 
 }  // namespace panonav

@@ -5,6 +5,7 @@
 
 #include "panonav/evaluation/place_recording.hpp"
 #include "panonav/evaluation/plot.hpp"
+#include "panonav/simulation/free_space.hpp"
 
 namespace panonav {
 
@@ -38,5 +39,9 @@ struct Surroundings {
 
 /// Furniture as on a floor plan: one layer of things lower than the camera, one of higher ones.
 [[nodiscard]] std::vector<MapLayer> furniture_layers(const Scene& scene);
+
+/// Where the robot cannot be, as dots `spacing_m` apart.
+[[nodiscard]] MapLayer obstacle_layer(const FreeSpace& space, Point2 low, Point2 high,
+                                      double spacing_m);
 
 }  // namespace panonav

@@ -10,6 +10,7 @@
 #include "panonav/evaluation/picture_plot.hpp"
 #include "panonav/evaluation/plot.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/positions.hpp"
 #include "panonav/route/route_crossing.hpp"
 
 namespace panonav {
@@ -18,9 +19,7 @@ namespace {
 
 MapLayer line_layer(const std::string& label, const std::string& colour,
                     const std::vector<Pose2>& poses) {
-  std::vector<Point2> points;
-  for (const Pose2& pose : poses) points.push_back(pose.position());
-  return {.label = label, .colour = colour, .lines = {std::move(points)}};
+  return {.label = label, .colour = colour, .lines = {positions_of(poses)}};
 }
 
 std::vector<Pose2> in_path_frame(const LabRoute& lab, const std::vector<Pose2>& poses) {

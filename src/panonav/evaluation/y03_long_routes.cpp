@@ -14,8 +14,10 @@
 #include "panonav/evaluation/plot.hpp"
 #include "panonav/evaluation/s06_support.hpp"
 #include "panonav/evaluation/statistics.hpp"
+#include "panonav/evaluation/surroundings.hpp"
 #include "panonav/evaluation/y03_experiments.hpp"
 #include "panonav/evaluation/y03_routes.hpp"
+#include "panonav/geometry/positions.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/panorama_reader.hpp"
@@ -35,12 +37,6 @@ constexpr double route_m = 60.0;
 // The way between lines that the paper counts its bytes for [Y03 section 2.2].
 constexpr double spacing_m = 0.1;
 constexpr int runs_each = 10;  // of a route, half of them back
-
-std::vector<Point2> positions(const std::vector<Pose2>& poses) {
-  std::vector<Point2> points;
-  for (const Pose2& pose : poses) points.push_back(pose.position());
-  return points;
-}
 
 // One route and the robots that repeated it.
 struct RepeatedRoute {
@@ -67,21 +63,18 @@ RepeatedRoute repeat_one(const RouteScene& place, int runs, std::uint64_t seed,
 }
 
 MapPlot map_of(const RouteScene& place, const RepeatedRoute& repeated) {
-  MapLayer obstacles{.label = "no place for the robot", .colour = "#c0c0c0"};
-  for (const GridPosition& at :
-       grid_positions(place.free_space->low(), place.free_space->high(), 0.1)) {
-    if (!place.free_space->is_free(at.position)) obstacles.dots.push_back(at.position);
-  }
-  MapPlot map{.title = place.name + ": x and y in metres", .layers = {obstacles}};
+  const FreeSpace& space = *place.free_space;
+  MapPlot map{.title = place.name + ": x and y in metres",
+              .layers = {obstacle_layer(space, space.low(), space.high(), 0.1)}};
   map.layers.push_back(
-      {.label = "remembered route", .colour = "#000000", .lines = {positions(repeated.way)}});
+      {.label = "remembered route", .colour = "#000000", .lines = {positions_of(repeated.way)}});
   MapLayer forward{.label = "driven forward", .colour = "#1f77b4"};
   MapLayer back{.label = "driven back", .colour = "#2ca02c"};
   MapLayer starts{.label = "starts, 0.3 m off", .colour = "#d62728"};
   MapLayer lost{.label = "lost", .colour = "#d62728"};
   for (std::size_t i = 0; i < repeated.runs.size(); ++i) {
     const RouteRun& run = repeated.runs[i];
-    (i % 2 == 0 ? forward : back).lines.push_back(positions(run.truth));
+    (i % 2 == 0 ? forward : back).lines.push_back(positions_of(run.truth));
     starts.circles.push_back(run.truth.front().position());
     if (!run.completes()) lost.crosses.push_back(run.truth.back().position());
   }

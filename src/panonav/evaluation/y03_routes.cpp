@@ -11,6 +11,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/evaluation/chain_run.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/positions.hpp"
 #include "panonav/motion/path.hpp"
 #include "panonav/motion/steering.hpp"
 
@@ -186,8 +187,7 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
     std::ranges::reverse(way);
     for (Pose2& pose : way) pose.heading_rad = wrap_angle(pose.heading_rad + pi);
   }
-  std::vector<Point2> path;
-  for (const Pose2& pose : way) path.push_back(pose.position());
+  const std::vector<Point2> path = positions_of(way);
   const Pose2 start = way.front();
   Random random(seed, 1);
   Random noise_of_lines(seed, 2);

@@ -11,6 +11,7 @@
 #include "panonav/core/median.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/positions.hpp"
 #include "panonav/mapping/lattice_graph.hpp"
 #include "panonav/mapping/lattice_solver.hpp"
 #include "panonav/mapping/lattice_springs.hpp"
@@ -170,11 +171,7 @@ class Arranger {
     lattice_.curve = DissimilarityCurve(slopes.empty() ? 1.0 : upper_median(slopes));
   }
 
-  [[nodiscard]] std::vector<Point2> positions() const {
-    std::vector<Point2> points;
-    for (const Pose2& pose : start_.poses) points.push_back(pose.position());
-    return points;
-  }
+  [[nodiscard]] std::vector<Point2> positions() const { return positions_of(start_.poses); }
 
   void link_near_views() {
     const auto near =
