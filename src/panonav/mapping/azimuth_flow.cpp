@@ -155,9 +155,6 @@ AzimuthFlow refine_flow(const HomingView& before, const HomingView& after, const
     }
     const Sampled then = sample(earlier, moved);
     const Pixels then_up = elevation_slopes(then.values, band_height_rad);
-    Eigen::Matrix<double, unknowns, unknowns> normal =
-        Eigen::Matrix<double, unknowns, unknowns>::Zero();
-    Eigen::Matrix<double, unknowns, 1> right = Eigen::Matrix<double, unknowns, 1>::Zero();
     const Pixels across = 0.5F * (now.slopes + then.slopes);
     const Pixels up = rise.asDiagonal() * (0.5F * (now_up + then_up));
     Pixels difference = now.values - then.values;
@@ -166,6 +163,13 @@ AzimuthFlow refine_flow(const HomingView& before, const HomingView& after, const
       // The way ahead in this direction, of the flow so far.
       difference.col(c) += static_cast<float>(flow.a1 * at.s1 - flow.b1 * at.c1) * up.col(c);
     }
+    const double left = static_cast<double>(difference.squaredNorm());
+    const double energy = static_cast<double>(now.values.squaredNorm() + then.values.squaredNorm());
+    flow.residual = energy > 0.0 ? std::min(1.0, left / energy) : 1.0;
+    if (iteration >= iterations) return flow;
+    Eigen::Matrix<double, unknowns, unknowns> normal =
+        Eigen::Matrix<double, unknowns, unknowns>::Zero();
+    Eigen::Matrix<double, unknowns, 1> right = Eigen::Matrix<double, unknowns, 1>::Zero();
     const auto sums_of = [](const Pixels& x, const Pixels& y) -> Eigen::RowVectorXd {
       return x.cwiseProduct(y).colwise().sum().cast<double>();
     };
@@ -184,10 +188,6 @@ AzimuthFlow refine_flow(const HomingView& before, const HomingView& after, const
                 up_up[c] * rises * rises.transpose() + across_up[c] * (mixed + mixed.transpose());
       right += across_difference[c] * turns + up_difference[c] * rises;
     }
-    const double left = static_cast<double>(difference.squaredNorm());
-    const double energy = static_cast<double>(now.values.squaredNorm() + then.values.squaredNorm());
-    flow.residual = energy > 0.0 ? std::min(1.0, left / energy) : 1.0;
-    if (iteration >= iterations) return flow;
     const double damping = 1e-6 * normal.trace() + 1e-12;
     normal.diagonal().array() += damping;
     const Eigen::Matrix<double, unknowns, 1> change = normal.ldlt().solve(right);
