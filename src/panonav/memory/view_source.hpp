@@ -1,0 +1,32 @@
+#pragma once
+
+#include <span>
+
+#include "panonav/memory/visual_memory.hpp"
+
+namespace panonav {
+
+/// Where views come from when not all of a memory is to be held at once: a large memory, a file.
+class ViewSource {
+ public:
+  virtual ~ViewSource() = default;
+  /// All views that there are, ascending.
+  [[nodiscard]] virtual std::span<const ViewId> views() const = 0;
+  /// A memory of these views under their ids, without links. The views must ascend. Throws
+  /// ContractError on a view that there is not.
+  [[nodiscard]] virtual VisualMemory load(std::span<const ViewId> views) const = 0;
+};
+
+/// A part of a memory that is held whole. The memory must outlive it.
+class MemoryViewSource final : public ViewSource {
+ public:
+  explicit MemoryViewSource(const VisualMemory& memory);
+  [[nodiscard]] std::span<const ViewId> views() const override { return memory_->views(); }
+  /// Copies the signatures.
+  [[nodiscard]] VisualMemory load(std::span<const ViewId> views) const override;
+
+ private:
+  const VisualMemory* memory_;
+};
+
+}  // namespace panonav

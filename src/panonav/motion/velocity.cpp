@@ -1,0 +1,75 @@
+#include "panonav/motion/velocity.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <string_view>
+
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+
+namespace panonav {
+
+void visit_options(BaseOptions& options, OptionVisitor& visitor) {
+  constexpr std::array<std::string_view, 2> drives{"differential", "holonomic"};
+  int drive = static_cast<int>(options.drive);
+  visitor.visit({.name = "drive", .help = "how the robot moves"}, drives, drive);
+  options.drive = static_cast<DriveKind>(drive);
+  visitor.visit(
+      {.name = "speed_m_s", .help = "highest speed", .low = 0, .high = 100, .low_open = true},
+      options.speed_m_s);
+  visitor.visit({.name = "turn_rad_s",
+                 .help = "highest speed of turning",
+                 .low = 0,
+                 .high = 100,
+                 .low_open = true},
+                options.turn_rad_s);
+  visitor.visit({.name = "period_s",
+                 .help = "time for which a command holds",
+                 .low = 0,
+                 .high = 10,
+                 .low_open = true},
+                options.period_s);
+  visitor.visit({.name = "on_spot_rad",
+                 .help = "a differential drive turns on the spot for larger angles",
+                 .low = 0,
+                 .high = std::numbers::pi / 2,
+                 .low_open = true},
+                options.on_spot_rad);
+}
+
+Velocity command_towards(double direction_rad, double distance_m, const BaseOptions& options) {
+  validate(options);
+  require(std::isfinite(direction_rad), "direction_rad", direction_rad, "finite");
+  require(std::isfinite(distance_m) && distance_m >= 0.0, "distance_m", distance_m,
+          ">= 0 and finite");
+  if (distance_m == 0.0) return {};
+  const double speed = std::min(options.speed_m_s, distance_m / options.period_s);
+  if (options.drive == DriveKind::holonomic) {
+    return {speed * std::cos(direction_rad), speed * std::sin(direction_rad), 0.0};
+  }
+  const double angle = wrap_angle(direction_rad);
+  const double turn = std::clamp(angle / options.period_s, -options.turn_rad_s, options.turn_rad_s);
+  if (std::abs(angle) > options.on_spot_rad) return {0.0, 0.0, turn};
+  // No faster than the turn can follow: the arc to the point has the curvature 2 sin(angle) / d.
+  const double arc =
+      0.5 * options.turn_rad_s * distance_m / std::max(std::abs(std::sin(angle)), 1e-9);
+  const double forward = std::min(speed * std::cos(angle), arc);
+  return {forward, 0.0, turn};
+}
+
+Pose2 motion_after(const Velocity& velocity, double duration_s) {
+  require(std::isfinite(duration_s) && duration_s >= 0.0, "duration_s", duration_s,
+          ">= 0 and finite");
+  const double turn = velocity.turn_rad_s * duration_s;
+  const double x = velocity.forward_m_s * duration_s;
+  const double y = velocity.left_m_s * duration_s;
+  // sin(t)/t and (1 - cos(t))/t; their series where the quotient loses its digits.
+  const bool small = std::abs(turn) < 1e-6;
+  const double along = small ? 1.0 : std::sin(turn) / turn;
+  const double across = small ? 0.5 * turn : (1.0 - std::cos(turn)) / turn;
+  return {along * x - across * y, across * x + along * y, wrap_angle(turn)};
+}
+
+}  // namespace panonav

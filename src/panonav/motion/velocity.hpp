@@ -1,0 +1,52 @@
+#pragma once
+
+#include "panonav/core/options.hpp"
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/motion/odometry.hpp"
+
+namespace panonav {
+
+/// Speeds of a robot in its own frame: x forward, y left, turning counter-clockwise.
+struct Velocity {
+  double forward_m_s = 0.0;
+  double left_m_s = 0.0;  ///< 0 for a differential drive
+  double turn_rad_s = 0.0;
+  friend bool operator==(const Velocity&, const Velocity&) = default;
+};
+
+/// The one way out to a robot: whatever moves implements it, a real base or a simulated one. A
+/// command holds until the next one; a base should stop by itself when none comes for a while.
+class RobotBase {
+ public:
+  virtual ~RobotBase() = default;
+  virtual void command(const Velocity& velocity) = 0;
+};
+
+/// What a base can do, and how commands to it are made.
+struct BaseOptions {
+  DriveKind drive = DriveKind::differential;
+  double speed_m_s = 0.3;       ///< highest, > 0
+  double turn_rad_s = 1.0;      ///< highest, > 0
+  double period_s = 0.1;        ///< time for which a command holds, > 0
+  double on_spot_rad = 0.7854;  ///< a differential drive turns on the spot for larger angles
+};
+void visit_options(BaseOptions& options, OptionVisitor& visitor);
+
+/// The command for the next period towards a point at `direction_rad` and `distance_m` in the
+/// current robot frame. It never drives past the point. A holonomic robot keeps its heading; a
+/// differential drive turns towards the point, on the spot first, and slows down with the cosine of
+/// the angle that is left. At distance 0 the robot stands. Throws ContractError on numbers that are
+/// not finite or a distance below 0, OptionError.
+[[nodiscard]] Velocity command_towards(double direction_rad, double distance_m,
+                                       const BaseOptions& options);
+
+/// robot_old_from_robot_new after driving so for a time >= 0: an arc, or a straight line.
+[[nodiscard]] Pose2 motion_after(const Velocity& velocity, double duration_s);
+
+/// What is left of a way to a point (in the old robot frame) after the robot moved by
+/// `robot_old_from_robot_new`: the point in the new frame.
+[[nodiscard]] inline Point2 remaining_way(Point2 target, const Pose2& robot_old_from_robot_new) {
+  return inverse(robot_old_from_robot_new) * target;
+}
+
+}  // namespace panonav

@@ -1,0 +1,120 @@
+#include "panonav/navigation/direction_field.hpp"
+
+#include <cmath>
+#include <numbers>
+#include <queue>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+
+namespace panonav {
+
+void visit_options(FieldOptions& options, OptionVisitor& visitor) {
+  visitor.visit({.name = "links_ahead",
+                 .help = "passages ahead that count for a direction",
+                 .low = 1,
+                 .high = 100},
+                options.links_ahead);
+  visitor.visit({.name = "most_bend_rad",
+                 .help = "a way that has bent by more is not looked along any further",
+                 .low = 0,
+                 .high = std::numbers::pi},
+                options.most_bend_rad);
+}
+
+std::vector<Guide> search_tree(const NavigationGraph& graph, const SubAreas& areas,
+                               std::size_t area, std::span<const SearchRoot> roots,
+                               std::span<const std::uint8_t> closed) {
+  require(area < areas.nodes.size(), "area", static_cast<double>(area), "one of the areas");
+  require(closed.empty() || closed.size() == graph.passages().size(), "size of closed",
+          static_cast<double>(closed.size()), "0 or the number of passages");
+  const std::vector<std::size_t>& nodes = areas.nodes[area];
+  std::vector<Guide> guides(nodes.size());
+  for (std::size_t place = 0; place < nodes.size(); ++place) guides[place].next = nodes[place];
+  using Open = std::pair<double, std::size_t>;
+  std::priority_queue<Open, std::vector<Open>, std::greater<>> open;
+  for (const SearchRoot& root : roots) {
+    require(root.node < graph.size() && areas.area_of[root.node] == area, "node of a root",
+            static_cast<double>(root.node), "a node of the area");
+    Guide& guide = guides[areas.place_of[root.node]];
+    if (!(root.way < guide.way)) continue;
+    guide = {root.way, root.next, root.passage, std::nullopt};
+    open.emplace(root.way, root.node);
+  }
+  while (!open.empty()) {
+    const auto [way, node] = open.top();
+    open.pop();
+    if (way > guides[areas.place_of[node]].way) continue;
+    for (const NavigationGraph::Exit& exit : graph.exits(node)) {
+      if (areas.area_of[exit.node] != area) continue;
+      if (!closed.empty() && closed[exit.passage] != 0) continue;
+      const double longer = way + graph.passages()[exit.passage].length;
+      Guide& guide = guides[areas.place_of[exit.node]];
+      if (longer < guide.way) {
+        guide = {longer, node, exit.passage, std::nullopt};
+        open.emplace(longer, exit.node);
+      }
+    }
+  }
+  return guides;
+}
+
+namespace {
+
+// The mean direction to the next nodes, as far as the way is straight enough.
+std::optional<double> direction_at(const NavigationGraph& graph, const SubAreas& areas,
+                                   std::size_t node, const FieldOptions& options,
+                                   std::span<const Guide> guides) {
+  std::vector<double> directions;
+  Pose2 node_from_here;
+  std::optional<double> first;
+  std::size_t here = node;
+  for (int i = 0; i < options.links_ahead && areas.area_of[here] == areas.area_of[node]; ++i) {
+    const Guide& guide = guides[areas.place_of[here]];
+    if (!guide.reachable() || guide.next == here) break;
+    const auto motion = graph.motion_from(here, guide.passage);
+    if (!motion) break;
+    const Pose2 node_from_next = node_from_here * *motion;
+    const double x = node_from_next.x_m - node_from_here.x_m;
+    const double y = node_from_next.y_m - node_from_here.y_m;
+    if (x != 0.0 || y != 0.0) {
+      const double along = std::atan2(y, x);
+      if (first && std::abs(angle_difference(along, *first)) > options.most_bend_rad) break;
+      if (!first) first = along;
+      directions.push_back(std::atan2(node_from_next.y_m, node_from_next.x_m));
+    }
+    node_from_here = node_from_next;
+    here = guide.next;
+  }
+  const auto mean = circular_mean(directions);
+  return mean ? std::optional(mean->direction_rad) : std::nullopt;
+}
+
+}  // namespace
+
+void set_directions(const NavigationGraph& graph, const SubAreas& areas, std::size_t area,
+                    const FieldOptions& options, std::span<Guide> guides) {
+  validate(options);
+  require(area < areas.nodes.size(), "area", static_cast<double>(area), "one of the areas");
+  require(guides.size() == areas.nodes[area].size(), "number of guides",
+          static_cast<double>(guides.size()), "the number of nodes of the area");
+  for (std::size_t place = 0; place < guides.size(); ++place) {
+    guides[place].direction_rad =
+        direction_at(graph, areas, areas.nodes[area][place], options, guides);
+  }
+}
+
+std::vector<Guide> direction_field(const NavigationGraph& graph, ViewId goal,
+                                   const FieldOptions& options,
+                                   std::span<const std::uint8_t> closed) {
+  const auto node = graph.node_of(goal);
+  require(node.has_value(), "goal", static_cast<double>(goal.value), "a view of the graph");
+  const SearchRoot root{*node, 0.0, *node, 0};
+  const SubAreas areas = undivided(graph);
+  std::vector<Guide> guides = search_tree(graph, areas, 0, {&root, 1}, closed);
+  set_directions(graph, areas, 0, options, guides);
+  return guides;
+}
+
+}  // namespace panonav

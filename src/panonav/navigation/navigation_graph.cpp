@@ -1,0 +1,229 @@
+#include "panonav/navigation/navigation_graph.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/median.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/homing/homing_view.hpp"
+#include "panonav/mapping/view_pair.hpp"
+
+namespace panonav {
+
+namespace {
+
+// Both views of a passage must agree on its direction to this [mapping/lattice.hpp].
+constexpr double most_disagreement_rad = std::numbers::pi / 4.0;
+// Of the median length: what a passage between pictures of one place costs at least, and what one
+// costs of which nothing is known.
+constexpr double least_length_share = 0.1;
+constexpr double unknown_length_share = 3.0;
+
+void require_valid(const Passage& passage) {
+  require(passage.a != passage.b, "view of a passage", static_cast<double>(passage.a.value),
+          "two different views");
+  require(std::isfinite(passage.length) && passage.length > 0.0, "length of a passage",
+          passage.length, "> 0 and finite");
+  if (passage.a_from_b && !is_finite(*passage.a_from_b)) {
+    throw ContractError("motion of a passage", "not finite", "finite");
+  }
+}
+
+// The motion that two readings tell: they are averaged, as each has its own error.
+std::optional<Pose2> motion_of(const PhaseReading& reading) {
+  if (!reading.points) return Pose2{0.0, 0.0, reading.turn_rad};
+  if (reading.disagreement_rad > most_disagreement_rad) return std::nullopt;
+  const double from_b = reading.direction_b_rad + reading.turn_rad - std::numbers::pi;
+  const double direction =
+      reading.direction_a_rad + 0.5 * angle_difference(from_b, reading.direction_a_rad);
+  return Pose2{reading.length * std::cos(direction), reading.length * std::sin(direction),
+               wrap_angle(reading.turn_rad)};
+}
+
+// Passages of which neither length nor motion is known get their length from the others, and those
+// between pictures of one place a least one.
+void complete_lengths(std::vector<Passage>& passages) {
+  std::vector<double> lengths;
+  for (const Passage& passage : passages) {
+    if (passage.length > 0.0) lengths.push_back(passage.length);
+  }
+  const double typical = lengths.empty() ? 1.0 : upper_median(lengths);
+  for (Passage& passage : passages) {
+    const bool known = passage.a_from_b || passage.length > 0.0;
+    passage.length = known ? std::max(passage.length, least_length_share * typical)
+                           : unknown_length_share * typical;
+  }
+}
+
+bool agree(const Pose2& a, const Pose2& b) {
+  const double turned = angle_difference(a.heading_rad, b.heading_rad);
+  const double aside = angle_difference(std::atan2(a.y_m, a.x_m), std::atan2(b.y_m, b.x_m));
+  return std::abs(turned) <= most_disagreement_rad && std::abs(aside) <= most_disagreement_rad;
+}
+
+// Whether most triangles with a third view that tell anything say the same of a passage, as
+// `arrange` asks; true where there is no triangle at all, and false where none of them tells
+// anything.
+bool is_supported(const NavigationGraph& graph, const Passage& passage) {
+  const std::size_t a = *graph.node_of(passage.a);
+  const std::size_t b = *graph.node_of(passage.b);
+  int triangles = 0;
+  int telling = 0;
+  int closed = 0;
+  for (const NavigationGraph::Exit& first : graph.exits(a)) {
+    const auto exits = graph.exits(first.node);
+    const auto second = std::ranges::lower_bound(exits, b, {}, &NavigationGraph::Exit::node);
+    if (second == exits.end() || second->node != b) continue;
+    ++triangles;
+    const auto a_from_c = graph.motion_from(a, first.passage);
+    const auto c_from_b = graph.motion_from(first.node, second->passage);
+    if (!a_from_c || !c_from_b) continue;
+    ++telling;
+    closed += static_cast<int>(agree(*passage.a_from_b, *a_from_c * *c_from_b));
+  }
+  return triangles == 0 || 2 * closed > telling;
+}
+
+}  // namespace
+
+NavigationGraph::NavigationGraph(std::vector<ViewId> views, std::vector<Passage> passages)
+    : views_(std::move(views)), begins_(views_.size() + 1) {
+  for (std::size_t i = 1; i < views_.size(); ++i) {
+    require(views_[i - 1] < views_[i], "views", static_cast<double>(views_[i].value), "ascending");
+  }
+  struct Ends {
+    std::size_t low, high, passage;
+  };
+  std::vector<Ends> ends;
+  for (const Passage& passage : passages) {
+    require_valid(passage);
+    const auto a = node_of(passage.a);
+    const auto b = node_of(passage.b);
+    require(a && b, "view of a passage", static_cast<double>((a ? passage.b : passage.a).value),
+            "a view of the graph");
+    ends.push_back({std::min(*a, *b), std::max(*a, *b), ends.size()});
+  }
+  std::ranges::sort(ends, {}, [](const Ends& e) { return std::tuple(e.low, e.high, e.passage); });
+  const auto doubles = std::ranges::unique(
+      ends, [](const Ends& x, const Ends& y) { return x.low == y.low && x.high == y.high; });
+  ends.erase(doubles.begin(), doubles.end());
+  for (const Ends& e : ends) {
+    ++begins_[e.low + 1];
+    ++begins_[e.high + 1];
+  }
+  std::partial_sum(begins_.begin(), begins_.end(), begins_.begin());
+  exits_.resize(begins_.back());
+  std::vector<std::size_t> next(begins_.begin(), begins_.end() - 1);
+  // In this order the lower ends of a node come before its higher ones, both ascending.
+  for (const Ends& e : ends) {
+    exits_[next[e.high]++] = {e.low, passages_.size()};
+    passages_.push_back(passages[e.passage]);
+  }
+  for (std::size_t p = 0; p < ends.size(); ++p) exits_[next[ends[p].low]++] = {ends[p].high, p};
+}
+
+std::optional<std::size_t> NavigationGraph::node_of(ViewId view) const {
+  const auto found = std::ranges::lower_bound(views_, view);
+  if (found == views_.end() || *found != view) return std::nullopt;
+  return static_cast<std::size_t>(found - views_.begin());
+}
+
+std::optional<Pose2> NavigationGraph::motion_from(std::size_t node, std::size_t passage) const {
+  const Passage& p = passages_.at(passage);
+  if (!p.a_from_b || views_.at(node) == p.a) return p.a_from_b;
+  return inverse(*p.a_from_b);
+}
+
+std::vector<std::size_t> nodes_around(const NavigationGraph& graph,
+                                      std::span<const std::size_t> from, int links) {
+  std::set<std::size_t> found(from.begin(), from.end());
+  std::vector<std::size_t> front(found.begin(), found.end());
+  for (int i = 0; i < links && !front.empty(); ++i) {
+    std::vector<std::size_t> next;
+    for (const std::size_t node : front) {
+      for (const NavigationGraph::Exit& exit : graph.exits(node)) {
+        if (found.insert(exit.node).second) next.push_back(exit.node);
+      }
+    }
+    front.swap(next);
+  }
+  return {found.begin(), found.end()};
+}
+
+NavigationGraph navigation_graph(const VisualMemory& memory, Executor& executor) {
+  const std::span<const ViewId> views = memory.views();
+  const std::span<const Link> links = memory.links();
+  std::vector<Passage> passages(links.size());
+  constexpr std::size_t links_per_chunk = 64;
+  executor.for_chunks(
+      links.size(), links_per_chunk, [&](std::size_t begin, std::size_t end, std::size_t) {
+        for (std::size_t i = begin; i < end; ++i) {
+          Passage& passage = passages[i];
+          passage = {links[i].a, links[i].b, 0.0, std::nullopt};
+          const auto reading = read_phases(homing_view(memory.signature(links[i].a)),
+                                           homing_view(memory.signature(links[i].b)));
+          if (!reading) continue;
+          passage.a_from_b = motion_of(*reading);
+          if (passage.a_from_b) passage.length = reading->length;
+        }
+      });
+  std::vector<Passage> read = passages;
+  complete_lengths(read);
+  const NavigationGraph graph({views.begin(), views.end()}, std::move(read));
+  for (Passage& passage : passages) {
+    if (passage.a_from_b && !is_supported(graph, passage)) {
+      passage = {passage.a, passage.b, 0.0, std::nullopt};
+    }
+  }
+  complete_lengths(passages);
+  return {{views.begin(), views.end()}, std::move(passages)};
+}
+
+NavigationGraph navigation_graph(const TopologicalMap& map, double least_weight) {
+  validate(map);
+  std::vector<ViewId> views;
+  for (const MapNode& node : map.nodes) views.push_back(node.view);
+  std::vector<Passage> passages;
+  for (const MapEdge& edge : map.edges) {
+    if (edge.weight < least_weight) continue;
+    const MapNode& a = *std::ranges::lower_bound(map.nodes, edge.a, {}, &MapNode::view);
+    const MapNode& b = *std::ranges::lower_bound(map.nodes, edge.b, {}, &MapNode::view);
+    if (a.part != b.part) continue;
+    const Pose2 a_from_b = inverse(a.pose) * b.pose;
+    passages.push_back({edge.a, edge.b, std::hypot(a_from_b.x_m, a_from_b.y_m), a_from_b});
+  }
+  complete_lengths(passages);
+  return {std::move(views), std::move(passages)};
+}
+
+NavigationGraph navigation_graph(const Lattice& lattice, double least_weight) {
+  std::vector<ViewId> views;
+  for (const LatticeNode& node : lattice.nodes) views.push_back(node.view);
+  std::vector<Passage> passages;
+  for (const LatticeSpring& spring : lattice.springs) {
+    const LatticeNode& a = lattice.nodes.at(spring.a);
+    const LatticeNode& b = lattice.nodes.at(spring.b);
+    if (spring.weight < least_weight || a.part != b.part) continue;
+    const Pose2 arranged = inverse(a.pose) * b.pose;
+    const double length = std::hypot(arranged.x_m, arranged.y_m);
+    // Without phases the arrangement knows no headings, and so no direction in the frame of a view.
+    std::optional<Pose2> a_from_b;
+    if (spring.phases) a_from_b = motion_of(*spring.phases);
+    if (a_from_b && spring.phases->length > 0.0) {
+      // Lengths of one unit within the graph: that of the arrangement.
+      a_from_b->x_m *= length / spring.phases->length;
+      a_from_b->y_m *= length / spring.phases->length;
+    }
+    passages.push_back({a.view, b.view, length, a_from_b});
+  }
+  complete_lengths(passages);
+  return {std::move(views), std::move(passages)};
+}
+
+}  // namespace panonav

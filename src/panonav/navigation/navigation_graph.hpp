@@ -1,0 +1,86 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "panonav/core/executor.hpp"
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/mapping/lattice.hpp"
+#include "panonav/mapping/topological_map.hpp"
+#include "panonav/memory/visual_memory.hpp"
+
+namespace panonav {
+
+/// Two reference views between which a robot can move, both ways.
+struct Passage {
+  ViewId a;
+  ViewId b;
+  /// What the way costs, > 0; in whatever unit the graph has.
+  double length = 1.0;
+  /// How b lies to a, in the graph's unit. Empty: nothing tells. At the same place, x and y are 0:
+  /// no direction is meant.
+  std::optional<Pose2> a_from_b;
+  friend bool operator==(const Passage&, const Passage&) = default;
+};
+
+/// The reference views and the passages between them. Nodes are numbers 0 .. size() - 1 in the
+/// order of their views. Holds no signatures, about 100 bytes a passage. Immutable.
+class NavigationGraph {
+ public:
+  /// `views` ascend. Of several passages between two views the first counts. Throws ContractError
+  /// on a passage of a view that is not there or to itself, or numbers that are not finite or out
+  /// of range.
+  NavigationGraph(std::vector<ViewId> views, std::vector<Passage> passages);
+
+  /// A passage as seen from one of its ends.
+  struct Exit {
+    std::size_t node = 0;     ///< where it leads
+    std::size_t passage = 0;  ///< its number
+  };
+  [[nodiscard]] std::size_t size() const noexcept { return views_.size(); }
+  [[nodiscard]] std::span<const ViewId> views() const noexcept { return views_; }
+  [[nodiscard]] ViewId view(std::size_t node) const { return views_.at(node); }
+  /// Empty when there is no such view.
+  [[nodiscard]] std::optional<std::size_t> node_of(ViewId view) const;
+  [[nodiscard]] std::span<const Passage> passages() const noexcept { return passages_; }
+  /// Ascending by node.
+  [[nodiscard]] std::span<const Exit> exits(std::size_t node) const {
+    return std::span(exits_).subspan(begins_[node], begins_[node + 1] - begins_[node]);
+  }
+  /// How the far end of a passage lies to `node`, one of its ends: node_from_other.
+  [[nodiscard]] std::optional<Pose2> motion_from(std::size_t node, std::size_t passage) const;
+
+ private:
+  std::vector<ViewId> views_;
+  std::vector<Passage> passages_;
+  std::vector<std::size_t> begins_;
+  std::vector<Exit> exits_;
+};
+
+/// The nodes that at most `links` passages lie away from one of `from`, these included; ascending.
+[[nodiscard]] std::vector<std::size_t> nodes_around(const NavigationGraph& graph,
+                                                    std::span<const std::size_t> from, int links);
+
+/// A passage for each link of the memory, read from the phases of its two views by their home
+/// vectors [M04 section 3.5]: no position is looked at. Lengths are in units of R, the typical
+/// distance of the things around, and at least a tenth of their median. Where the answers of both
+/// views differ by more than 45 degrees, or not more than half of the triangles with third views
+/// close to that, as `arrange` asks, nothing is told: the passage counts as three times the median
+/// length. Cost: two home vectors a link, about a millisecond.
+[[nodiscard]] NavigationGraph navigation_graph(const VisualMemory& memory, Executor& executor);
+
+/// A passage for each edge of a map within one part whose weight is at least `least_weight`: what
+/// lies below contradicts the rest of the map. Motions and lengths follow from the poses. Throws
+/// ContractError as `validate`.
+[[nodiscard]] NavigationGraph navigation_graph(const TopologicalMap& map,
+                                               double least_weight = 0.1);
+
+/// A passage for each spring that kept `least_weight` of itself. Lengths follow from the
+/// arrangement, directions and turns from the phases of its two views where these tell them: so the
+/// distortion of the arrangement bends no direction.
+[[nodiscard]] NavigationGraph navigation_graph(const Lattice& lattice, double least_weight = 0.1);
+
+}  // namespace panonav

@@ -1,0 +1,387 @@
+#include "panonav/navigation/navigator.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/homing/fourier_homing.hpp"
+#include "panonav/navigation/obstacle.hpp"
+#include "panonav/signature/compass.hpp"
+
+namespace panonav {
+
+namespace {
+
+// A vector of less confidence is as likely as not but the error of reading it.
+constexpr double least_confidence = 0.5;
+// The next reference as the robot sees it now counts where it does not contradict the field.
+constexpr double most_correction_rad = std::numbers::pi / 3.0;
+// How a robot that is obstructed tries to get past before the way counts as blocked.
+constexpr std::array<double, 5> detours_rad{0.0, 0.7, -0.7, 1.3, -1.3};
+// A step that is turned aside by more says nothing about the passage ahead.
+constexpr double most_aside_rad = 1.0;
+// So often the bar of what is closed is made twice as wide at most.
+constexpr int most_widenings = 6;
+
+// Its multiples cover the circle evenly, however many there are.
+constexpr double golden_angle_rad = 2.39996322972865332;
+// A step is short, so there is no need to search far displacements.
+constexpr FourierHomingOptions short_way{.displacement_search = false};
+
+}  // namespace
+
+struct Navigator::Seen {
+  const FourierSignature& signature;
+  PackedSignature packed;
+  HomingView view;
+};
+
+Navigator::Navigator(const ViewSource& source, AreaPlanner planner, const NavigatorOptions& options)
+    : source_(&source),
+      planner_(std::move(planner)),
+      options_(options),
+      // The next place and what is looked at there are at hand on both sides of a border.
+      views_(source, options.near_links + 1) {
+  validate(options_);
+  require(planner_.graph().size() > 0, "views of the graph", 0.0, ">= 1");
+  scale_ = learn_place_scale(source, planner_.graph());
+}
+
+void Navigator::set_goal(ViewId goal) {
+  if (planner_.closed() > 0) planner_.open_all();
+  planner_.set_goal(goal);
+  goal_ = planner_.graph().node_of(goal);
+  arrival_ = learn_arrival_scale(*source_, planner_.graph(), goal);
+  goal_view_ = homing_view(source_->load({&goal, 1}).signature(goal));
+  homing_.reset();
+  last_view_.reset();
+  commanded_rad_.reset();
+  elsewhere_.reset();
+  aimed_for_.reset();
+  tries_.clear();
+  visited_.clear();
+  suspects_.clear();
+  obstructed_ = false;
+  looks_in_vain_ = closings_in_vain_ = 0;
+  state_ = NavigationState::moving;
+  looks_ = unknown_looks_ = elsewhere_looks_ = obstruction_ = attempts_ = 0;
+  plan_fields();
+}
+
+void Navigator::forget_place() {
+  node_.reset();
+  homing_.reset();
+  last_view_.reset();
+  commanded_rad_.reset();
+}
+
+// The field of the loaded area, and progress, start anew.
+void Navigator::plan_fields() {
+  if (views_.area()) field_ = planner_.field(*views_.area());
+  least_way_ = std::numeric_limits<double>::infinity();
+}
+
+const Guide& Navigator::guide() const {
+  return field_.at(planner_.areas().place_of[*node_]);
+}
+
+void Navigator::enter(std::size_t node, NavigationDecision& decision) {
+  node_ = node;
+  const std::size_t area = planner_.areas().area_of[node];
+  if (views_.area() == area) return;
+  views_.enter(planner_.graph(), planner_.areas(), area);
+  field_ = planner_.field(area);
+  decision.events.push_back(NavigationEvent::entered_area);
+}
+
+void Navigator::relocalise(const Seen& seen, NavigationDecision& decision) {
+  const auto found =
+      search_everywhere(*source_, planner_.graph(), planner_.areas(), seen.signature);
+  decision.events.push_back(NavigationEvent::relocalised);
+  if (!found) return;
+  // A place that does not look like it either is no reason to leave the one that was expected.
+  if (node_ && found->difference > scale_.limit()) return;
+  if (node_) decision.events.push_back(NavigationEvent::kidnapped);
+  decision.difference = found->difference;
+  homing_.reset();
+  enter(found->node, decision);
+}
+
+// Where the robot is: near where it was, unless several looks say otherwise.
+void Navigator::locate(const Seen& seen, const RobotReport& report, NavigationDecision& decision) {
+  const NavigationGraph& graph = planner_.graph();
+  if (report.estimate) {
+    if (const auto estimated = graph.node_of(*report.estimate)) enter(*estimated, decision);
+  }
+  if (!node_) {
+    relocalise(seen, decision);
+  } else {
+    const std::size_t from = *node_;
+    const auto around = nodes_around(graph, {&from, 1}, options_.near_links);
+    const auto here = views_.nearest(graph, around, seen.packed, seen.view);
+    const auto anywhere = views_.nearest(graph, seen.packed, seen.view);
+    const bool elsewhere = here && anywhere && anywhere->dissimilarity < here->dissimilarity &&
+                           anywhere->difference <= scale_.limit() &&
+                           !std::ranges::binary_search(around, anywhere->node);
+    if (elsewhere) {
+      // The looks must agree on the place, too.
+      const bool again =
+          elsewhere_ &&
+          std::ranges::binary_search(nodes_around(graph, {&*elsewhere_, 1}, options_.near_links),
+                                     anywhere->node);
+      elsewhere_looks_ = again ? elsewhere_looks_ + 1 : 1;
+      elsewhere_ = anywhere->node;
+    } else {
+      elsewhere_looks_ = 0;
+      elsewhere_.reset();
+    }
+    const bool accepted = elsewhere_looks_ >= options_.agreeing_looks;
+    const auto& found = accepted ? anywhere : here;
+    if (found) {
+      decision.difference = found->difference;
+      enter(found->node, decision);
+    }
+    if (accepted) {
+      decision.events.push_back(NavigationEvent::kidnapped);
+      elsewhere_looks_ = 0;
+      elsewhere_.reset();
+      homing_.reset();
+    }
+  }
+  if (decision.difference <= scale_.limit()) {
+    unknown_looks_ = 0;
+    return;
+  }
+  decision.events.push_back(NavigationEvent::unknown_place);
+  ++unknown_looks_;
+  if (unknown_looks_ % options_.agreeing_looks == 0) relocalise(seen, decision);
+  if (decision.difference <= scale_.limit()) {
+    unknown_looks_ = 0;
+  } else if (unknown_looks_ >= options_.lost_patience) {
+    state_ = NavigationState::lost;
+  }
+}
+
+// Closes a passage that was tried in vain, and all that cross a bar half way along it where
+// something stood in the way. The bar is twice as wide each time that closing brought the robot
+// nowhere new: so a wide thing is soon closed as a whole, and a narrow one leaves its sides open.
+void Navigator::close_way(std::size_t passage, NavigationDecision& decision) {
+  const NavigationGraph& graph = planner_.graph();
+  const Tries tried = tries_.at(passage);
+  std::vector<std::size_t> shut{passage};
+  const auto motion = graph.motion_from(tried.node, passage);
+  const bool is_wide = tried.obstructed > 1 || closings_in_vain_ > 0;
+  if (is_wide && motion && (motion->x_m != 0.0 || motion->y_m != 0.0)) {
+    const double half = 0.5 * std::hypot(motion->x_m, motion->y_m);
+    const auto across = passages_across(graph,
+                                        {tried.node, std::atan2(motion->y_m, motion->x_m), half,
+                                         std::ldexp(half, closings_in_vain_)},
+                                        2 + closings_in_vain_);
+    shut.insert(shut.end(), across.begin(), across.end());
+  }
+  // What was closed before and is no better now is closed as a whole.
+  if (suspects_.contains(passage)) shut.insert(shut.end(), suspects_.begin(), suspects_.end());
+  planner_.close(shut);
+  decision.events.push_back(NavigationEvent::closed);
+  obstruction_ = looks_in_vain_ = 0;
+  closings_in_vain_ = std::min(closings_in_vain_ + 1, most_widenings);
+  tries_.clear();
+  plan_fields();
+}
+
+// Opens what is closed, so often; then the run ends.
+void Navigator::try_again(NavigationDecision& decision, NavigationState otherwise) {
+  ++attempts_;
+  if (attempts_ >= options_.attempts) {
+    state_ = otherwise;
+    return;
+  }
+  homing_.reset();
+  if (planner_.closed() == 0) return;
+  for (std::size_t passage = 0; passage < planner_.graph().passages().size(); ++passage) {
+    if (planner_.is_closed(passage)) suspects_.insert(passage);
+  }
+  planner_.open_all();
+  tries_.clear();
+  visited_.clear();
+  looks_in_vain_ = closings_in_vain_ = 0;
+  decision.events.push_back(NavigationEvent::reopened);
+  plan_fields();
+}
+
+// What became of the step before, and whether the robot comes nearer to the goal.
+void Navigator::count_try() {
+  if (visited_.insert(*node_).second) closings_in_vain_ = 0;
+  const auto tried = aimed_for_ ? tries_.find(*aimed_for_) : tries_.end();
+  if (tried != tries_.end()) tried->second.obstructed += static_cast<int>(obstructed_);
+  ++looks_in_vain_;
+  if (guide().way < least_way_) {
+    // The first look of a plan is no progress.
+    if (std::isfinite(least_way_)) {
+      tries_.clear();
+      looks_in_vain_ = 0;
+    }
+    least_way_ = guide().way;
+  }
+}
+
+void Navigator::notice_obstacles(const Seen& seen, const RobotReport& report,
+                                 NavigationDecision& decision) {
+  obstructed_ = report.obstacle;
+  heading_for_rad_.reset();
+  if (commanded_rad_ && last_view_) {
+    const HomeVector back = home_vector_unchecked(*last_view_, seen.view, short_way);
+    // The robot stood.
+    obstructed_ |= back.confidence < least_confidence &&
+                   image_difference(*last_view_, seen.view) < 0.5 * scale_.neighbours;
+    heading_for_rad_ = wrap_angle(*commanded_rad_ + back.heading_rad);
+  }
+  if (obstructed_) {
+    obstruction_ += 2;
+    decision.events.push_back(NavigationEvent::obstructed);
+  } else if (obstruction_ > 0) {
+    --obstruction_;
+  }
+  if (homing_) {
+    if (obstruction_ < 2 * options_.agreeing_looks) return;
+    obstruction_ = 0;
+    try_again(decision, NavigationState::blocked);
+    return;
+  }
+  count_try();
+  if (tries_.empty() || !guide().reachable()) return;
+  const auto most_obstructed =
+      std::ranges::max_element(tries_, {}, [](const auto& t) { return t.second.obstructed; });
+  if (most_obstructed->second.obstructed >= options_.agreeing_looks) {
+    close_way(most_obstructed->first, decision);
+  } else if (looks_in_vain_ > options_.passage_patience) {
+    close_way(
+        std::ranges::max_element(tries_, {}, [](const auto& t) { return t.second.looks; })->first,
+        decision);
+  }
+}
+
+// By how much the direction is turned: to get past what is in the way, or, where a direction turned
+// out to lead nowhere, to search around.
+double Navigator::detour_rad() const {
+  if (obstruction_ >= 2) {
+    return detours_rad[static_cast<std::size_t>(obstruction_ / 2) % detours_rad.size()];
+  }
+  const int searching = looks_in_vain_ - (options_.passage_patience + 1) / 2;
+  return searching <= 0 ? 0.0 : wrap_angle(golden_angle_rad * searching);
+}
+
+void Navigator::go_home(const Seen& seen, NavigationDecision& decision) {
+  if (!homing_) {
+    HomingPursuitOptions homing = options_.homing;
+    homing.longest_step_m = std::min(homing.longest_step_m, options_.step_m);
+    homing.arrived_difference = arrival_.difference;
+    // Well inside: the vector has an error of its own.
+    homing.stop_length = 0.5 * arrival_.length;
+    homing_.emplace(*goal_view_, homing);
+    decision.events.push_back(NavigationEvent::homing);
+  }
+  const PursuitDecision step = homing_->decide(seen.view);
+  decision.homing = true;
+  decision.difference = step.difference;
+  decision.next = planner_.graph().view(*goal_);
+  decision.direction_rad = step.turn_rad;
+  decision.advance_m = step.advance_m;
+  if (step.state == PursuitState::moving) return;
+  // Homing may stop for other reasons than a short vector; the place decides.
+  if (step.difference <= arrival_.difference && step.vector.length() <= arrival_.length) {
+    state_ = NavigationState::arrived;
+    return;
+  }
+  decision.events.push_back(NavigationEvent::homing_failed);
+  homing_.reset();
+  try_again(decision, NavigationState::lost);
+}
+
+void Navigator::follow(const Seen& seen, NavigationDecision& decision) {
+  const NavigationGraph& graph = planner_.graph();
+  const Guide& ahead = guide();
+  decision.next = graph.view(ahead.next);
+  // The direction of the reference in the frame of the robot, which is turned against it.
+  std::optional<double> direction;
+  const auto turned = compass(seen.packed, views_.memory().packed(graph.view(*node_)));
+  if (ahead.direction_rad && turned) {
+    direction = wrap_angle(*ahead.direction_rad - turned->heading_rad);
+  }
+  if (views_.holds(*decision.next)) {
+    const HomeVector next = home_vector(views_.view(*decision.next), seen.view);
+    if (next.confidence > least_confidence) {
+      const double seen_rad = next.direction_rad();
+      const std::optional<double> known = direction || obstructed_ ? direction : heading_for_rad_;
+      const double off = known ? angle_difference(seen_rad, *known) : 0.0;
+      if (std::abs(off) < most_correction_rad) direction = seen_rad - 0.5 * off;
+    }
+  }
+  // Where no view tells the direction, the robot goes on as it went.
+  if (!direction) direction = obstructed_ ? 0.0 : heading_for_rad_.value_or(0.0);
+  double detour = detour_rad();
+  if (obstructed_ && unknown_looks_ > 0 && heading_for_rad_) {
+    // What hides the place is left behind to see where this is.
+    direction = heading_for_rad_;
+    detour = std::numbers::pi;
+  }
+  decision.direction_rad = wrap_angle(*direction + detour);
+  decision.advance_m = options_.step_m;
+  commanded_rad_ = decision.direction_rad;
+  Tries& tries = tries_.try_emplace(ahead.passage, Tries{*node_, 0, 0}).first->second;
+  ++tries.looks;
+  if (std::abs(detour) < most_aside_rad) aimed_for_ = ahead.passage;
+}
+
+NavigationDecision Navigator::look(const FourierSignature& view, const RobotReport& report) {
+  if (!goal_) throw ContractError("goal", "none", "one that was set");
+  NavigationDecision decision;
+  decision.look = ++looks_;
+  decision.state = state_;
+  if (state_ != NavigationState::moving) {
+    if (node_) decision.nearest = planner_.graph().view(*node_);
+    return decision;
+  }
+  if (!views_.area()) {
+    // The first look: any area has the full scale that all have.
+    views_.enter(planner_.graph(), planner_.areas(), 0);
+    field_ = planner_.field(0);
+  }
+  const Seen seen{view, pack(view, views_.memory().full_scale()), homing_view(view)};
+  locate(seen, report, decision);
+  if (state_ == NavigationState::moving) notice_obstacles(seen, report, decision);
+  if (state_ == NavigationState::moving && !guide().reachable()) {
+    try_again(decision, NavigationState::unreachable);
+    // Nothing was closed that could be opened.
+    if (!guide().reachable()) state_ = NavigationState::unreachable;
+  }
+  commanded_rad_.reset();
+  aimed_for_.reset();
+  // At an unknown place the robot waits for the looks to agree; then it goes by the best guess.
+  const bool waits = unknown_looks_ > 0 && unknown_looks_ < options_.agreeing_looks && !obstructed_;
+  if (state_ == NavigationState::moving && !waits) {
+    if (*node_ == *goal_) {
+      go_home(seen, decision);
+    } else {
+      homing_.reset();
+      follow(seen, decision);
+    }
+  }
+  if (state_ == NavigationState::moving && looks_ >= options_.most_looks) {
+    state_ = NavigationState::blocked;
+  }
+  last_view_ = seen.view;
+  decision.state = state_;
+  if (state_ != NavigationState::moving) decision.advance_m = 0.0;
+  decision.nearest = planner_.graph().view(*node_);
+  decision.area = *views_.area();
+  decision.way = guide().way;
+  return decision;
+}
+
+}  // namespace panonav

@@ -1,0 +1,171 @@
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "panonav/core/options.hpp"
+#include "panonav/homing/homing_pursuit.hpp"
+#include "panonav/memory/view_source.hpp"
+#include "panonav/navigation/area_planner.hpp"
+#include "panonav/navigation/area_views.hpp"
+#include "panonav/navigation/place_scale.hpp"
+
+namespace panonav {
+
+struct NavigatorOptions {
+  double step_m = 0.25;  ///< longest way between two looks; about half the references' spacing
+  int near_links = 2;    ///< the next place is looked for within so many passages of the last one
+  /// The last stretch. Its difference and length of arrival come from the references around the
+  /// goal, its longest step is `step_m` at most.
+  HomingPursuitOptions homing;
+  int agreeing_looks = 3;  ///< looks that must agree before another place or a block is believed
+  int lost_patience = 12;  ///< looks without a known place after which the robot is lost
+  /// Looks without coming nearer to the goal; from half of them on the robot searches around. Then
+  /// the passage that was tried most counts as blocked.
+  int passage_patience = 8;
+  int attempts = 3;       ///< times that closed passages, or the last stretch, are tried
+  int most_looks = 5000;  ///< after which a run ends as blocked
+};
+void visit_options(NavigatorOptions& options, OptionVisitor& visitor);
+
+enum class NavigationState {
+  moving,
+  arrived,      ///< the views say that this is the goal
+  blocked,      ///< the robot cannot get on, though there is a way in the memory
+  lost,         ///< what the robot sees is nowhere in the memory, or not where it should be
+  unreachable,  ///< no way leads to the goal, or all of them turned out to be blocked
+};
+/// "moving", "arrived", "blocked", "lost", "unreachable".
+[[nodiscard]] std::string_view name_of(NavigationState state);
+
+/// What made a decision differ from going on.
+enum class NavigationEvent {
+  relocalised,    ///< the place was looked for in the whole memory
+  kidnapped,      ///< another place than the expected one is accepted
+  entered_area,   ///< another area was loaded
+  unknown_place,  ///< the reference does not look like what is seen
+  obstructed,     ///< the robot could not make its last step
+  closed,         ///< passages were closed and the way planned anew
+  reopened,       ///< closed passages are tried again
+  homing,         ///< the last stretch begins
+  homing_failed,  ///< the last stretch ended at another place
+};
+[[nodiscard]] std::string_view name_of(NavigationEvent event);
+
+/// What a robot tells besides its view.
+struct RobotReport {
+  /// Something stopped the robot before the last step was done.
+  bool obstacle = false;
+  /// Where another estimate, as Monte-Carlo localisation is, has the robot: the nearest reference.
+  std::optional<ViewId> estimate;
+};
+
+/// One decision with its reasons: the log entry of a look.
+struct NavigationDecision {
+  int look = 0;  ///< counts from 1
+  NavigationState state = NavigationState::moving;
+  double direction_rad = 0.0;     ///< in which to go, in the current robot frame
+  double advance_m = 0.0;         ///< how far; 0 unless moving
+  bool homing = false;            ///< the last stretch, by the home vector to the goal itself
+  std::optional<ViewId> nearest;  ///< the place
+  std::optional<ViewId> next;     ///< the reference ahead
+  std::size_t area = 0;           ///< that is loaded
+  double difference =
+      0.0;           ///< of what is seen from `nearest` (homing: the goal), `image_difference`
+  double way = 0.0;  ///< that is left along the passages, in the graph's unit
+  std::vector<NavigationEvent> events;
+};
+/// A line for a log.
+[[nodiscard]] std::string describe(const NavigationDecision& decision);
+
+/// Goes to a place over the memory by views alone [M04 section 3.5]: look, find the nearest
+/// reference, take its direction, move, look again; the last stretch by homing. As every look
+/// decides anew, neither a distorted map nor a step that leads elsewhere matters.
+///
+/// Holds the state of a run, and of the memory the views of one area only. Knows nothing of how the
+/// robot moves: `command_towards` (motion/velocity.hpp) does. Same calls, same bits. Cost of a look
+/// without a change of area: the search among the loaded views and three home vectors at most.
+class Navigator {
+ public:
+  /// The source must hold all views of the planner's graph and outlive *this. Throws OptionError,
+  /// ContractError when the graph is empty.
+  Navigator(const ViewSource& source, AreaPlanner planner, const NavigatorOptions& options = {});
+
+  /// A new run; where the robot is stays known, closed passages are opened. Throws ContractError
+  /// when the view is not in the graph.
+  void set_goal(ViewId goal);
+
+  /// The robot may be anywhere: the next look searches the whole memory.
+  void forget_place();
+
+  /// What to do after a look. After a decision that stops, further ones do too. Throws
+  /// ContractError without a goal, and on a signature of another shape than the memory's.
+  [[nodiscard]] NavigationDecision look(const FourierSignature& view,
+                                        const RobotReport& report = {});
+
+  [[nodiscard]] const AreaPlanner& planner() const noexcept { return planner_; }
+  [[nodiscard]] const PlaceScale& place_scale() const noexcept { return scale_; }
+  [[nodiscard]] const ArrivalScale& arrival_scale() const noexcept { return arrival_; }
+  /// Views in memory now.
+  [[nodiscard]] std::size_t loaded_views() const noexcept { return views_.size(); }
+
+ private:
+  struct Seen;
+  /// What became of the steps along a passage since the robot came nearer to the goal.
+  struct Tries {
+    std::size_t node = 0;  // from which it was tried first
+    int looks = 0;
+    int obstructed = 0;
+  };
+  void locate(const Seen& seen, const RobotReport& report, NavigationDecision& decision);
+  void relocalise(const Seen& seen, NavigationDecision& decision);
+  void enter(std::size_t node, NavigationDecision& decision);
+  void notice_obstacles(const Seen& seen, const RobotReport& report, NavigationDecision& decision);
+  void count_try();
+  void close_way(std::size_t passage, NavigationDecision& decision);
+  void try_again(NavigationDecision& decision, NavigationState otherwise);
+  [[nodiscard]] const Guide& guide() const;
+  void go_home(const Seen& seen, NavigationDecision& decision);
+  void follow(const Seen& seen, NavigationDecision& decision);
+  void plan_fields();
+  [[nodiscard]] double detour_rad() const;
+
+  const ViewSource* source_;
+  AreaPlanner planner_;
+  NavigatorOptions options_;
+  PlaceScale scale_;
+  ArrivalScale arrival_;
+  AreaViews views_;
+  std::vector<Guide> field_;  // of the loaded area
+
+  std::optional<std::size_t> goal_;  // node
+  std::optional<HomingView> goal_view_;
+  std::optional<HomingPursuit> homing_;
+  std::optional<std::size_t> node_;  // where the robot is
+  std::optional<HomingView> last_view_;
+  std::optional<double>
+      commanded_rad_;  // direction of the step before, in the frame of `last_view_`
+  std::optional<double> heading_for_rad_;  // the same in the current frame, unless it failed
+  NavigationState state_ = NavigationState::moving;
+  int looks_ = 0;
+  int unknown_looks_ = 0;
+  int elsewhere_looks_ = 0;
+  std::optional<std::size_t> elsewhere_;
+  bool obstructed_ = false;  // in the step before this look
+  int obstruction_ = 0;  // grows by 2 with each step that fails, falls by 1 with each that does not
+  int attempts_ = 0;
+  double least_way_ = 0.0;    // since the last plan
+  int looks_in_vain_ = 0;     // since the way became shorter or a passage was closed
+  int closings_in_vain_ = 0;  // since the robot came to a view where it had not been before
+  std::map<std::size_t, Tries> tries_;    // of passages, since the way became shorter
+  std::set<std::size_t> visited_;         // nodes, in this attempt
+  std::set<std::size_t> suspects_;        // passages that were closed in earlier attempts
+  std::optional<std::size_t> aimed_for_;  // passage of the step before, unless that led around
+};
+
+}  // namespace panonav

@@ -1,0 +1,89 @@
+#include "panonav/navigation/place_scale.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/median.hpp"
+#include "panonav/homing/fourier_homing.hpp"
+#include "panonav/mapping/view_pair.hpp"
+
+namespace panonav {
+
+namespace {
+
+using ViewPair = std::pair<ViewId, ViewId>;
+
+VisualMemory views_of(const ViewSource& source, const std::vector<ViewPair>& pairs) {
+  std::set<ViewId> wanted;
+  for (const auto& [a, b] : pairs) {
+    wanted.insert(a);
+    wanted.insert(b);
+  }
+  const std::vector<ViewId> views(wanted.begin(), wanted.end());
+  return source.load(views);
+}
+
+double median_difference(const ViewSource& source, const std::vector<ViewPair>& pairs) {
+  const VisualMemory memory = views_of(source, pairs);
+  std::vector<double> differences;
+  for (const auto& [a, b] : pairs) {
+    differences.push_back(
+        image_difference(homing_view(memory.signature(a)), homing_view(memory.signature(b))));
+  }
+  return upper_median(std::move(differences));
+}
+
+}  // namespace
+
+PlaceScale learn_place_scale(const ViewSource& source, const NavigationGraph& graph, int samples) {
+  require(samples >= 1, "samples", samples, ">= 1");
+  const auto most = static_cast<std::size_t>(samples);
+  PlaceScale scale;
+  std::vector<ViewPair> linked;
+  const std::size_t passages = graph.passages().size();
+  for (std::size_t i = 0; i < std::min(most, passages); ++i) {
+    const Passage& passage = graph.passages()[i * passages / std::min(most, passages)];
+    linked.emplace_back(passage.a, passage.b);
+  }
+  if (!linked.empty()) scale.neighbours = median_difference(source, linked);
+  // Views half of all views apart in their order: far from each other but for a few.
+  std::vector<ViewPair> strange;
+  const std::size_t half = graph.size() / 2;
+  for (std::size_t i = 0; i < std::min(most, half); ++i) {
+    const std::size_t first = i * half / std::min(most, half);
+    strange.emplace_back(graph.view(first), graph.view(first + half));
+  }
+  if (!strange.empty()) scale.strangers = median_difference(source, strange);
+  return scale;
+}
+
+ArrivalScale learn_arrival_scale(const ViewSource& source, const NavigationGraph& graph,
+                                 ViewId goal) {
+  const auto node = graph.node_of(goal);
+  require(node.has_value(), "goal", static_cast<double>(goal.value), "a view of the graph");
+  std::vector<ViewPair> pairs;
+  for (const auto& exit : graph.exits(*node)) pairs.emplace_back(goal, graph.view(exit.node));
+  ArrivalScale scale;
+  if (pairs.empty()) return scale;
+  const VisualMemory memory = views_of(source, pairs);
+  const HomingView home = homing_view(memory.signature(goal));
+  std::vector<std::pair<double, double>> nearest;  // length, difference
+  for (const auto& [unused, neighbour] : pairs) {
+    const HomingView view = homing_view(memory.signature(neighbour));
+    const auto reading = read_phases(home, view);
+    if (reading && reading->points) {
+      nearest.emplace_back(reading->length, image_difference(home, view));
+    }
+  }
+  if (nearest.empty()) return scale;
+  std::ranges::sort(nearest);
+  nearest.resize(std::min<std::size_t>(nearest.size(), 3));
+  const auto [length, difference] = nearest[nearest.size() / 2];
+  return {0.5 * difference, 0.5 * length, true};
+}
+
+}  // namespace panonav

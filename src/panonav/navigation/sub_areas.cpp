@@ -1,0 +1,239 @@
+#include "panonav/navigation/sub_areas.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numeric>
+#include <span>
+#include <utility>
+
+namespace panonav {
+
+void visit_options(SubAreaOptions& options, OptionVisitor& visitor) {
+  visitor.visit(
+      {.name = "views_per_area", .help = "size of an area aimed at", .low = 2, .high = 1e6},
+      options.views_per_area);
+  visitor.visit({.name = "iterations",
+                 .help = "steps of relaxation by which each cut is sought",
+                 .low = 0,
+                 .high = 1e5},
+                options.iterations);
+}
+
+namespace {
+
+constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
+constexpr double least_side = 1.0 / 3.0;
+
+/// Some nodes of a graph with the passages among them, numbered anew.
+struct Part {
+  std::vector<std::size_t> nodes;  // ascending
+  std::vector<std::size_t> begins, neighbours;
+
+  [[nodiscard]] std::size_t size() const { return nodes.size(); }
+  [[nodiscard]] std::span<const std::size_t> of(std::size_t i) const {
+    return std::span(neighbours).subspan(begins[i], begins[i + 1] - begins[i]);
+  }
+};
+
+Part part_of(const NavigationGraph& graph, std::vector<std::size_t> nodes,
+             std::vector<std::size_t>& number) {
+  Part part;
+  part.nodes = std::move(nodes);
+  for (std::size_t i = 0; i < part.size(); ++i) number[part.nodes[i]] = i;
+  part.begins.push_back(0);
+  for (const std::size_t node : part.nodes) {
+    for (const NavigationGraph::Exit& exit : graph.exits(node)) {
+      if (number[exit.node] != none) part.neighbours.push_back(number[exit.node]);
+    }
+    part.begins.push_back(part.neighbours.size());
+  }
+  for (const std::size_t node : part.nodes) number[node] = none;
+  return part;
+}
+
+// Passages from `from` to every node; `none` where there is no way over nodes with side `side`.
+std::vector<std::size_t> steps_from(const Part& part, std::size_t from,
+                                    std::span<const std::uint8_t> sides, std::uint8_t side) {
+  std::vector<std::size_t> steps(part.size(), none);
+  std::vector<std::size_t> queue{from};
+  steps[from] = 0;
+  for (std::size_t head = 0; head < queue.size(); ++head) {
+    for (const std::size_t next : part.of(queue[head])) {
+      if (steps[next] != none || sides[next] != side) continue;
+      steps[next] = steps[queue[head]] + 1;
+      queue.push_back(next);
+    }
+  }
+  return steps;
+}
+
+std::size_t farthest(std::span<const std::size_t> steps) {
+  std::size_t best = 0;
+  for (std::size_t i = 1; i < steps.size(); ++i) {
+    if (steps[i] != none && (steps[best] == none || steps[i] > steps[best])) best = i;
+  }
+  return best;
+}
+
+// Approximates the second eigenvector of the random walk on a connected part. The walk is lazy, so
+// that its eigenvalues are not negative; the constant, its first eigenvector, is taken out.
+std::vector<double> second_eigenvector(const Part& part, int iterations) {
+  const std::vector<std::uint8_t> everywhere(part.size(), 0);
+  const auto outermost = farthest(steps_from(part, 0, everywhere, 0));
+  const auto steps = steps_from(part, outermost, everywhere, 0);
+  std::vector<double> values(steps.begin(), steps.end());
+  std::vector<double> relaxed(values.size());
+  for (int i = 0; i <= iterations; ++i) {
+    double sum = 0.0;
+    double weight = 0.0;
+    for (std::size_t n = 0; n < part.size(); ++n) {
+      const auto degree = static_cast<double>(part.of(n).size());
+      sum += degree * values[n];
+      weight += degree;
+    }
+    double largest = 0.0;
+    for (double& value : values) {
+      value -= sum / weight;
+      largest = std::max(largest, std::abs(value));
+    }
+    if (i == iterations || largest == 0.0) break;
+    for (std::size_t n = 0; n < part.size(); ++n) {
+      double around = 0.0;
+      for (const std::size_t next : part.of(n)) around += values[next];
+      relaxed[n] = 0.5 * (values[n] + around / static_cast<double>(part.of(n).size())) / largest;
+    }
+    values.swap(relaxed);
+  }
+  return values;
+}
+
+// 1 for the nodes up to the cut of least normalised cut along the order of `values`.
+std::vector<std::uint8_t> best_cut(const Part& part, std::span<const double> values) {
+  std::vector<std::size_t> order(part.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::ranges::stable_sort(order, {}, [&](std::size_t n) { return values[n]; });
+  std::vector<std::uint8_t> sides(part.size(), 0);
+  const auto total = static_cast<double>(part.neighbours.size());
+  const auto low =
+      static_cast<std::size_t>(std::ceil(least_side * static_cast<double>(part.size())));
+  double cut = 0.0;
+  double volume = 0.0;
+  double best = std::numeric_limits<double>::infinity();
+  std::size_t best_count = part.size() / 2;
+  for (std::size_t count = 1; count < part.size(); ++count) {
+    const std::size_t node = order[count - 1];
+    sides[node] = 1;
+    volume += static_cast<double>(part.of(node).size());
+    for (const std::size_t next : part.of(node)) cut += sides[next] != 0 ? -1.0 : 1.0;
+    if (count < low || part.size() - count < low) continue;
+    const double normalised = cut / volume + cut / (total - volume);
+    if (normalised < best) {
+      best = normalised;
+      best_count = count;
+    }
+  }
+  std::ranges::fill(sides, std::uint8_t{0});
+  for (std::size_t i = 0; i < best_count; ++i) sides[order[i]] = 1;
+  return sides;
+}
+
+// All nodes of a side but those of its largest piece change over.
+void give_away_fragments(const Part& part, std::uint8_t side, std::vector<std::uint8_t>& sides) {
+  std::vector<std::size_t> piece(part.size(), none);
+  std::vector<std::size_t> sizes;
+  for (std::size_t n = 0; n < part.size(); ++n) {
+    if (sides[n] != side || piece[n] != none) continue;
+    const auto steps = steps_from(part, n, sides, side);
+    sizes.push_back(0);
+    for (std::size_t m = 0; m < part.size(); ++m) {
+      if (steps[m] == none) continue;
+      piece[m] = sizes.size() - 1;
+      ++sizes.back();
+    }
+  }
+  if (sizes.size() < 2) return;
+  const auto largest = static_cast<std::size_t>(std::ranges::max_element(sizes) - sizes.begin());
+  for (std::size_t n = 0; n < part.size(); ++n) {
+    if (piece[n] == none || piece[n] == largest) continue;
+    sides[n] = static_cast<std::uint8_t>(1 - side);
+  }
+}
+
+// Connected pieces of some nodes, each ascending, in the order of their first nodes.
+std::vector<std::vector<std::size_t>> pieces(const NavigationGraph& graph,
+                                             const std::vector<std::size_t>& nodes,
+                                             std::vector<std::size_t>& number) {
+  const Part part = part_of(graph, nodes, number);
+  std::vector<std::uint8_t> taken(part.size(), 0);
+  std::vector<std::vector<std::size_t>> result;
+  for (std::size_t n = 0; n < part.size(); ++n) {
+    if (taken[n] != 0) continue;
+    const auto steps = steps_from(part, n, taken, 0);
+    result.emplace_back();
+    for (std::size_t m = 0; m < part.size(); ++m) {
+      if (steps[m] == none) continue;
+      taken[m] = 1;
+      result.back().push_back(part.nodes[m]);
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+SubAreas undivided(const NavigationGraph& graph) {
+  SubAreas areas;
+  areas.area_of.assign(graph.size(), 0);
+  areas.place_of.resize(graph.size());
+  std::iota(areas.place_of.begin(), areas.place_of.end(), 0U);
+  areas.nodes.push_back(areas.place_of);
+  return areas;
+}
+
+SubAreas divide(const NavigationGraph& graph, const SubAreaOptions& options) {
+  validate(options);
+  SubAreas areas;
+  areas.area_of.resize(graph.size());
+  areas.place_of.resize(graph.size());
+  std::vector<std::size_t> number(graph.size(), none);
+  std::vector<std::size_t> all(graph.size());
+  std::iota(all.begin(), all.end(), 0U);
+  std::vector<std::vector<std::size_t>> open = pieces(graph, all, number);
+  // Halving stops where halves would be farther from the size aimed at than the whole, as a ratio.
+  const auto largest = static_cast<std::size_t>(std::sqrt(2.0) * options.views_per_area);
+  while (!open.empty()) {
+    std::vector<std::size_t> nodes = std::move(open.back());
+    open.pop_back();
+    if (nodes.size() <= std::max<std::size_t>(largest, 2)) {
+      areas.nodes.push_back(std::move(nodes));
+      continue;
+    }
+    const Part part = part_of(graph, std::move(nodes), number);
+    std::vector<std::uint8_t> sides = best_cut(part, second_eigenvector(part, options.iterations));
+    give_away_fragments(part, 1, sides);
+    give_away_fragments(part, 0, sides);
+    std::vector<std::size_t> half[2];
+    for (std::size_t n = 0; n < part.size(); ++n) half[sides[n]].push_back(part.nodes[n]);
+    for (const auto& side : half) {
+      for (auto& piece : pieces(graph, side, number)) open.push_back(std::move(piece));
+    }
+  }
+  std::ranges::sort(areas.nodes);
+  for (std::size_t a = 0; a < areas.nodes.size(); ++a) {
+    for (std::size_t place = 0; place < areas.nodes[a].size(); ++place) {
+      areas.area_of[areas.nodes[a][place]] = a;
+      areas.place_of[areas.nodes[a][place]] = place;
+    }
+  }
+  for (std::size_t p = 0; p < graph.passages().size(); ++p) {
+    const Passage& passage = graph.passages()[p];
+    if (areas.area_of[*graph.node_of(passage.a)] != areas.area_of[*graph.node_of(passage.b)]) {
+      areas.gates.push_back(p);
+    }
+  }
+  return areas;
+}
+
+}  // namespace panonav

@@ -1,0 +1,310 @@
+#include "panonav/navigation/navigator.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "navigation/walled_world.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/core/executor.hpp"
+#include "panonav/core/median.hpp"
+#include "support/sanitizers.hpp"
+
+namespace panonav {
+namespace {
+
+using test::RememberedWorld;
+using test::SimulatedRobot;
+using test::two_rooms;
+using test::WalledWorld;
+constexpr double pi = std::numbers::pi;
+constexpr double spacing_m = 0.3;
+constexpr Point2 high{8.0, 4.0};
+
+struct Drive {
+  NavigationDecision end;
+  double error_m = 0.0;
+  double travelled_m = 0.0;
+  std::vector<NavigationEvent> events;
+  std::size_t most_loaded = 0;
+
+  [[nodiscard]] bool had(NavigationEvent event) const {
+    return std::ranges::find(events, event) != events.end();
+  }
+};
+
+AreaPlanner phase_planner(const VisualMemory& memory, int views_per_area = 60) {
+  Executor executor(1);
+  return AreaPlanner(navigation_graph(memory, executor),
+                     {.areas = {.views_per_area = views_per_area}});
+}
+
+// Drives until the navigator stops. `kidnap_look`: then the robot is carried to `kidnap_to`.
+Drive drive(const WalledWorld& world, const RememberedWorld& remembered, Navigator& navigator,
+            ViewId goal, const Pose2& start, DriveKind kind, std::uint64_t seed, double light = 1.0,
+            int kidnap_look = 0, const Pose2& kidnap_to = {}) {
+  SimulatedRobot robot(world, start, kind, seed);
+  Random noise(seed, 9);
+  navigator.set_goal(goal);
+  navigator.forget_place();
+  Drive run;
+  RobotReport report;
+  for (int look = 1; look <= 600; ++look) {
+    if (look == kidnap_look) robot.carry_to(kidnap_to);
+    const auto decision = navigator.look(world.seen_from(robot.pose(), noise, light), report);
+    run.events.insert(run.events.end(), decision.events.begin(), decision.events.end());
+    run.most_loaded = std::max(run.most_loaded, navigator.loaded_views());
+    run.end = decision;
+    if (decision.state != NavigationState::moving) break;
+    report.obstacle = robot.go(decision.direction_rad, decision.advance_m);
+  }
+  run.error_m = distance(robot.pose().position(), remembered.pose_of(goal).position());
+  run.travelled_m = robot.travelled_m();
+  return run;
+}
+
+Pose2 free_pose(const WalledWorld& world, Random& random, double low_x = 0.0, double high_x = 8.0) {
+  for (;;) {
+    const Pose2 pose{random.uniform(low_x, high_x), random.uniform(0.0, high.y_m),
+                     random.uniform(-pi, pi)};
+    if (world.clearance_m(pose.position()) > 0.25) return pose;
+  }
+}
+
+TEST(Navigator, ArrivesFromAnywhereByPhasesAlone) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  int runs = 0;
+  int arrived = 0;
+  std::vector<double> ratios;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    const WalledWorld world = two_rooms(seed, seed % 2 == 0);
+    const RememberedWorld remembered(world, high, spacing_m, seed);
+    const MemoryViewSource source(remembered.memory);
+    Navigator navigator(source, phase_planner(remembered.memory));
+    EXPECT_TRUE(navigator.place_scale().neighbours < navigator.place_scale().strangers);
+    // What positions would say, for the shortest way.
+    TopologicalMap map;
+    for (const ViewId view : remembered.memory.views()) {
+      map.nodes.push_back({view, remembered.pose_of(view), 0});
+    }
+    for (const Link& link : remembered.memory.links()) {
+      map.edges.push_back({link.a, link.b, {}, link.kind, 1.0});
+    }
+    const NavigationGraph by_positions = navigation_graph(map);
+    Random random(seed, 3);
+    for (int i = 0; i < 15; ++i) {
+      const ViewId goal = remembered.memory.views()[random.index(remembered.memory.size())];
+      const Pose2 start = free_pose(world, random);
+      const auto kind = i % 2 == 0 ? DriveKind::holonomic : DriveKind::differential;
+      const Drive run = drive(world, remembered, navigator, goal, start, kind, random.next());
+      ++runs;
+      const bool right =
+          run.end.state == NavigationState::arrived && run.error_m <= 0.5 * spacing_m;
+      arrived += right;
+      const auto guides = direction_field(by_positions, goal);
+      const auto nearest = std::ranges::min_element(remembered.poses, {}, [&](const Pose2& p) {
+        return distance(p.position(), start.position());
+      });
+      const double shortest =
+          guides[static_cast<std::size_t>(nearest - remembered.poses.begin())].way;
+      if (right && shortest > 1.0) ratios.push_back(run.travelled_m / shortest);
+      EXPECT_LT(run.most_loaded, remembered.memory.size());
+    }
+  }
+  RecordProperty("arrived", arrived);
+  RecordProperty("median_length_over_shortest", std::to_string(upper_median(ratios)));
+  EXPECT_GE(arrived, runs * 95 / 100);
+  ASSERT_GT(ratios.size(), 20U);
+  EXPECT_LT(upper_median(ratios), 1.3);
+}
+
+// Some drives in one world; how many ended right.
+struct Outcome {
+  int runs = 0;
+  int arrived = 0;
+};
+
+constexpr double light_when_driving[] = {0.7, 1.3};
+
+TEST(Navigator, ArrivesInOtherLight) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  Outcome outcome;
+  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+    const WalledWorld world = two_rooms(seed, true);
+    const RememberedWorld remembered(world, high, spacing_m, seed);
+    const MemoryViewSource source(remembered.memory);
+    Navigator navigator(source, phase_planner(remembered.memory));
+    Random random(seed, 4);
+    for (int i = 0; i < 8; ++i) {
+      const ViewId goal = remembered.memory.views()[random.index(remembered.memory.size())];
+      const Drive run = drive(world, remembered, navigator, goal, free_pose(world, random),
+                              DriveKind::differential, random.next(), light_when_driving[i % 2]);
+      ++outcome.runs;
+      outcome.arrived +=
+          run.end.state == NavigationState::arrived && run.error_m <= 0.5 * spacing_m;
+    }
+  }
+  EXPECT_GE(outcome.arrived, outcome.runs * 9 / 10);
+}
+
+TEST(Navigator, AKidnappedRobotStillArrives) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  Outcome outcome;
+  int noticed = 0;
+  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+    const WalledWorld world = two_rooms(seed, true);
+    const RememberedWorld remembered(world, high, spacing_m, seed);
+    const MemoryViewSource source(remembered.memory);
+    Navigator navigator(source, phase_planner(remembered.memory));
+    Random random(seed, 5);
+    for (int i = 0; i < 8; ++i) {
+      // From one room into the other, and carried on the way from one into the other.
+      const bool leftwards = i % 2 == 0;
+      ViewId goal;
+      do {
+        goal = remembered.memory.views()[random.index(remembered.memory.size())];
+      } while ((remembered.pose_of(goal).x_m < 4.0) != leftwards);
+      const Pose2 start = free_pose(world, random, leftwards ? 5.0 : 0.0, leftwards ? 8.0 : 3.0);
+      const Pose2 carried = free_pose(world, random, leftwards ? 5.0 : 0.0, leftwards ? 8.0 : 3.0);
+      const Drive run = drive(world, remembered, navigator, goal, start, DriveKind::holonomic,
+                              random.next(), 1.0, 8, carried);
+      ++outcome.runs;
+      noticed += run.had(NavigationEvent::kidnapped);
+      outcome.arrived +=
+          run.end.state == NavigationState::arrived && run.error_m <= 0.5 * spacing_m;
+    }
+  }
+  EXPECT_GE(outcome.arrived, outcome.runs * 9 / 10);
+  EXPECT_GE(noticed, outcome.runs / 2);
+}
+
+// The door, or one of two, is shut after the memory was made.
+TEST(Navigator, AShutDoorIsGoneRoundOrMakesTheGoalUnreachable) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  Outcome with_detour;
+  Outcome without;
+  int told = 0;
+  int looks = 0;
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    for (const bool second_door : {true, false}) {
+      WalledWorld world = two_rooms(seed, second_door);
+      const RememberedWorld remembered(world, high, spacing_m, seed);
+      world.add_wall({4, 2.4}, {4, 3.2}, 0.8);
+      const MemoryViewSource source(remembered.memory);
+      Navigator navigator(source, phase_planner(remembered.memory));
+      Random random(seed, 6);
+      for (int i = 0; i < 4; ++i) {
+        ViewId goal;
+        do {
+          goal = remembered.memory.views()[random.index(remembered.memory.size())];
+        } while (remembered.pose_of(goal).x_m < 5.0);
+        const Drive run =
+            drive(world, remembered, navigator, goal, free_pose(world, random, 0.0, 3.0),
+                  DriveKind::holonomic, random.next());
+        const bool arrived =
+            run.end.state == NavigationState::arrived && run.error_m <= 0.5 * spacing_m;
+        Outcome& outcome = second_door ? with_detour : without;
+        ++outcome.runs;
+        outcome.arrived += arrived;
+        if (!second_door) {
+          told += run.end.state == NavigationState::unreachable;
+          looks += run.end.look;
+          EXPECT_TRUE(run.had(NavigationEvent::closed));
+        }
+      }
+    }
+  }
+  EXPECT_GE(with_detour.arrived, with_detour.runs * 9 / 10);
+  EXPECT_EQ(without.arrived, 0);
+  EXPECT_GE(told, without.runs * 9 / 10);
+  // Three attempts, each of some closings with `passage_patience` looks.
+  EXPECT_LE(looks, without.runs * 300);
+}
+
+TEST(Navigator, IsLostInAnotherPlace) {
+  const WalledWorld world = two_rooms(1, false);
+  const RememberedWorld remembered(world, high, spacing_m, 1);
+  const WalledWorld elsewhere = two_rooms(2, false);
+  const MemoryViewSource source(remembered.memory);
+  Navigator navigator(source, phase_planner(remembered.memory));
+  Random random(3);
+  for (int i = 0; i < 3; ++i) {
+    const ViewId goal = remembered.memory.views()[random.index(remembered.memory.size())];
+    const Drive run = drive(elsewhere, remembered, navigator, goal, free_pose(elsewhere, random),
+                            DriveKind::holonomic, random.next());
+    EXPECT_EQ(run.end.state, NavigationState::lost);
+    EXPECT_TRUE(run.had(NavigationEvent::relocalised));
+  }
+}
+
+TEST(Navigator, GoesNowhereWithoutAWay) {
+  const WalledWorld world = two_rooms(1, false);
+  RememberedWorld remembered(world, high, spacing_m, 1);
+  const ViewId goal = remembered.memory.views().front();
+  for (const ViewId neighbour : remembered.memory.neighbours(goal)) {
+    remembered.memory.unlink(goal, neighbour);
+  }
+  const MemoryViewSource source(remembered.memory);
+  Navigator navigator(source, phase_planner(remembered.memory));
+  Random random(3);
+  const Drive run =
+      drive(world, remembered, navigator, goal, {6.8, 3.4, 0.0}, DriveKind::holonomic, 1);
+  EXPECT_EQ(run.end.state, NavigationState::unreachable);
+  EXPECT_EQ(run.end.look, 1);
+  EXPECT_EQ(run.end.advance_m, 0.0);
+}
+
+TEST(Navigator, SameCallsGiveTheSameDecisions) {
+  const WalledWorld world = two_rooms(2, true);
+  const RememberedWorld remembered(world, high, spacing_m, 2);
+  const MemoryViewSource source(remembered.memory);
+  std::vector<std::string> logs[2];
+  for (auto& log : logs) {
+    Navigator navigator(source, phase_planner(remembered.memory));
+    navigator.set_goal(remembered.memory.views().back());
+    SimulatedRobot robot(world, {1.0, 1.0, 0.3}, DriveKind::differential, 4);
+    Random noise(5);
+    RobotReport report;
+    for (int look = 0; look < 30; ++look) {
+      const auto decision = navigator.look(world.seen_from(robot.pose(), noise), report);
+      log.push_back(describe(decision));
+      report.obstacle = robot.go(decision.direction_rad, decision.advance_m);
+    }
+  }
+  EXPECT_EQ(logs[0], logs[1]);
+  EXPECT_NE(logs[0].front().find("relocalised"), std::string::npos);
+}
+
+TEST(Navigator, TakesThePlaceOfAnotherEstimate) {
+  const WalledWorld world = two_rooms(2, true);
+  const RememberedWorld remembered(world, high, spacing_m, 2);
+  const MemoryViewSource source(remembered.memory);
+  Navigator navigator(source, phase_planner(remembered.memory));
+  navigator.set_goal(remembered.memory.views().back());
+  Random noise(5);
+  const ViewId here = remembered.memory.views()[20];
+  const auto decision =
+      navigator.look(world.seen_from(remembered.pose_of(here), noise), {.estimate = here});
+  EXPECT_EQ(decision.nearest, here);
+  EXPECT_TRUE(std::ranges::find(decision.events, NavigationEvent::relocalised) ==
+              decision.events.end());
+}
+
+TEST(Navigator, RefusesWhatItCannotDo) {
+  const WalledWorld world = two_rooms(1, false);
+  const RememberedWorld remembered(world, high, 0.8, 1);
+  const MemoryViewSource source(remembered.memory);
+  Navigator navigator(source, phase_planner(remembered.memory));
+  Random noise(1);
+  EXPECT_THROW((void)navigator.look(world.seen_from({1, 1, 0}, noise)), ContractError);
+  EXPECT_THROW(navigator.set_goal(ViewId{99999}), ContractError);
+  EXPECT_THROW(Navigator(source, phase_planner(remembered.memory), {.step_m = 0.0}), OptionError);
+  EXPECT_THROW(Navigator(source, AreaPlanner(NavigationGraph({}, {}))), ContractError);
+}
+
+}  // namespace
+}  // namespace panonav

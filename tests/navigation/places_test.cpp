@@ -1,0 +1,237 @@
+// What the navigator is made of: scales of likeness, views by area, obstacles, graphs from views.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "localisation/ray_cast_room.hpp"
+#include "mapping/round_room.hpp"
+#include "navigation/random_graphs.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/core/executor.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/homing/fourier_homing.hpp"
+#include "panonav/mapping/view_pair.hpp"
+#include "panonav/memory/view_source.hpp"
+#include "panonav/navigation/area_views.hpp"
+#include "panonav/navigation/direction_field.hpp"
+#include "panonav/navigation/obstacle.hpp"
+#include "panonav/navigation/place_scale.hpp"
+
+namespace panonav {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+// A grid in a round room of 3 m, 0.5 m apart, headings at random.
+struct Grid {
+  test::RoundRoom room{3.0, 5};
+  std::vector<Pose2> poses;
+  VisualMemory memory;
+
+  Grid() : memory(remember()) {}
+
+ private:
+  VisualMemory remember() {
+    Random random(8);
+    std::vector<FourierSignature> signatures;
+    for (int i = 0; i < 36; ++i) {
+      poses.push_back({-1.25 + 0.5 * (i % 6), -1.25 + 0.5 * (i / 6), random.uniform(-pi, pi)});
+      signatures.push_back(room.seen_from(poses.back()));
+    }
+    VisualMemory made = testing::make_memory(
+        signatures, std::vector<std::optional<ReferencePose>>(signatures.size()));
+    for (std::size_t a = 0; a < poses.size(); ++a) {
+      for (std::size_t b = a + 1; b < poses.size(); ++b) {
+        if (distance(poses[a].position(), poses[b].position()) < 0.75) {
+          made.link({made.views()[a], made.views()[b], LinkKind::neighbour});
+        }
+      }
+    }
+    return made;
+  }
+};
+
+TEST(NavigationGraph, PhasesAloneTellDirections) {
+  const Grid grid;
+  Executor executor(1);
+  const NavigationGraph graph = navigation_graph(grid.memory, executor);
+  ASSERT_EQ(graph.passages().size(), grid.memory.links().size());
+  std::size_t told = 0;
+  for (const Passage& passage : graph.passages()) {
+    if (!passage.a_from_b) continue;
+    ++told;
+    const Pose2 truth = inverse(grid.poses[passage.a.value]) * grid.poses[passage.b.value];
+    EXPECT_LT(std::abs(angle_difference(std::atan2(passage.a_from_b->y_m, passage.a_from_b->x_m),
+                                        std::atan2(truth.y_m, truth.x_m))),
+              radians(25.0));
+    EXPECT_LT(std::abs(angle_difference(passage.a_from_b->heading_rad, truth.heading_rad)),
+              radians(15.0));
+  }
+  EXPECT_GT(told, graph.passages().size() * 9 / 10);
+  Executor two(2);
+  const NavigationGraph again = navigation_graph(grid.memory, two);
+  EXPECT_TRUE(std::ranges::equal(graph.passages(), again.passages()));
+
+  // Whatever the goal, nearly all views send the robot nearer to it.
+  int nearer = 0;
+  int all = 0;
+  for (std::size_t goal = 0; goal < graph.size(); goal += 7) {
+    const auto guides = direction_field(graph, graph.view(goal));
+    for (std::size_t node = 0; node < graph.size(); ++node) {
+      if (node == goal) continue;
+      ASSERT_TRUE(guides[node].reachable());
+      if (!guides[node].direction_rad) continue;
+      const Point2 end = inverse(grid.poses[node]) * grid.poses[goal].position();
+      ++all;
+      nearer += std::cos(*guides[node].direction_rad - std::atan2(end.y_m, end.x_m)) > 0.5;
+    }
+  }
+  EXPECT_GE(nearer, all * 95 / 100);
+}
+
+TEST(NavigationGraph, AMapTellsWhatItsPosesTell) {
+  const TopologicalMap map{{{ViewId{1}, {0, 0, 0.3}, 0},
+                            {ViewId{4}, {2, 0, -1.0}, 0},
+                            {ViewId{6}, {2, 1, 0.0}, 0},
+                            {ViewId{9}, {0, 0, 0.0}, 1}},
+                           {{ViewId{1}, ViewId{4}, {}, LinkKind::sequence, 1.0},
+                            {ViewId{4}, ViewId{6}, {}, LinkKind::closure, 0.05},
+                            {ViewId{6}, ViewId{9}, {}, LinkKind::sequence, 1.0}}};
+  const NavigationGraph graph = navigation_graph(map);
+  ASSERT_EQ(graph.passages().size(), 1U);  // one contradicts the map, one leads to another frame
+  EXPECT_NEAR(graph.passages()[0].length, 2.0, 1e-12);
+  EXPECT_NEAR(graph.passages()[0].a_from_b->x_m, 2.0 * std::cos(0.3), 1e-12);
+  EXPECT_NEAR(graph.passages()[0].a_from_b->y_m, -2.0 * std::sin(0.3), 1e-12);
+  EXPECT_EQ(navigation_graph(map, 0.0).passages().size(), 2U);
+}
+
+TEST(NavigationGraph, ALatticeGivesLengthsAndPhasesGiveDirections) {
+  const Grid grid;
+  Executor executor(1);
+  const Lattice lattice = arrange(grid.memory, {}, {}, executor);
+  const NavigationGraph graph = navigation_graph(lattice);
+  ASSERT_GT(graph.passages().size(), 60U);
+  int right = 0;
+  for (const Passage& passage : graph.passages()) {
+    if (!passage.a_from_b) continue;
+    const Pose2 truth = inverse(grid.poses[passage.a.value]) * grid.poses[passage.b.value];
+    right += std::abs(angle_difference(std::atan2(passage.a_from_b->y_m, passage.a_from_b->x_m),
+                                       std::atan2(truth.y_m, truth.x_m))) < radians(25.0);
+  }
+  EXPECT_GE(right, static_cast<int>(graph.passages().size()) * 9 / 10);
+}
+
+TEST(PlaceScale, TellsNeighboursFromStrangers) {
+  const Grid grid;
+  const MemoryViewSource source(grid.memory);
+  Executor executor(1);
+  const NavigationGraph graph = navigation_graph(grid.memory, executor);
+  const PlaceScale scale = learn_place_scale(source, graph);
+  EXPECT_GT(scale.neighbours, 0.0);
+  EXPECT_LT(scale.neighbours, scale.limit());
+  EXPECT_LT(scale.limit(), scale.strangers);
+  EXPECT_THROW((void)learn_place_scale(source, graph, 0), ContractError);
+}
+
+TEST(PlaceScale, ArrivalMeansHalfTheSpacing) {
+  const Grid grid;
+  const MemoryViewSource source(grid.memory);
+  Executor executor(1);
+  const NavigationGraph graph = navigation_graph(grid.memory, executor);
+  Random random(2);
+  for (const std::size_t node : {std::size_t{7}, std::size_t{14}, std::size_t{21}}) {
+    const ArrivalScale scale = learn_arrival_scale(source, graph, graph.view(node));
+    ASSERT_TRUE(scale.learnt);
+    const HomingView home = homing_view(grid.memory.signature(graph.view(node)));
+    int near_arrived = 0;
+    int far_arrived = 0;
+    for (int i = 0; i < 20; ++i) {
+      const double direction = random.uniform(-pi, pi);
+      const auto arrived_at = [&](double way_m) {
+        const Pose2 pose{grid.poses[node].x_m + way_m * std::cos(direction),
+                         grid.poses[node].y_m + way_m * std::sin(direction),
+                         random.uniform(-pi, pi)};
+        const HomingView view = homing_view(grid.room.seen_from(pose));
+        return image_difference(home, view) <= scale.difference &&
+               home_vector(home, view).length() <= scale.length;
+      };
+      near_arrived += arrived_at(0.1);
+      far_arrived += arrived_at(0.5);
+    }
+    EXPECT_EQ(near_arrived, 20);
+    EXPECT_EQ(far_arrived, 0);
+  }
+  const NavigationGraph alone({ViewId{0}}, {});
+  EXPECT_FALSE(learn_arrival_scale(source, alone, ViewId{0}).learnt);
+  EXPECT_THROW((void)learn_arrival_scale(source, alone, ViewId{1}), ContractError);
+}
+
+TEST(AreaViews, HoldsAnAreaAndFindsWhatTheWholeMemoryFinds) {
+  const Grid grid;
+  const MemoryViewSource source(grid.memory);
+  Executor executor(1);
+  const NavigationGraph graph = navigation_graph(grid.memory, executor);
+  const SubAreas areas = divide(graph, {.views_per_area = 6});
+  ASSERT_GT(areas.nodes.size(), 3U);
+  AreaViews views(source, 1);
+  EXPECT_THROW((void)views.memory(), ContractError);
+  for (std::size_t area = 0; area < areas.nodes.size(); ++area) {
+    views.enter(graph, areas, area);
+    EXPECT_EQ(views.area(), area);
+    EXPECT_LT(views.size(), grid.memory.size());
+    for (const std::size_t node : areas.nodes[area]) {
+      EXPECT_TRUE(views.holds(graph.view(node)));
+      for (const auto& exit : graph.exits(node)) EXPECT_TRUE(views.holds(graph.view(exit.node)));
+      // Between references, in any heading.
+      const Pose2 pose = grid.poses[node] * Pose2{0.08, 0.05, 1.0};
+      const FourierSignature seen = grid.room.seen_from(pose);
+      const PackedSignature packed = pack(seen, grid.memory.full_scale());
+      const auto found = views.nearest(graph, packed, homing_view(seen));
+      const auto match = grid.memory.search(packed, {.top = 1}).matches.front();
+      ASSERT_TRUE(found.has_value());
+      if (views.holds(match.view)) {
+        EXPECT_EQ(graph.view(found->node), match.view);
+        EXPECT_EQ(found->dissimilarity, match.dissimilarity);
+      }
+      const std::size_t one[] = {node};
+      EXPECT_EQ(views.nearest(graph, one, packed, homing_view(seen))->node, node);
+      const auto anywhere = search_everywhere(source, graph, areas, seen);
+      ASSERT_TRUE(anywhere.has_value());
+      EXPECT_LT(distance(grid.poses[anywhere->node].position(), pose.position()), 0.4);
+    }
+  }
+}
+
+TEST(Obstacle, ClosesAllThatCrossesItAndNothingElse) {
+  std::vector<Pose2> poses;
+  Random random(3);
+  for (int i = 0; i < 25; ++i) poses.push_back({i % 5 + 0.0, i / 5 + 0.0, random.uniform(-pi, pi)});
+  const NavigationGraph graph = test::posed_graph(poses, 1.5, [](Point2, Point2) { return true; });
+  // From the middle, the way to the east is shut over one spacing either way.
+  const std::size_t node = 12;
+  const double direction = angle_difference(0.0, poses[node].heading_rad);
+  const auto across = passages_across(graph, {node, direction, 0.5, 1.0});
+  std::size_t expected = 0;
+  for (std::size_t p = 0; p < graph.passages().size(); ++p) {
+    const Point2 a = poses[*graph.node_of(graph.passages()[p].a)].position();
+    const Point2 b = poses[*graph.node_of(graph.passages()[p].b)].position();
+    const bool crosses = std::min(a.x_m, b.x_m) == 2.0 && std::max(a.x_m, b.x_m) == 3.0 &&
+                         std::abs(0.5 * (a.y_m + b.y_m) - 2.0) <= 1.0 + 1e-9;
+    // The bar ends on passages at its rim: both answers are right there.
+    const bool at_rim = std::abs(std::abs(0.5 * (a.y_m + b.y_m) - 2.0) - 1.0) < 1e-6;
+    if (!at_rim) {
+      EXPECT_EQ(std::ranges::binary_search(across, p), crosses);
+    }
+    expected += crosses && !at_rim;
+  }
+  EXPECT_EQ(expected, 5U);
+  EXPECT_THROW((void)passages_across(graph, {99, 0.0, 0.5, 1.0}), ContractError);
+  EXPECT_THROW((void)passages_across(graph, {0, 0.0, -0.5, 1.0}), ContractError);
+}
+
+}  // namespace
+}  // namespace panonav
