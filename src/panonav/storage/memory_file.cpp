@@ -155,6 +155,15 @@ StoredView MemoryFile::Implementation::view_in(const Statement& row) {
   return view;
 }
 
+void MemoryFile::Implementation::append_row(const Statement& row, VisualMemory& memory) {
+  StoredView view = view_in(row);
+  const auto half = static_cast<std::ptrdiff_t>(header.shape.size());
+  packed.shape = header.shape;
+  packed.magnitudes.assign(view.signature.begin(), view.signature.begin() + half);
+  packed.phases.assign(view.signature.begin() + half, view.signature.end());
+  memory.append_as(view.id, packed, std::move(view.info));
+}
+
 ViewId MemoryFile::Implementation::insert(const NewView& view) {
   const std::int64_t last = next_id.step() ? next_id.integer(0) : 0;
   next_id.reset();
@@ -373,18 +382,10 @@ VisualMemory MemoryFile::load() const {
   const MemoryHeader& header = implementation_->header;
   VisualMemory memory(header.shape, header.full_scale, header.elevations);
   const Transaction reading(database, Transaction::Kind::reading);
-  PackedSignature packed{header.shape, std::vector<std::uint8_t>(header.shape.size()),
-                         std::vector<std::uint8_t>(header.shape.size())};
   try {
     const std::string sql = std::string("SELECT ") + view_columns + " FROM views ORDER BY id";
     Statement rows(database, sql.c_str());
-    while (rows.step()) {
-      StoredView view = implementation_->view_in(rows);
-      const auto half = static_cast<std::ptrdiff_t>(header.shape.size());
-      std::copy_n(view.signature.begin(), half, packed.magnitudes.begin());
-      std::copy_n(view.signature.begin() + half, half, packed.phases.begin());
-      memory.append_as(view.id, packed, std::move(view.info));
-    }
+    while (rows.step()) implementation_->append_row(rows, memory);
     // A page that lost its cells loses views without a fault of their own; the index of the names,
     // which lies on other pages, still counts them.
     const std::int64_t count =
@@ -393,15 +394,56 @@ VisualMemory MemoryFile::load() const {
       database.fail_damaged("it holds " + std::to_string(memory.size()) + " of " +
                             std::to_string(count) + " views");
     }
-    Statement check(database, "PRAGMA quick_check(links)");
-    if (!check.step() || check.text(0) != "ok") database.fail_damaged("table links");
-    check.reset();
-    Statement links(database, "SELECT a, b, kind, checksum FROM links ORDER BY a, b");
-    while (links.step()) memory.link(implementation_->link_in(links));
+    implementation_->for_links([&](const Link& link) { memory.link(link); });
   } catch (const ContractError& error) {
     database.fail_damaged(error.what());
   }
   return memory;
+}
+
+VisualMemory MemoryFile::load(std::span<const ViewId> views) const {
+  for (std::size_t i = 1; i < views.size(); ++i) {
+    require(views[i - 1] < views[i], "views", static_cast<double>(views[i].value), "ascending");
+  }
+  Database& database = implementation_->database;
+  const MemoryHeader& header = implementation_->header;
+  VisualMemory memory(header.shape, header.full_scale, header.elevations);
+  const Transaction reading(database, Transaction::Kind::reading);
+  const std::string sql = std::string("SELECT ") + view_columns + " FROM views WHERE id = ?";
+  Statement row(database, sql.c_str());
+  for (const ViewId view : views) {
+    if (!row.bind(1, std::int64_t{view.value}).step()) {
+      // The index of the names lies on other pages: it still knows what the table has lost.
+      Statement named(database,
+                      "SELECT 1 FROM views INDEXED BY sqlite_autoindex_views_1 WHERE id = ?");
+      if (!named.bind(1, std::int64_t{view.value}).step()) refuse_view(view);
+      database.fail_damaged("view " + std::to_string(view.value) + " is missing");
+    }
+    try {
+      implementation_->append_row(row, memory);
+    } catch (const ContractError& error) {
+      database.fail_damaged(error.what());
+    }
+    row.reset();
+  }
+  return memory;
+}
+
+std::vector<ViewId> MemoryFile::views() const {
+  Database& database = implementation_->database;
+  std::vector<ViewId> views;
+  // The index of the names holds the ids, too, on far fewer pages than the table.
+  Statement ids(database, "SELECT id FROM views INDEXED BY sqlite_autoindex_views_1");
+  while (ids.step()) views.push_back(implementation_->id_in(ids, 0));
+  std::ranges::sort(views);
+  return views;
+}
+
+std::vector<Link> MemoryFile::links() const {
+  std::vector<Link> links;
+  const Transaction reading(implementation_->database, Transaction::Kind::reading);
+  implementation_->for_links([&](const Link& link) { links.push_back(link); });
+  return links;
 }
 
 std::vector<MemoryFault> MemoryFile::verify() const {

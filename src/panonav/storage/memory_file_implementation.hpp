@@ -27,15 +27,27 @@ struct MemoryFile::Implementation {
   [[nodiscard]] ViewId id_in(const Statement& row, int column);
   /// Reads and checks a row of all columns of the table of views.
   [[nodiscard]] StoredView view_in(const Statement& row);
+  /// Appends such a row to a memory.
+  void append_row(const Statement& row, VisualMemory& memory);
   ViewId insert(const NewView& view);
   [[nodiscard]] bool contains(ViewId view);
   [[nodiscard]] Link link_in(const Statement& row);
+  /// Passes each link to `take`, ascending.
+  template <class Take>
+  void for_links(const Take& take) {
+    Statement check(database, "PRAGMA quick_check(links)");
+    if (!check.step() || check.text(0) != "ok") database.fail_damaged("table links");
+    check.reset();
+    Statement rows(database, "SELECT a, b, kind, checksum FROM links ORDER BY a, b");
+    while (rows.step()) take(link_in(rows));
+  }
 
   std::filesystem::path path;
   Database database;
   MemoryHeader header;
   RecordBytes scratch;
   std::vector<std::uint8_t> signature;
+  PackedSignature packed;
   Statement insert_view;
   Statement next_id;
   Statement insert_thumbnail;

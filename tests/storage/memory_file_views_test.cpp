@@ -1,0 +1,142 @@
+#include "panonav/storage/memory_file_views.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+
+#include "panonav/core/error.hpp"
+#include "storage/memory_samples.hpp"
+#include "support/temporary_folder.hpp"
+
+namespace panonav {
+namespace {
+
+using test::random_view;
+using test::small_header;
+using test::TemporaryFolder;
+
+// Views 1 .. 60 but for every seventh, with links.
+VisualMemory write_sample(const std::filesystem::path& path) {
+  MemoryFile file = MemoryFile::create(path, small_header());
+  Random random(1);
+  std::vector<NewView> added;
+  for (int number = 0; number < 60; ++number) {
+    added.push_back(random_view(random, small_header().shape, number));
+  }
+  std::vector<ViewId> ids = file.append(added);
+  std::vector<ViewId> removed;
+  for (std::size_t i = 0; i < ids.size(); i += 7) removed.push_back(ids[i]);
+  file.remove(removed);
+  std::erase_if(ids, [&](ViewId id) { return std::ranges::binary_search(removed, id); });
+  std::vector<Link> links;
+  for (std::size_t i = 3; i < ids.size(); ++i) {
+    links.push_back({ids[i - 3], ids[i], i % 2 == 0 ? LinkKind::neighbour : LinkKind::closure});
+  }
+  file.link(links);
+  return file.load();
+}
+
+void expect_same_views(const VisualMemory& part, const VisualMemory& whole) {
+  EXPECT_EQ(part.shape(), whole.shape());
+  EXPECT_EQ(part.full_scale(), whole.full_scale());
+  EXPECT_EQ(part.elevations(), whole.elevations());
+  for (const ViewId view : part.views()) {
+    EXPECT_EQ(part.info(view), whole.info(view));
+    EXPECT_EQ(part.packed(view), whole.packed(view));
+  }
+}
+
+TEST(MemoryFileViews, AreThoseOfTheWholeMemory) {
+  const TemporaryFolder folder;
+  const VisualMemory whole = write_sample(folder / "m.panonav");
+  ASSERT_EQ(whole.size(), 51U);
+  const MemoryFileViews source(folder / "m.panonav");
+  EXPECT_TRUE(std::ranges::equal(source.views(), whole.views()));
+  EXPECT_TRUE(std::ranges::equal(source.file().links(), whole.links()));
+  EXPECT_EQ(source.load({}).size(), 0U);
+  const VisualMemory all = source.load(source.views());
+  EXPECT_TRUE(std::ranges::equal(all.views(), whole.views()));
+  EXPECT_TRUE(all.links().empty());
+  expect_same_views(all, whole);
+  Random random(2);
+  for (int trial = 0; trial < 50; ++trial) {
+    std::vector<ViewId> wanted;
+    for (const ViewId view : whole.views()) {
+      if (random.index(4) == 0) wanted.push_back(view);
+    }
+    const VisualMemory part = source.load(wanted);
+    EXPECT_TRUE(std::ranges::equal(part.views(), wanted));
+    expect_same_views(part, whole);
+  }
+}
+
+TEST(MemoryFileViews, RefuseWhatIsNotThere) {
+  const TemporaryFolder folder;
+  const VisualMemory whole = write_sample(folder / "m.panonav");
+  const MemoryFileViews source(folder / "m.panonav");
+  const ViewId there = whole.views().front();
+  ASSERT_FALSE(whole.contains(ViewId{1}));
+  EXPECT_THROW((void)source.load(std::vector<ViewId>{ViewId{1}}), ContractError);
+  EXPECT_THROW((void)source.load(std::vector<ViewId>{there, ViewId{9999}}), ContractError);
+  EXPECT_THROW((void)source.load(std::vector<ViewId>{there, there}), ContractError);
+  EXPECT_EQ(source.load(std::vector<ViewId>{there}).size(), 1U);
+  EXPECT_THROW(MemoryFileViews(folder / "absent.panonav"), FileError);
+  folder.write("foreign.panonav", "no memory at all");
+  EXPECT_THROW(MemoryFileViews(folder / "foreign.panonav"), FileError);
+}
+
+TEST(MemoryFileViews, SeeWhatOthersChange) {
+  const TemporaryFolder folder;
+  const auto path = folder / "m.panonav";
+  const VisualMemory whole = write_sample(path);
+  const MemoryFileViews source(path);
+  const std::vector<ViewId> first{whole.views()[0]};
+  const std::vector<ViewId> second{whole.views()[1]};
+  MemoryFile file = MemoryFile::open(path, Access::read_write);
+  file.remove(first);
+  file.set_pose(second[0], ReferencePose{1.0, 2.0, 3.0});
+  EXPECT_THROW((void)source.load(first), ContractError);
+  EXPECT_EQ(source.load(second).info(second[0]).pose, (ReferencePose{1.0, 2.0, 3.0}));
+}
+
+// Whatever is damaged, a view is what was written or refused as a fault of the file.
+TEST(MemoryFileViews, DamageIsAFaultOfTheFile) {
+  const TemporaryFolder folder;
+  const auto path = folder / "m.panonav";
+  const VisualMemory whole = write_sample(path);
+  std::ifstream file(path, std::ios::binary);
+  const std::string good{std::istreambuf_iterator<char>(file), {}};
+  Random random(3);
+  int views_refused = 0;
+  int views_read = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    std::string damaged = good;
+    const std::size_t at = random.index(damaged.size());
+    const std::size_t count = std::min<std::size_t>(trial % 2 == 0 ? 1 : 256, damaged.size() - at);
+    for (std::size_t i = 0; i < count; ++i) {
+      damaged[at + i] = static_cast<char>(random.index(256));
+    }
+    const auto copy = folder.write("damaged.panonav", damaged);
+    SCOPED_TRACE("trial " + std::to_string(trial) + " at byte " + std::to_string(at));
+    try {
+      const MemoryFileViews source(copy);
+      for (const ViewId view : whole.views()) {
+        try {
+          expect_same_views(source.load({&view, 1}), whole);
+          ++views_read;
+        } catch (const FileError&) {
+          ++views_refused;
+        }
+      }
+    } catch (const FileError&) {
+    }
+    if (HasFailure()) return;
+  }
+  EXPECT_GT(views_read, 1000);
+  EXPECT_GT(views_refused, 50);
+}
+
+}  // namespace
+}  // namespace panonav
