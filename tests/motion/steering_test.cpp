@@ -82,6 +82,47 @@ TEST(PathFollower, RepeatsAPathThatCrossesItselfForwardAndBack) {
   }
 }
 
+// There may be a wall behind every corner.
+TEST(PathFollower, CutsNoCorner) {
+  // A zigzag of right angles.
+  std::vector<Point2> path{{0.0, 0.0}};
+  for (int corner = 0; corner < 6; ++corner) {
+    for (int i = 0; i < 10; ++i) {
+      const Point2 last = path.back();
+      path.push_back(corner % 2 == 0 ? Point2{last.x_m + 0.1, last.y_m}
+                                     : Point2{last.x_m, last.y_m + 0.1});
+    }
+  }
+  const PathFollowerOptions options{.steering = {.step_m = 0.15}};
+  PathFollower follower(path, options);
+  Pose2 robot;
+  double most_m = 0.0;
+  int steps = 0;
+  while (const auto step = follower.next_step(robot)) {
+    ASSERT_LT(++steps, 500);
+    const Pose2 there = robot * *step;
+    for (int k = 1; k <= 4; ++k) {
+      const Point2 between{robot.x_m + 0.25 * k * (there.x_m - robot.x_m),
+                           robot.y_m + 0.25 * k * (there.y_m - robot.y_m)};
+      double least = std::numeric_limits<double>::infinity();
+      for (std::size_t i = 1; i < path.size(); ++i) {
+        for (int share = 0; share <= 10; ++share) {
+          least = std::min(
+              least,
+              distance(between, {path[i - 1].x_m + 0.1 * share * (path[i].x_m - path[i - 1].x_m),
+                                 path[i - 1].y_m + 0.1 * share * (path[i].y_m - path[i - 1].y_m)}));
+        }
+      }
+      most_m = std::max(most_m, least);
+    }
+    robot = there;
+  }
+  EXPECT_LT(distance(robot.position(), path.back()), 0.03);
+  EXPECT_GT(steps, 30);
+  // A look-ahead of 0.3 m alone would cut by 0.1 m.
+  EXPECT_LT(most_m, 0.06);
+}
+
 TEST(PathFollower, RefusesWhatIsNoPath) {
   const std::vector<Point2> one{{0.0, 0.0}};
   EXPECT_THROW(PathFollower{one}, ContractError);

@@ -56,6 +56,19 @@ bool has_room(const RouteScene& place, Point2 position) {
   return place.free_space->clearance_m(position) >= place.scene.robot_radius_m;
 }
 
+// Straight from one place to another.
+bool reaches(const RouteScene& place, Point2 from, Point2 to) {
+  const int steps = static_cast<int>(std::ceil(distance(from, to) / 0.025));
+  for (int i = 0; i <= steps; ++i) {
+    const double share = steps == 0 ? 0.0 : static_cast<double>(i) / steps;
+    if (!has_room(place, {from.x_m + share * (to.x_m - from.x_m),
+                          from.y_m + share * (to.y_m - from.y_m)})) {
+      return false;
+    }
+  }
+  return true;
+}
+
 // Of a way, at the place with the least room.
 double least_clearance_m(const RouteScene& place, const std::vector<Pose2>& way) {
   double least_m = std::numeric_limits<double>::infinity();
@@ -87,15 +100,20 @@ double off_part_m(Point2 robot, std::span<const Pose2> way, double along_m) {
   return distance_from_route_m(robot, way.subspan(begin, end - begin));
 }
 
-// To the side of the start where there is room; else any other way off it.
-Pose2 start_beside(const RouteScene& place, const Pose2& start, double off_m, Random& random) {
+// To the side of the start where there is room, also for the straight way onto the route; else any
+// other way off it.
+Pose2 start_beside(const RouteScene& place, std::span<const Point2> path, const Pose2& start,
+                   double off_m, Random& random) {
+  const std::size_t ahead = std::min<std::size_t>(3, path.size() - 1);
   const double side = random.uniform() < 0.5 ? 1.0 : -1.0;
   for (const double angle : {0.5 * pi, -0.5 * pi, 0.75 * pi, -0.75 * pi, 0.25 * pi, -0.25 * pi}) {
     const Pose2 there =
         start * Pose2{off_m * std::cos(side * angle), off_m * std::sin(side * angle),
                       random.normal(0.0, radians(5.0))};
-    const Pose2 half{0.5 * (start.x_m + there.x_m), 0.5 * (start.y_m + there.y_m), 0.0};
-    if (has_room(place, there.position()) && has_room(place, half.position())) return there;
+    if (reaches(place, there.position(), path.front()) &&
+        reaches(place, there.position(), path[ahead])) {
+      return there;
+    }
   }
   return start;
 }
@@ -195,7 +213,7 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
   DriftingWheels wheels;
   wheels.travel = scale();
   wheels.turn = scale();
-  Pose2 robot = start_beside(place, start, options.start_off_m, random);
+  Pose2 robot = start_beside(place, path, start, options.start_off_m, random);
   tracker.set_pose(start);
   PathFollower follower(path, {.steering = {.step_m = options.step_m}});
   const auto most_steps = static_cast<int>(3.0 * follower.length_m() / options.step_m) + 50;

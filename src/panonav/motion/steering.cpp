@@ -25,6 +25,11 @@ void visit_options(SteeringOptions& options, OptionVisitor& visitor) {
                 options.travel_gain);
   visitor.visit({.name = "step_m", .help = "driven in one step at most", .low = 1e-3, .high = 10},
                 options.step_m);
+  visitor.visit({.name = "on_spot_rad",
+                 .help = "the robot turns on the spot for larger errors of direction",
+                 .low = 0.05,
+                 .high = 1.5},
+                options.on_spot_rad);
 }
 
 void visit_options(PathFollowerOptions& options, OptionVisitor& visitor) {
@@ -33,6 +38,11 @@ void visit_options(PathFollowerOptions& options, OptionVisitor& visitor) {
                  .low = 0.01,
                  .high = 100},
                 options.look_ahead_m);
+  visitor.visit({.name = "most_cut_m",
+                 .help = "by which the straight way to that place may leave the path",
+                 .low = 1e-3,
+                 .high = 10},
+                options.most_cut_m);
   visitor.visit({.name = "arrived_m",
                  .help = "so near to the end of the path the robot has arrived",
                  .low = 1e-3,
@@ -48,8 +58,10 @@ Pose2 steer_to(const Pose2& robot, Point2 goal, const SteeringOptions& options) 
   const double off = angle_difference(std::atan2(dy, dx), robot.heading_rad);
   const double turn =
       std::clamp(options.turn_gain * off, -options.most_turn_rad, options.most_turn_rad);
-  const double travel_m = std::min(options.step_m, options.travel_gain * std::hypot(dx, dy)) *
-                          std::max(0.0, std::cos(off));
+  const double travel_m =
+      std::abs(off) > options.on_spot_rad
+          ? 0.0
+          : std::min(options.step_m, options.travel_gain * std::hypot(dx, dy)) * std::cos(off);
   // Wheels without slip: the chord of the step points along the heading at its middle.
   return {travel_m * std::cos(0.5 * turn), travel_m * std::sin(0.5 * turn), turn};
 }
@@ -105,13 +117,44 @@ void PathFollower::advance(Point2 robot) {
   along_m_ = best_m;
 }
 
+// As far ahead as the path stays near the straight way there.
+Point2 PathFollower::aim() const {
+  const Point2 here = place_at(along_m_);
+  // Nearer, the robot would turn for every error of its position.
+  double ahead_m = along_m_ + options_.look_ahead_m / 3.0;
+  const double most_m = along_m_ + options_.look_ahead_m;
+  const auto leaves = [&](Point2 there) {
+    const double ex = there.x_m - here.x_m;
+    const double ey = there.y_m - here.y_m;
+    const double length = std::hypot(ex, ey);
+    if (!(length > 0.0)) return true;
+    const auto first = std::ranges::upper_bound(way_m_, along_m_);
+    for (auto i = static_cast<std::size_t>(first - way_m_.begin());
+         i < path_.size() && way_m_[i] < ahead_m; ++i) {
+      const double off = (path_[i].x_m - here.x_m) * ey - (path_[i].y_m - here.y_m) * ex;
+      if (std::abs(off) > options_.most_cut_m * length) return true;
+    }
+    return false;
+  };
+  constexpr int steps = 8;
+  const double step_m = (most_m - ahead_m) / steps;
+  Point2 there = place_at(ahead_m);
+  for (int i = 0; i < steps; ++i) {
+    ahead_m += step_m;
+    const Point2 farther = place_at(ahead_m);
+    if (leaves(farther)) break;
+    there = farther;
+  }
+  return there;
+}
+
 std::optional<Pose2> PathFollower::next_step(const Pose2& robot) {
   advance(robot.position());
   // A robot beside the end has arrived, too.
   const double left_m = length_m() - along_m_;
   const bool near = distance(robot.position(), path_.back()) <= options_.arrived_m;
   if (left_m <= 1e-9 || (near && left_m <= options_.look_ahead_m)) return std::nullopt;
-  return steer_to(robot, place_at(along_m_ + options_.look_ahead_m), options_.steering);
+  return steer_to(robot, aim(), options_.steering);
 }
 
 }  // namespace panonav

@@ -15,26 +15,33 @@ struct SteeringOptions {
   double most_turn_rad = 0.5;  ///< in one step
   double travel_gain = 0.8;    ///< of the way that is left, driven in one step
   double step_m = 0.05;        ///< driven in one step at most
+  /// With a larger error of direction the robot turns on the spot, so that it comes no nearer to
+  /// what stands beside its way than that way does.
+  double on_spot_rad = 0.5;
   friend bool operator==(const SteeringOptions&, const SteeringOptions&) = default;
 };
 void visit_options(SteeringOptions& options, OptionVisitor& visitor);
 
 /// The next step towards a goal, as an odometry step: turns by a share of the error of direction
 /// and drives by a share of the way that is left, less the farther the goal is off to the side, and
-/// not at all while it lies behind [Y03 section 5.2]. Throws OptionError.
+/// not at all while it lies farther off than `on_spot_rad` [Y03 section 5.2]. Throws OptionError.
 [[nodiscard]] Pose2 steer_to(const Pose2& robot, Point2 goal, const SteeringOptions& options = {});
 
 struct PathFollowerOptions {
-  double look_ahead_m = 0.3;  ///< the robot steers to the place of the path so far ahead of it
-  double arrived_m = 0.02;    ///< so near to the end of the path the robot has arrived
+  double look_ahead_m = 0.3;  ///< the robot steers to a place of the path at most so far ahead
+  /// That place is so near that the straight way there leaves the path by no more than this: a
+  /// corner is not cut where there may be no room.
+  double most_cut_m = 0.02;
+  double arrived_m = 0.02;  ///< so near to the end of the path the robot has arrived
   SteeringOptions steering;
   friend bool operator==(const PathFollowerOptions&, const PathFollowerOptions&) = default;
 };
 void visit_options(PathFollowerOptions& options, OptionVisitor& visitor);
 
-/// Repeats a path: steers to the place a little ahead of the robot's own on it (pure pursuit). The
-/// robot's place moves on along the path from step to step, so that a path may cross and overlap
-/// itself. To drive a path back, give it in reverse.
+/// Repeats a path: steers to the place a little ahead of the robot's own on it (pure pursuit), the
+/// less far the more the path bends, but a third of the look-ahead at least. The robot's place
+/// moves on along the path from step to step, so that a path may cross and overlap itself. To drive
+/// a path back, give it in reverse.
 class PathFollower {
  public:
   /// Throws OptionError, and ContractError on a path of fewer than two places or a number that is
@@ -42,7 +49,7 @@ class PathFollower {
   explicit PathFollower(std::span<const Point2> path, const PathFollowerOptions& options = {});
 
   /// The next step of a robot that is at `robot`, as an odometry step; empty when it has arrived.
-  /// Cost: O(places of the path within twice the look-ahead).
+  /// Cost: O(places of the path within twice the look-ahead, squared).
   [[nodiscard]] std::optional<Pose2> next_step(const Pose2& robot);
 
   /// Way along the path to the robot's place.
@@ -52,6 +59,7 @@ class PathFollower {
  private:
   [[nodiscard]] Point2 place_at(double along_m) const;
   void advance(Point2 robot);
+  [[nodiscard]] Point2 aim() const;
 
   PathFollowerOptions options_;
   std::vector<Point2> path_;

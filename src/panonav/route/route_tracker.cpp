@@ -156,13 +156,19 @@ std::optional<TrackedRouteFix> RouteTracker::search(std::span<const float> line)
 }
 
 std::optional<TrackedRouteFix> RouteTracker::track(std::span<const float> line, const Pose2& step) {
+  const auto agrees = [&](const RouteFix& fix, double within_m) {
+    return elsewhere_ && distance((*elsewhere_ * step).position(), fix.pose.position()) <= within_m;
+  };
   std::optional<TrackedRouteFix> found;
   if (pose_) {
     const Pose2 predicted = *pose_ * step;
     pose_ = predicted;
+    const auto off_m = [&](const RouteFix& fix) {
+      return distance(fix.pose.position(), predicted.position());
+    };
     const auto believed = [&](const std::optional<RouteFix>& fix) {
       return fix && fix->correlation >= least_correlation_ &&
-             distance(fix->pose.position(), predicted.position()) <= 1.5 * options_.recovery_m;
+             off_m(*fix) <= 1.5 * options_.recovery_m;
     };
     auto fix = lines_.fit(line, predicted);
     if (believed(fix)) {
@@ -171,20 +177,26 @@ std::optional<TrackedRouteFix> RouteTracker::track(std::span<const float> line, 
       fix = recover(line, predicted);
       if (believed(fix)) found = placed(*std::move(fix), RouteFixOrigin::recovery);
     }
+    // Odometry is right to centimetres from one line to the next.
+    if (found && followed_ && off_m(found->fix) > options_.surprise_m &&
+        !agrees(found->fix, options_.surprise_m)) {
+      elsewhere_ = found->fix.pose;
+      return std::nullopt;
+    }
   }
   if (!found) {
     auto anywhere = search(line);
-    const bool agrees = anywhere && elsewhere_ &&
-                        distance((*elsewhere_ * step).position(), anywhere->fix.pose.position()) <=
-                            options_.recovery_m;
-    elsewhere_.reset();
-    if (anywhere) elsewhere_ = anywhere->fix.pose;
     // A robot that was followed until now is seldom carried away; a line is sooner mistaken.
-    if (!pose_ || agrees) found = std::move(anywhere);
+    if (anywhere && (!pose_ || agrees(anywhere->fix, options_.recovery_m))) {
+      found = std::move(anywhere);
+    } else {
+      elsewhere_ = anywhere ? std::optional(anywhere->fix.pose) : std::nullopt;
+    }
   }
   if (found) {
     pose_ = found->fix.pose;
     elsewhere_.reset();
+    followed_ = true;
   }
   return found;
 }

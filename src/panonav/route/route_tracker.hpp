@@ -15,6 +15,9 @@ struct RouteTrackerOptions {
   int search_sides = 2;            ///< so many times to either side
   int most_candidates = 6;         ///< places that a search fits
   double recovery_m = 0.5;         ///< by which a prediction may be off
+  /// A robot that was followed until now and seems to be farther than this from where odometry puts
+  /// it is believed to be there once the next line agrees.
+  double surprise_m = 0.15;
   /// Correlation from which on a fit is believed; 0: learnt from the route itself.
   double least_correlation = 0.0;
   friend bool operator==(const RouteTrackerOptions&, const RouteTrackerOptions&) = default;
@@ -49,9 +52,9 @@ class RouteTracker {
                         const RouteFitOptions& fit = {});
 
   /// `step`: how the robot moved since the last line, in the frame it had then [Y03 section 4.1].
-  /// Empty: not on this route, as far as the line tells; the odometry is then carried on. A place
-  /// far from the prediction is believed once two lines one after the other agree on it. Throws
-  /// ContractError on a wrong length.
+  /// Empty: not on this route, as far as the line tells, or at a surprising place of it, which is
+  /// believed once two lines one after the other agree on it; the odometry is then carried on.
+  /// Throws ContractError on a wrong length.
   std::optional<TrackedRouteFix> track(std::span<const float> line, const Pose2& step);
 
   /// From the line alone. Cost: some 10 microseconds for each place tried.
@@ -61,11 +64,13 @@ class RouteTracker {
   void reset() noexcept {
     pose_.reset();
     elsewhere_.reset();
+    followed_ = false;
   }
   /// Takes it from elsewhere.
   void set_pose(const Pose2& pose) noexcept {
     pose_ = pose;
     elsewhere_.reset();
+    followed_ = false;
   }
   [[nodiscard]] const std::optional<Pose2>& pose() const noexcept { return pose_; }
   [[nodiscard]] double least_correlation() const noexcept { return least_correlation_; }
@@ -83,7 +88,8 @@ class RouteTracker {
   RouteLines lines_;
   double least_correlation_ = 0.0;
   std::optional<Pose2> pose_;
-  std::optional<Pose2> elsewhere_;  // where the last line alone would have put the robot
+  std::optional<Pose2> elsewhere_;  // where the last line would have put the robot
+  bool followed_ = false;           // a line has told where the robot is
 };
 
 }  // namespace panonav
