@@ -275,5 +275,30 @@ TEST(RoutePanorama, RefusesWhatDoesNotFit) {
   EXPECT_NEAR(route.length_m(), 0.1, 1e-12);
 }
 
+// Smoothed lines may lead away from a good prediction. The better of both ways is the answer.
+TEST(RouteFit, ExplainsAtLeastAsMuchAsWithoutSmoothing) {
+  Random random(21);
+  int better = 0;
+  for (const std::uint64_t seed : {31U, 32U, 33U}) {
+    const TexturedRoom room(seed);
+    const RoutePanorama route = record(room, straight_path(4.0, 0.05));
+    const RouteLines lines(route);
+    const RouteLines plain(route, {.levels = 1});
+    for (int trial = 0; trial < 20; ++trial) {
+      const Pose2 truth{random.uniform(-1.0, 1.0), random.uniform(-0.4, 0.4),
+                        random.uniform(-pi, pi)};
+      const Pose2 predicted = truth * Pose2{0.3 * random.normal(), 0.3 * random.normal(), 0.1};
+      const auto line = room.line(truth);
+      const auto direct = plain.fit(line, predicted);
+      const auto found = lines.fit(line, predicted);
+      ASSERT_TRUE(direct && found);
+      EXPECT_GE(found->correlation, direct->correlation - 1e-9) << trial;
+      better += static_cast<int>(found->correlation > direct->correlation + 1e-6);
+    }
+  }
+  // Smoothing is not for nothing.
+  EXPECT_GT(better, 0);
+}
+
 }  // namespace
 }  // namespace panonav

@@ -54,6 +54,14 @@ struct RouteLines::Linearised {
   double correlation = 0.0;
 };
 
+// What a fit writes over and over.
+struct RouteLines::Workspace {
+  std::vector<float> seen;
+  std::vector<RouteCrossing> crossings;
+  std::vector<Term> terms;
+  std::vector<float> scratch;
+};
+
 void visit_options(RouteFitOptions& options, OptionVisitor& visitor) {
   visitor.visit({.name = "coarse_deg",
                  .help = "smoothing of the lines where a fit starts",
@@ -283,6 +291,36 @@ std::vector<float> RouteLines::what_no_shift_explains(const std::vector<Term>& t
   return left;
 }
 
+// Gauss-Newton from level to level.
+bool RouteLines::descend(std::span<const Level> levels, std::span<const float> line,
+                         const Window& near, Workspace& work, Pose2& pose) const {
+  for (const Level& level : levels) {
+    work.seen = smoothed_line(line, level.sigma);
+    const bool last = &level == &levels_.back();
+    const double near_enough_m =
+        last ? 3e-4 : 0.05 * usual_distance_m * level.sigma * 2.0 * pi / columns_;
+    for (int step = 0; step < options_.most_steps; ++step) {
+      if (!collect(level, work.seen, pose, near, work.crossings, work.terms)) return false;
+      const auto normal = linearise(work.terms, work.scratch);
+      if (!normal) return false;
+      // A little damping: directions in which nothing changes stay where they are.
+      Matrix damped = normal->matrix;
+      damped.diagonal() *= 1.0 + 1e-3;
+      const Vector change = damped.ldlt().solve(normal->right);
+      if (!change.allFinite()) return false;
+      // No step is longer than what smoothing lets it see.
+      const double length_m = std::hypot(change[0], change[1]);
+      const double scale = std::min(
+          {1.0, 0.25 / std::max(1e-12, length_m), 0.2 / std::max(1e-12, std::abs(change[2]))});
+      pose.x_m += scale * change[0];
+      pose.y_m += scale * change[1];
+      pose.heading_rad = wrap_angle(pose.heading_rad + scale * change[2]);
+      if (length_m < near_enough_m && std::abs(change[2]) < near_enough_m) break;
+    }
+  }
+  return true;
+}
+
 std::optional<RouteFix> RouteLines::fit(std::span<const float> line, const Pose2& predicted) const {
   if (line.size() != static_cast<std::size_t>(columns_)) {
     throw ContractError("values of the line", static_cast<double>(line.size()),
@@ -290,43 +328,39 @@ std::optional<RouteFix> RouteLines::fit(std::span<const float> line, const Pose2
   }
   const auto near = window(predicted.position());
   if (!near) return std::nullopt;
-  RouteFix fix;
-  fix.pose = predicted;
-  std::vector<RouteCrossing> crossings;
-  std::vector<Term> terms;
-  std::vector<float> scratch;
-  terms.reserve(line.size());
-  scratch.reserve(line.size());
-  std::vector<float> seen;
+  Workspace work;
+  work.terms.reserve(line.size());
+  work.scratch.reserve(line.size());
   std::optional<Linearised> normal;
-  for (const Level& level : levels_) {
-    seen = smoothed_line(line, level.sigma);
-    const bool last = &level == &levels_.back();
-    const double near_enough_m =
-        last ? 3e-4 : 0.05 * usual_distance_m * level.sigma * 2.0 * pi / columns_;
-    for (int step = 0; step < options_.most_steps; ++step) {
-      if (!collect(level, seen, fix.pose, *near, crossings, terms)) return std::nullopt;
-      normal = linearise(terms, scratch);
-      if (!normal) return std::nullopt;
-      // A little damping: directions in which nothing changes stay where they are.
-      Matrix damped = normal->matrix;
-      damped.diagonal() *= 1.0 + 1e-3;
-      const Vector change = damped.ldlt().solve(normal->right);
-      if (!change.allFinite()) return std::nullopt;
-      // No step is longer than what smoothing lets it see.
-      const double length_m = std::hypot(change[0], change[1]);
-      const double scale = std::min(
-          {1.0, 0.25 / std::max(1e-12, length_m), 0.2 / std::max(1e-12, std::abs(change[2]))});
-      fix.pose.x_m += scale * change[0];
-      fix.pose.y_m += scale * change[1];
-      fix.pose.heading_rad = wrap_angle(fix.pose.heading_rad + scale * change[2]);
-      if (length_m < near_enough_m && std::abs(change[2]) < near_enough_m) break;
-    }
+  RouteFix fix;
+  const auto try_from = [&](std::span<const Level> levels, Pose2 pose) {
+    if (!descend(levels, line, *near, work, pose)) return;
+    // `descend` leaves the line as its last level sees it.
+    if (!collect(levels_.back(), work.seen, pose, *near, work.crossings, work.terms)) return;
+    const auto there = linearise(work.terms, work.scratch);
+    if (!there || (normal && there->correlation <= normal->correlation)) return;
+    normal = there;
+    fix.pose = pose;
+  };
+  // Smoothed lines lead from afar, but may lead away: near things and far ones behind them blend.
+  // From a good prediction the lines themselves find their way. What explains more is believed.
+  const std::span<const Level> levels(levels_);
+  try_from(levels.last(1), predicted);
+  Pose2 coarse = predicted;
+  if (levels.size() > 1 && descend(levels.first(levels.size() - 1), line, *near, work, coarse)) {
+    // So near to each other both end at the same place.
+    constexpr double same_m = 0.01;
+    constexpr double same_rad = 0.01;
+    const bool same =
+        normal && distance(coarse.position(), fix.pose.position()) < same_m &&
+        std::abs(angle_difference(coarse.heading_rad, fix.pose.heading_rad)) < same_rad;
+    if (!same) try_from(levels.last(1), coarse);
   }
-  if (!collect(levels_.back(), seen, fix.pose, *near, crossings, terms)) return std::nullopt;
-  normal = linearise(terms, scratch);
   if (!normal) return std::nullopt;
-  fix.columns = static_cast<int>(terms.size());
+  work.seen = smoothed_line(line, levels_.back().sigma);
+  static_cast<void>(
+      collect(levels_.back(), work.seen, fix.pose, *near, work.crossings, work.terms));
+  fix.columns = static_cast<int>(work.terms.size());
   fix.correlation = normal->correlation;
   fix.residual = std::sqrt(normal->variance) / normal->deviation;
   const Matrix inverse = normal->matrix.ldlt().solve(Matrix::Identity());
@@ -340,7 +374,8 @@ std::optional<RouteFix> RouteLines::fit(std::span<const float> line, const Pose2
   fix.noise = normal->noise;
   const int shift = std::max(1, columns_ / 360);
   const double turn = fix.pose.heading_rad * columns_ / (2.0 * pi);
-  const auto left = what_no_shift_explains(terms, line.size(), normal->gain, normal->offset, shift);
+  const auto left =
+      what_no_shift_explains(work.terms, line.size(), normal->gain, normal->offset, shift);
   fix.unexplained.resize(line.size());
   for (std::size_t c = 0; c < left.size(); ++c) {
     const auto size = static_cast<long long>(line.size());

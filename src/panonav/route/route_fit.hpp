@@ -95,6 +95,9 @@ class RouteLines {
   };
   struct Term;
   struct Linearised;
+  struct Workspace;
+  [[nodiscard]] bool descend(std::span<const Level> levels, std::span<const float> line,
+                             const Window& near, Workspace& work, Pose2& pose) const;
   [[nodiscard]] std::optional<Window> window(Point2 position) const;
   // What the route shows in a column where a line of sight crosses the path.
   [[nodiscard]] float shown(const Level& level, float along, std::size_t column) const noexcept;
