@@ -107,14 +107,18 @@ void plan_around(benchmark::State& state) {
 BENCHMARK(plan_around)->Unit(benchmark::kMillisecond);
 
 // Looks along the way through all rooms. `border`: those at which another area is loaded.
-void look(benchmark::State& state, bool border, bool from_file) {
+// `all`: every component is compared everywhere.
+void look(benchmark::State& state, bool border, bool from_file, bool all = false) {
   const auto views = source(from_file);
   AreaPlanner planning = planner();
   planning.set_goal(graph().view(graph().size() - 1));
   const auto way = planning.planned_way(0);
   std::vector<FourierSignature> seen;
   for (const std::size_t node : way) seen.push_back(memory().signature(graph().view(node)));
-  Navigator navigator(*views, planner());
+  NavigatorOptions options;
+  if (all) options.coarse_components = 0;
+  Navigator navigator(*views, planner(), options);
+  double bytes_read = 0.0;
   std::size_t next = way.size();
   std::size_t most_loaded = 0;
   for (auto _ : state) {
@@ -131,15 +135,23 @@ void look(benchmark::State& state, bool border, bool from_file) {
         return std::ranges::find(decision.events, event) != decision.events.end();
       };
       measured = !had(NavigationEvent::relocalised) && had(NavigationEvent::entered_area) == border;
-      if (measured) state.SetIterationTime(passed.count());
+      if (measured) {
+        state.SetIterationTime(passed.count());
+        bytes_read += static_cast<double>(decision.bytes_read);
+      }
       most_loaded = std::max(most_loaded, navigator.loaded_views());
     }
   }
+  state.counters["kB_read"] =
+      benchmark::Counter(bytes_read / 1000.0, benchmark::Counter::kAvgIterations);
   state.counters["most_loaded_views"] = static_cast<double>(most_loaded);
   state.counters["most_loaded_kB"] =
       static_cast<double>(most_loaded * 2 * memory().shape().size()) / 1000.0;
 }
 BENCHMARK_CAPTURE(look, within_an_area, false, false)
+    ->UseManualTime()
+    ->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(look, within_an_area_all_components, false, false, true)
     ->UseManualTime()
     ->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(look, at_a_border, true, false)->UseManualTime()->Unit(benchmark::kMicrosecond);

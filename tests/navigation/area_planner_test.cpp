@@ -110,6 +110,29 @@ TEST(SubAreas, AnyGraphIsDividedIntoConnectedAreasOfSimilarSize) {
   }
 }
 
+TEST(SubAreas, DoorsAreNarrowAndOpenBordersAreNot) {
+  Random random(1);
+  const int side = 8;
+  const NavigationGraph graph = rooms_in_a_row(3, side, random);
+  const auto narrow = narrow_places(graph, divide(graph, {.views_per_area = side * side}), 1);
+  for (std::size_t node = 0; node < graph.size(); ++node) {
+    const auto column = static_cast<int>(node % side);
+    const auto row = static_cast<int>(node / side % side);
+    const auto room = static_cast<int>(node / (side * side));
+    const auto near = [&](int door_column) {
+      return std::abs(column - door_column) <= 1 && std::abs(row - side / 2) <= 1;
+    };
+    EXPECT_EQ(narrow[node] != 0, (room < 2 && near(side - 1)) || (room > 0 && near(0)));
+  }
+  std::vector<Pose2> poses;
+  for (int i = 0; i < 400; ++i) poses.push_back({i % 20 + 0.0, i / 20 + 0.0, 0.0});
+  const NavigationGraph open = test::posed_graph(poses, 1.5, [](Point2, Point2) { return true; });
+  const SubAreas areas = divide(open, {.views_per_area = 100});
+  ASSERT_GT(areas.nodes.size(), 2U);
+  const auto none = narrow_places(open, areas, 2);
+  EXPECT_EQ(std::ranges::count(none, std::uint8_t{0}), 400);
+}
+
 TEST(AreaPlanner, WithAllGatesEveryWayIsAShortestOne) {
   std::size_t compared = 0;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {

@@ -30,7 +30,7 @@ struct Drive {
   double error_m = 0.0;
   double travelled_m = 0.0;
   std::vector<NavigationEvent> events;
-  std::size_t most_loaded = 0;
+  std::uint64_t bytes_read = 0;
 
   [[nodiscard]] bool had(NavigationEvent event) const {
     return std::ranges::find(events, event) != events.end();
@@ -57,7 +57,7 @@ Drive drive(const WalledWorld& world, const RememberedWorld& remembered, Navigat
     if (look == kidnap_look) robot.carry_to(kidnap_to);
     const auto decision = navigator.look(world.seen_from(robot.pose(), noise, light), report);
     run.events.insert(run.events.end(), decision.events.begin(), decision.events.end());
-    run.most_loaded = std::max(run.most_loaded, navigator.loaded_views());
+    run.bytes_read += decision.bytes_read;
     run.end = decision;
     if (decision.state != NavigationState::moving) break;
     report.obstacle = robot.go(decision.direction_rad, decision.advance_m);
@@ -112,7 +112,6 @@ TEST(Navigator, ArrivesFromAnywhereByPhasesAlone) {
       const double shortest =
           guides[static_cast<std::size_t>(nearest - remembered.poses.begin())].way;
       if (right && shortest > 1.0) ratios.push_back(run.travelled_m / shortest);
-      EXPECT_LT(run.most_loaded, remembered.memory.size());
     }
   }
   RecordProperty("arrived", arrived);
@@ -149,6 +148,79 @@ TEST(Navigator, ArrivesInOtherLight) {
     }
   }
   EXPECT_GE(outcome.arrived, outcome.runs * 9 / 10);
+}
+
+TEST(Navigator, FewComponentsInTheOpenAreEnoughAndCostLess) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  Outcome coarse;
+  Outcome full;
+  struct Work {
+    std::uint64_t bytes = 0;
+    int looks = 0;
+    [[nodiscard]] double bytes_per_look() const { return static_cast<double>(bytes) / looks; }
+  };
+  Work coarse_work;
+  Work full_work;
+  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+    const WalledWorld world = two_rooms(seed, true);
+    const RememberedWorld remembered(world, high, spacing_m, seed);
+    const MemoryViewSource source(remembered.memory);
+    for (const bool all : {true, false}) {
+      NavigatorOptions options;
+      if (all) options.coarse_components = 0;
+      Navigator navigator(source, phase_planner(remembered.memory), options);
+      Outcome& outcome = all ? full : coarse;
+      Random random(seed, 8);
+      for (int i = 0; i < 10; ++i) {
+        const ViewId goal = remembered.memory.views()[random.index(remembered.memory.size())];
+        const Drive run = drive(world, remembered, navigator, goal, free_pose(world, random),
+                                DriveKind::differential, random.next());
+        ++outcome.runs;
+        outcome.arrived +=
+            run.end.state == NavigationState::arrived && run.error_m <= 0.5 * spacing_m;
+        Work& work = all ? full_work : coarse_work;
+        work.bytes += run.bytes_read;
+        work.looks += run.end.look;
+      }
+    }
+  }
+  EXPECT_GE(full.arrived, full.runs * 95 / 100);
+  EXPECT_GE(coarse.arrived, coarse.runs * 95 / 100);
+  // These rooms are small: most places lie near the doors or the goal.
+  EXPECT_LT(coarse_work.bytes_per_look(), 0.9 * full_work.bytes_per_look());
+}
+
+// All components at the goal, in a narrow place and where the robot does not know where it is.
+TEST(Navigator, ComparesAllComponentsWhereItMatters) {
+  const WalledWorld world = two_rooms(1, false);
+  const RememberedWorld remembered(world, high, spacing_m, 1);
+  const MemoryViewSource source(remembered.memory);
+  AreaPlanner planner = phase_planner(remembered.memory);
+  const auto narrow = narrow_places(planner.graph(), planner.areas(), 2);
+  ASSERT_NE(std::ranges::count(narrow, std::uint8_t{1}), 0);
+  Navigator navigator(source, std::move(planner));
+  const NavigationGraph& graph = navigator.planner().graph();
+  Random noise(5);
+  // The robot drives from one room into the other, held on the way that is planned.
+  const std::size_t goal = graph.size() - 1;
+  navigator.set_goal(graph.view(goal));
+  AreaPlanner planning = navigator.planner();
+  const auto way = planning.planned_way(0);
+  ASSERT_GT(way.size(), 10U);
+  const auto around_goal = nodes_around(graph, {&goal, 1}, 2);
+  int coarse = 0;
+  for (std::size_t i = 0; i < way.size(); ++i) {
+    const Pose2& pose = remembered.pose_of(graph.view(way[i]));
+    const auto decision = navigator.look(world.seen_from(pose, noise));
+    ASSERT_EQ(decision.nearest, graph.view(way[i]));
+    EXPECT_GT(decision.bytes_read, 0U);
+    // What counts is the place where the robot was before it looked.
+    const bool all =
+        i == 0 || narrow[way[i - 1]] != 0 || std::ranges::binary_search(around_goal, way[i - 1]);
+    EXPECT_EQ(decision.components, all ? 15 : 6) << "at place " << i << " of the way";
+    coarse += decision.components == 6;
+  }
+  EXPECT_GT(coarse, 2);
 }
 
 TEST(Navigator, AKidnappedRobotStillArrives) {
@@ -303,6 +375,8 @@ TEST(Navigator, RefusesWhatItCannotDo) {
   EXPECT_THROW((void)navigator.look(world.seen_from({1, 1, 0}, noise)), ContractError);
   EXPECT_THROW(navigator.set_goal(ViewId{99999}), ContractError);
   EXPECT_THROW(Navigator(source, phase_planner(remembered.memory), {.step_m = 0.0}), OptionError);
+  EXPECT_THROW(Navigator(source, phase_planner(remembered.memory), {.coarse_components = 2}),
+               ContractError);
   EXPECT_THROW(Navigator(source, AreaPlanner(NavigationGraph({}, {}))), ContractError);
 }
 

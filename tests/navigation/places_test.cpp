@@ -134,7 +134,7 @@ TEST(PlaceScale, TellsNeighboursFromStrangers) {
   EXPECT_GT(scale.neighbours, 0.0);
   EXPECT_LT(scale.neighbours, scale.limit());
   EXPECT_LT(scale.limit(), scale.strangers);
-  EXPECT_THROW((void)learn_place_scale(source, graph, 0), ContractError);
+  EXPECT_THROW((void)learn_place_scale(source, graph, 0, 0), ContractError);
 }
 
 TEST(PlaceScale, ArrivalMeansHalfTheSpacing) {
@@ -178,7 +178,7 @@ TEST(AreaViews, HoldsAnAreaAndFindsWhatTheWholeMemoryFinds) {
   const SubAreas areas = divide(graph, {.views_per_area = 6});
   ASSERT_GT(areas.nodes.size(), 3U);
   AreaViews views(source, 1);
-  EXPECT_THROW((void)views.memory(), ContractError);
+  EXPECT_THROW((void)views.view(grid.memory.views()[0]), ContractError);
   for (std::size_t area = 0; area < areas.nodes.size(); ++area) {
     views.enter(graph, areas, area);
     EXPECT_EQ(views.area(), area);
@@ -189,21 +189,88 @@ TEST(AreaViews, HoldsAnAreaAndFindsWhatTheWholeMemoryFinds) {
       // Between references, in any heading.
       const Pose2 pose = grid.poses[node] * Pose2{0.08, 0.05, 1.0};
       const FourierSignature seen = grid.room.seen_from(pose);
-      const PackedSignature packed = pack(seen, grid.memory.full_scale());
-      const auto found = views.nearest(graph, packed, homing_view(seen));
-      const auto match = grid.memory.search(packed, {.top = 1}).matches.front();
+      const SeenView view(seen, grid.memory.full_scale());
+      const auto found = views.nearest(graph, view);
+      const auto match = grid.memory.search(view.packed, {.top = 1}).matches.front();
       ASSERT_TRUE(found.has_value());
       if (views.holds(match.view)) {
         EXPECT_EQ(graph.view(found->node), match.view);
         EXPECT_EQ(found->dissimilarity, match.dissimilarity);
       }
       const std::size_t one[] = {node};
-      EXPECT_EQ(views.nearest(graph, one, packed, homing_view(seen))->node, node);
+      EXPECT_EQ(views.nearest(graph, one, view)->node, node);
       const auto anywhere = search_everywhere(source, graph, areas, seen);
       ASSERT_TRUE(anywhere.has_value());
       EXPECT_LT(distance(grid.poses[anywhere->node].position(), pose.position()), 0.4);
     }
   }
+}
+
+TEST(AreaViews, WhatIsLoadedAheadNeedNotBeLoadedAgain) {
+  const Grid grid;
+  // Counts what is asked for.
+  struct Counting final : ViewSource {
+    explicit Counting(const VisualMemory& memory) : source(memory) {}
+    [[nodiscard]] std::span<const ViewId> views() const override { return source.views(); }
+    [[nodiscard]] VisualMemory load(std::span<const ViewId> views) const override {
+      loaded += views.size();
+      return source.load(views);
+    }
+    MemoryViewSource source;
+    mutable std::size_t loaded = 0;
+  } source(grid.memory);
+  Executor executor(1);
+  const NavigationGraph graph = navigation_graph(grid.memory, executor);
+  const SubAreas areas = divide(graph, {.views_per_area = 12});
+  ASSERT_GT(areas.nodes.size(), 2U);
+  AreaViews at_once(source, 1);
+  at_once.enter(graph, areas, 1);
+  const std::size_t whole = source.loaded;
+  AreaViews views(source, 1);
+  views.enter(graph, areas, 0);
+  const std::size_t first = views.size();
+  source.loaded = 0;
+  views.load_ahead(graph, areas, 0, 100);  // is here
+  EXPECT_EQ(source.loaded, 0U);
+  views.load_ahead(graph, areas, 2, 3);  // not entered after all
+  views.load_ahead(graph, areas, 1, 5);
+  EXPECT_EQ(views.size(), first + 5);
+  EXPECT_EQ(views.area(), 0U);
+  views.load_ahead(graph, areas, 1, 4);
+  EXPECT_EQ(source.loaded, 3U + 9U);
+  views.enter(graph, areas, 1);
+  EXPECT_EQ(source.loaded, 3U + whole);
+  EXPECT_EQ(views.size(), whole);
+  for (const std::size_t node : areas.nodes[1]) {
+    const SeenView seen(grid.memory.signature(graph.view(node)), grid.memory.full_scale());
+    EXPECT_EQ(views.nearest(graph, seen)->node, at_once.nearest(graph, seen)->node);
+    EXPECT_EQ(views.view(graph.view(node)), at_once.view(graph.view(node)));
+  }
+}
+
+TEST(AreaViews, FewComponentsReadLess) {
+  const Grid grid;
+  const MemoryViewSource source(grid.memory);
+  Executor executor(1);
+  const NavigationGraph graph = navigation_graph(grid.memory, executor);
+  const SubAreas areas = undivided(graph);
+  std::uint64_t read[2] = {0, 0};
+  for (const int components : {0, 5}) {
+    AreaViews views(source, 0);
+    views.enter(graph, areas, 0);
+    EXPECT_EQ(views.bytes_read(), 0U);
+    for (std::size_t node = 0; node < graph.size(); ++node) {
+      const SeenView seen(grid.memory.signature(graph.view(node)), grid.memory.full_scale(),
+                          components);
+      const auto found = views.nearest(graph, areas.nodes[0], seen);
+      EXPECT_EQ(found->node, node);
+      EXPECT_EQ(found->dissimilarity, 0U);
+      EXPECT_NEAR(views.turn_against(graph.view(node), seen)->heading_rad, 0.0, 1e-3);
+    }
+    read[components == 0 ? 0 : 1] = views.bytes_read();
+  }
+  EXPECT_EQ(read[0] * 5, read[1] * 15);
+  EXPECT_THROW(SeenView(grid.memory.signature(graph.view(0)), 1.0F, 2), ContractError);
 }
 
 TEST(Obstacle, ClosesAllThatCrossesItAndNothingElse) {

@@ -196,7 +196,8 @@ class SimulatedRobot final : public RobotBase {
     const Pose2 step = sample_step(motion_after(velocity, base_.period_s), noise_, random_);
     const Pose2 there = pose_ * step;
     if (!world_->is_free(there.position())) {
-      obstacle_ = true;
+      // A round robot that turns on the spot hits nothing.
+      obstacle_ |= velocity.forward_m_s != 0.0 || velocity.left_m_s != 0.0;
       pose_.heading_rad = there.heading_rad;
       return;
     }

@@ -1,7 +1,9 @@
 #include "panonav/navigation/area_views.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <tuple>
+#include <utility>
 
 #include "panonav/core/error.hpp"
 #include "panonav/homing/fourier_homing.hpp"
@@ -16,51 +18,113 @@ constexpr int compared_per_area = 3;
 
 }  // namespace
 
+SeenView::SeenView(const FourierSignature& seen, float full_scale, int components_)
+    : packed(pack(seen, full_scale)),
+      view(homing_view(seen)),
+      components(components_ == 0 ? seen.components() : components_) {
+  require(components >= 3 || components_ == 0, "components", components, "0, or 3 or more");
+  if (components_ != 0) view = first_components(view, components_);
+}
+
 AreaViews::AreaViews(const ViewSource& source, int links) : source_(&source), links_(links) {}
 
+std::optional<std::size_t> AreaViews::area() const noexcept {
+  return here_.area;
+}
+
+void AreaViews::begin(const NavigationGraph& graph, const SubAreas& areas, std::size_t area,
+                      Loading& loading) const {
+  loading = {area, {}, 0, {}};
+  for (const std::size_t node : nodes_around(graph, areas.nodes.at(area), links_)) {
+    loading.views.push_back(graph.view(node));
+  }
+}
+
+void AreaViews::load(Loading& loading, std::size_t most) const {
+  const std::size_t count = std::min(most, loading.views.size() - loading.loaded);
+  if (count == 0) return;
+  loading.parts.push_back(source_->load(std::span(loading.views).subspan(loading.loaded, count)));
+  loading.loaded += count;
+}
+
 void AreaViews::enter(const NavigationGraph& graph, const SubAreas& areas, std::size_t area) {
-  if (area_ == area) return;
-  const std::vector<std::size_t> nodes = nodes_around(graph, areas.nodes.at(area), links_);
-  std::vector<ViewId> views;
-  views.reserve(nodes.size());
-  for (const std::size_t node : nodes) views.push_back(graph.view(node));
-  memory_ = source_->load(views);
-  area_ = area;
+  if (here_.area == area) return;
+  if (ahead_.area == area) {
+    here_ = std::move(ahead_);
+  } else {
+    begin(graph, areas, area, here_);
+  }
+  ahead_ = {};
+  load(here_, here_.views.size());
 }
 
-const VisualMemory& AreaViews::memory() const {
-  if (!memory_) throw ContractError("area", "none", "one that was entered");
-  return *memory_;
+void AreaViews::load_ahead(const NavigationGraph& graph, const SubAreas& areas, std::size_t area,
+                           int most_views) {
+  if (here_.area == area) return;
+  if (ahead_.area != area) begin(graph, areas, area, ahead_);
+  load(ahead_, static_cast<std::size_t>(most_views));
 }
 
-HomingView AreaViews::view(ViewId view) const {
-  return homing_view(memory().signature(view));
+const VisualMemory* AreaViews::part_of(ViewId view) const {
+  const auto after = std::ranges::upper_bound(
+      here_.parts, view, {}, [](const VisualMemory& part) { return part.views().front(); });
+  if (after == here_.parts.begin()) return nullptr;
+  const VisualMemory& part = *std::prev(after);
+  return part.contains(view) ? &part : nullptr;
+}
+
+const VisualMemory& AreaViews::require_part_of(ViewId view) const {
+  const VisualMemory* const part = part_of(view);
+  require(part != nullptr, "view", static_cast<double>(view.value), "one that is loaded");
+  return *part;
+}
+
+std::optional<CompassReading> AreaViews::turn_against(ViewId view, const SeenView& seen) {
+  bytes_read_ += 2 * static_cast<std::uint64_t>(seen.packed.shape.rows) * seen.components;
+  return compass(seen.packed, require_part_of(view).packed(view), {.components = seen.components});
+}
+
+HomingView AreaViews::view(ViewId view, int components) {
+  const FourierSignature signature = require_part_of(view).signature(view);
+  const int compared = components == 0 ? signature.components() : components;
+  // Magnitudes and phases, a byte each.
+  bytes_read_ += 2 * static_cast<std::uint64_t>(signature.rows()) * compared;
+  const HomingView whole = homing_view(signature);
+  return components == 0 ? whole : first_components(whole, components);
 }
 
 std::optional<FoundView> AreaViews::nearest(const NavigationGraph& graph,
                                             std::span<const std::size_t> nodes,
-                                            const PackedSignature& packed,
-                                            const HomingView& seen) const {
+                                            const SeenView& seen) {
   std::optional<FoundView> best;
   for (const std::size_t node : nodes) {
-    if (!holds(graph.view(node))) continue;
-    const auto dissimilarity = dissimilarity_packed(packed, memory().packed(graph.view(node)));
+    const VisualMemory* const part = part_of(graph.view(node));
+    if (part == nullptr) continue;
+    const auto dissimilarity =
+        dissimilarity_packed(seen.packed, part->packed(graph.view(node)), seen.components);
+    bytes_read_ += static_cast<std::uint64_t>(seen.packed.shape.rows) * seen.components;
     const bool nearer =
         !best || std::tuple(dissimilarity, node) < std::tuple(best->dissimilarity, best->node);
     if (nearer) best = {node, dissimilarity, 0.0};
   }
-  if (best) best->difference = image_difference(view(graph.view(best->node)), seen);
+  if (best) {
+    best->difference = image_difference(view(graph.view(best->node), seen.components), seen.view);
+  }
   return best;
 }
 
-std::optional<FoundView> AreaViews::nearest(const NavigationGraph& graph,
-                                            const PackedSignature& packed,
-                                            const HomingView& seen) const {
-  const SearchResult found = memory().search(packed, {.top = 1});
-  if (found.matches.empty()) return std::nullopt;
-  const Match& match = found.matches.front();
-  return FoundView{*graph.node_of(match.view), match.dissimilarity,
-                   image_difference(view(match.view), seen)};
+std::optional<FoundView> AreaViews::nearest(const NavigationGraph& graph, const SeenView& seen) {
+  std::optional<Match> best;
+  for (const VisualMemory& part : here_.parts) {
+    const SearchResult found = part.search(seen.packed, {.top = 1, .components = seen.components});
+    bytes_read_ += found.bytes_read;
+    for (const Match& match : found.matches) {
+      if (!best || match.dissimilarity < best->dissimilarity) best = match;
+    }
+  }
+  if (!best) return std::nullopt;
+  return FoundView{*graph.node_of(best->view), best->dissimilarity,
+                   image_difference(view(best->view, seen.components), seen.view)};
 }
 
 std::optional<FoundView> search_everywhere(const ViewSource& source, const NavigationGraph& graph,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
@@ -9,50 +10,83 @@
 #include "panonav/memory/view_source.hpp"
 #include "panonav/navigation/navigation_graph.hpp"
 #include "panonav/navigation/sub_areas.hpp"
+#include "panonav/signature/compass.hpp"
 
 namespace panonav {
+
+/// What a robot sees, as references are compared with it.
+struct SeenView {
+  /// Throws ContractError unless `components` is 0 (all) or 3 .. those of the signature.
+  SeenView(const FourierSignature& seen, float full_scale, int components = 0);
+
+  PackedSignature packed;  ///< with the memory's full scale
+  HomingView view;         ///< the first `components` only
+  int components;          ///< that are compared
+};
 
 /// A reference that looks like the robot's view.
 struct FoundView {
   std::size_t node = 0;
-  std::uint32_t dissimilarity = 0;  ///< as the memory has it
+  std::uint32_t dissimilarity = 0;  ///< as the memory has it, over the components compared
   double difference = 0.0;          ///< by `image_difference`: magnitudes and phases
 };
 
 /// The views of one area and those around it, loaded from a source: what a robot needs to have at
-/// hand. Nothing else of the memory is held.
+/// hand. Of the memory nothing else is held but what was loaded ahead of the area that comes next.
 class AreaViews {
  public:
   /// Views up to `links` passages outside an area are loaded with it. The source must outlive
   /// *this.
   AreaViews(const ViewSource& source, int links);
 
-  /// Loads the area, unless it is loaded.
+  /// Loads the area, or what of it was not loaded ahead.
   void enter(const NavigationGraph& graph, const SubAreas& areas, std::size_t area);
+  /// Loads some views of the area that will be entered next, `most_views` at most, so that no look
+  /// has to wait for all of them. Another area than at the last call: what was loaded is dropped.
+  void load_ahead(const NavigationGraph& graph, const SubAreas& areas, std::size_t area,
+                  int most_views);
   /// Empty before the first `enter`.
-  [[nodiscard]] std::optional<std::size_t> area() const noexcept { return area_; }
-  [[nodiscard]] std::size_t size() const noexcept { return memory_ ? memory_->size() : 0; }
-  [[nodiscard]] bool holds(ViewId view) const { return memory_ && memory_->contains(view); }
+  [[nodiscard]] std::optional<std::size_t> area() const noexcept;
+  /// Views held, those loaded ahead included.
+  [[nodiscard]] std::size_t size() const noexcept { return here_.loaded + ahead_.loaded; }
+  /// Whether it belongs to the area that was entered.
+  [[nodiscard]] bool holds(ViewId view) const { return part_of(view) != nullptr; }
 
-  /// These need a loaded area; they throw ContractError otherwise, and on a view that is not
-  /// loaded.
-  [[nodiscard]] const VisualMemory& memory() const;
-  [[nodiscard]] HomingView view(ViewId view) const;
+  /// Throw ContractError on a view that is not loaded.
+  /// How far the robot is turned against the view.
+  [[nodiscard]] std::optional<CompassReading> turn_against(ViewId view, const SeenView& seen);
+  /// By its first components; 0: all.
+  [[nodiscard]] HomingView view(ViewId view, int components = 0);
   /// The least dissimilar of those `nodes` that are loaded; empty when none is. Ties by node.
   [[nodiscard]] std::optional<FoundView> nearest(const NavigationGraph& graph,
                                                  std::span<const std::size_t> nodes,
-                                                 const PackedSignature& packed,
-                                                 const HomingView& view) const;
+                                                 const SeenView& seen);
   /// The least dissimilar of all loaded views.
   [[nodiscard]] std::optional<FoundView> nearest(const NavigationGraph& graph,
-                                                 const PackedSignature& packed,
-                                                 const HomingView& view) const;
+                                                 const SeenView& seen);
+
+  /// Bytes of signatures, and of the index over them, that the comparisons so far have read.
+  [[nodiscard]] std::uint64_t bytes_read() const noexcept { return bytes_read_; }
 
  private:
+  /// An area as far as it is loaded: the first `loaded` of its views, in parts.
+  struct Loading {
+    std::optional<std::size_t> area;
+    std::vector<ViewId> views;  // ascending
+    std::size_t loaded = 0;
+    std::vector<VisualMemory> parts;  // ascending, too
+  };
+  void begin(const NavigationGraph& graph, const SubAreas& areas, std::size_t area,
+             Loading& loading) const;
+  void load(Loading& loading, std::size_t most) const;
+  [[nodiscard]] const VisualMemory* part_of(ViewId view) const;
+  [[nodiscard]] const VisualMemory& require_part_of(ViewId view) const;
+
   const ViewSource* source_;
   int links_;
-  std::optional<std::size_t> area_;
-  std::optional<VisualMemory> memory_;
+  Loading here_;
+  Loading ahead_;
+  std::uint64_t bytes_read_ = 0;
 };
 
 /// Relocalisation over the whole memory, one area after the other, so that no more than one is

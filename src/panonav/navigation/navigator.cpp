@@ -11,7 +11,6 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/homing/fourier_homing.hpp"
 #include "panonav/navigation/obstacle.hpp"
-#include "panonav/signature/compass.hpp"
 
 namespace panonav {
 
@@ -28,6 +27,9 @@ constexpr double most_aside_rad = 1.0;
 // So often the bar of what is closed is made twice as wide at most.
 constexpr int most_widenings = 6;
 
+// Fewer tell no home vector.
+constexpr int least_components = 3;
+
 // Its multiples cover the circle evenly, however many there are.
 constexpr double golden_angle_rad = 2.39996322972865332;
 // A step is short, so there is no need to search far displacements.
@@ -37,8 +39,15 @@ constexpr FourierHomingOptions short_way{.displacement_search = false};
 
 struct Navigator::Seen {
   const FourierSignature& signature;
-  PackedSignature packed;
-  HomingView view;
+  SeenView view;
+};
+
+// The references most like a view: around the last place, and in all of the area.
+struct Navigator::Located {
+  std::vector<std::size_t> around;
+  std::optional<FoundView> here;
+  std::optional<FoundView> anywhere;
+  bool elsewhere = false;  // the latter is another place, and looks right
 };
 
 Navigator::Navigator(const ViewSource& source, AreaPlanner planner, const NavigatorOptions& options)
@@ -49,13 +58,27 @@ Navigator::Navigator(const ViewSource& source, AreaPlanner planner, const Naviga
       views_(source, options.near_links + 1) {
   validate(options_);
   require(planner_.graph().size() > 0, "views of the graph", 0.0, ">= 1");
+  const ViewId first = planner_.graph().view(0);
+  const VisualMemory one = source.load({&first, 1});
+  full_scale_ = one.full_scale();
+  components_ = one.shape().components;
+  const int coarse = options_.coarse_components;
+  require(coarse == 0 || coarse >= least_components, "coarse_components", coarse,
+          "0, or 3 or more");
+  if (coarse < components_) coarse_components_ = coarse;
   scale_ = learn_place_scale(source, planner_.graph());
+  coarse_scale_ = coarse_components_ == 0
+                      ? scale_
+                      : learn_place_scale(source, planner_.graph(), coarse_components_);
+  narrow_ = narrow_places(planner_.graph(), planner_.areas(), options_.near_links);
 }
 
 void Navigator::set_goal(ViewId goal) {
   if (planner_.closed() > 0) planner_.open_all();
   planner_.set_goal(goal);
   goal_ = planner_.graph().node_of(goal);
+  const auto around = nodes_around(planner_.graph(), {&*goal_, 1}, options_.near_links);
+  around_goal_ = {around.begin(), around.end()};
   arrival_ = learn_arrival_scale(*source_, planner_.graph(), goal);
   goal_view_ = homing_view(source_->load({&goal, 1}).signature(goal));
   homing_.reset();
@@ -112,59 +135,100 @@ void Navigator::relocalise(const Seen& seen, NavigationDecision& decision) {
   enter(found->node, decision);
 }
 
-// Where the robot is: near where it was, unless several looks say otherwise.
-void Navigator::locate(const Seen& seen, const RobotReport& report, NavigationDecision& decision) {
+bool Navigator::needs_all_components() const {
+  return coarse_components_ == 0 || !node_ || narrow_[*node_] != 0 ||
+         around_goal_.contains(*node_) || unknown_looks_ > 0 || elsewhere_looks_ > 0 ||
+         2 * looks_in_vain_ > options_.passage_patience;
+}
+
+double Navigator::limit(const SeenView& view) const noexcept {
+  return (view.components == components_ ? scale_ : coarse_scale_).limit();
+}
+
+Navigator::Located Navigator::search_around(const SeenView& view) {
   const NavigationGraph& graph = planner_.graph();
+  Located located;
+  located.around = nodes_around(graph, {&*node_, 1}, options_.near_links);
+  located.here = views_.nearest(graph, located.around, view);
+  located.anywhere = views_.nearest(graph, view);
+  located.elsewhere = located.here && located.anywhere &&
+                      located.anywhere->dissimilarity < located.here->dissimilarity &&
+                      located.anywhere->difference <= limit(view) &&
+                      !std::ranges::binary_search(located.around, located.anywhere->node);
+  return located;
+}
+
+// The place near where the robot was, unless several looks say otherwise.
+void Navigator::accept(const Located& located, NavigationDecision& decision) {
+  if (located.elsewhere) {
+    // The looks must agree on the place, too.
+    const bool again =
+        elsewhere_ && std::ranges::binary_search(
+                          nodes_around(planner_.graph(), {&*elsewhere_, 1}, options_.near_links),
+                          located.anywhere->node);
+    elsewhere_looks_ = again ? elsewhere_looks_ + 1 : 1;
+    elsewhere_ = located.anywhere->node;
+  } else {
+    elsewhere_looks_ = 0;
+    elsewhere_.reset();
+  }
+  const bool accepted = elsewhere_looks_ >= options_.agreeing_looks;
+  const auto& found = accepted ? located.anywhere : located.here;
+  if (found) {
+    decision.difference = found->difference;
+    enter(found->node, decision);
+  }
+  if (accepted) {
+    decision.events.push_back(NavigationEvent::kidnapped);
+    elsewhere_looks_ = 0;
+    elsewhere_.reset();
+    homing_.reset();
+  }
+}
+
+void Navigator::locate(Seen& seen, const RobotReport& report, NavigationDecision& decision) {
   if (report.estimate) {
-    if (const auto estimated = graph.node_of(*report.estimate)) enter(*estimated, decision);
+    const auto estimated = planner_.graph().node_of(*report.estimate);
+    if (estimated) enter(*estimated, decision);
   }
   if (!node_) {
     relocalise(seen, decision);
   } else {
-    const std::size_t from = *node_;
-    const auto around = nodes_around(graph, {&from, 1}, options_.near_links);
-    const auto here = views_.nearest(graph, around, seen.packed, seen.view);
-    const auto anywhere = views_.nearest(graph, seen.packed, seen.view);
-    const bool elsewhere = here && anywhere && anywhere->dissimilarity < here->dissimilarity &&
-                           anywhere->difference <= scale_.limit() &&
-                           !std::ranges::binary_search(around, anywhere->node);
-    if (elsewhere) {
-      // The looks must agree on the place, too.
-      const bool again =
-          elsewhere_ &&
-          std::ranges::binary_search(nodes_around(graph, {&*elsewhere_, 1}, options_.near_links),
-                                     anywhere->node);
-      elsewhere_looks_ = again ? elsewhere_looks_ + 1 : 1;
-      elsewhere_ = anywhere->node;
-    } else {
-      elsewhere_looks_ = 0;
-      elsewhere_.reset();
+    Located located = search_around(seen.view);
+    const bool in_doubt =
+        !located.here || located.elsewhere || located.here->difference > limit(seen.view);
+    if (in_doubt && seen.view.components != components_) {
+      seen.view = SeenView(seen.signature, full_scale_);
+      located = search_around(seen.view);
     }
-    const bool accepted = elsewhere_looks_ >= options_.agreeing_looks;
-    const auto& found = accepted ? anywhere : here;
-    if (found) {
-      decision.difference = found->difference;
-      enter(found->node, decision);
-    }
-    if (accepted) {
-      decision.events.push_back(NavigationEvent::kidnapped);
-      elsewhere_looks_ = 0;
-      elsewhere_.reset();
-      homing_.reset();
-    }
+    accept(located, decision);
   }
-  if (decision.difference <= scale_.limit()) {
+  if (decision.difference <= limit(seen.view)) {
     unknown_looks_ = 0;
     return;
   }
   decision.events.push_back(NavigationEvent::unknown_place);
   ++unknown_looks_;
   if (unknown_looks_ % options_.agreeing_looks == 0) relocalise(seen, decision);
-  if (decision.difference <= scale_.limit()) {
+  if (decision.difference <= limit(seen.view)) {
     unknown_looks_ = 0;
   } else if (unknown_looks_ >= options_.lost_patience) {
     state_ = NavigationState::lost;
   }
+}
+
+// Some views of the area into which the way leads.
+void Navigator::load_ahead() {
+  if (options_.views_ahead == 0 || !node_ || !guide().reachable()) return;
+  const SubAreas& areas = planner_.areas();
+  const std::size_t here = *views_.area();
+  std::size_t node = *node_;
+  while (areas.area_of[node] == here) {
+    const std::size_t next = field_[areas.place_of[node]].next;
+    if (next == node) return;  // the goal
+    node = next;
+  }
+  views_.load_ahead(planner_.graph(), areas, areas.area_of[node], options_.views_ahead);
 }
 
 // Closes a passage that was tried in vain, and all that cross a bar half way along it where
@@ -235,10 +299,11 @@ void Navigator::notice_obstacles(const Seen& seen, const RobotReport& report,
   obstructed_ = report.obstacle;
   heading_for_rad_.reset();
   if (commanded_rad_ && last_view_) {
-    const HomeVector back = home_vector_unchecked(*last_view_, seen.view, short_way);
+    const HomeVector back = home_vector_unchecked(*last_view_, seen.view.view, short_way);
     // The robot stood.
     obstructed_ |= back.confidence < least_confidence &&
-                   image_difference(*last_view_, seen.view) < 0.5 * scale_.neighbours;
+                   image_difference(*last_view_, seen.view.view) <
+                       0.5 * std::min(scale_.neighbours, coarse_scale_.neighbours);
     heading_for_rad_ = wrap_angle(*commanded_rad_ + back.heading_rad);
   }
   if (obstructed_) {
@@ -286,15 +351,19 @@ void Navigator::go_home(const Seen& seen, NavigationDecision& decision) {
     homing_.emplace(*goal_view_, homing);
     decision.events.push_back(NavigationEvent::homing);
   }
-  const PursuitDecision step = homing_->decide(seen.view);
+  const PursuitDecision step = homing_->decide(seen.view.view);
   decision.homing = true;
   decision.difference = step.difference;
   decision.next = planner_.graph().view(*goal_);
   decision.direction_rad = step.turn_rad;
   decision.advance_m = step.advance_m;
   if (step.state == PursuitState::moving) return;
-  // Homing may stop for other reasons than a short vector; the place decides.
-  if (step.difference <= arrival_.difference && step.vector.length() <= arrival_.length) {
+  // Homing may stop for other reasons than a short vector; the place decides. Noise makes a
+  // difference, too: a robot that sees no way left is there when it is more alike than the
+  // references around.
+  const double length = step.vector.length();
+  if ((step.difference <= arrival_.difference && length <= arrival_.length) ||
+      (step.difference <= 2.0 * arrival_.difference && length <= 0.5 * arrival_.length)) {
     state_ = NavigationState::arrived;
     return;
   }
@@ -309,12 +378,13 @@ void Navigator::follow(const Seen& seen, NavigationDecision& decision) {
   decision.next = graph.view(ahead.next);
   // The direction of the reference in the frame of the robot, which is turned against it.
   std::optional<double> direction;
-  const auto turned = compass(seen.packed, views_.memory().packed(graph.view(*node_)));
+  const auto turned = views_.turn_against(graph.view(*node_), seen.view);
   if (ahead.direction_rad && turned) {
     direction = wrap_angle(*ahead.direction_rad - turned->heading_rad);
   }
   if (views_.holds(*decision.next)) {
-    const HomeVector next = home_vector(views_.view(*decision.next), seen.view);
+    const HomeVector next =
+        home_vector(views_.view(*decision.next, seen.view.components), seen.view.view);
     if (next.confidence > least_confidence) {
       const double seen_rad = next.direction_rad();
       const std::optional<double> known = direction || obstructed_ ? direction : heading_for_rad_;
@@ -347,12 +417,8 @@ NavigationDecision Navigator::look(const FourierSignature& view, const RobotRepo
     if (node_) decision.nearest = planner_.graph().view(*node_);
     return decision;
   }
-  if (!views_.area()) {
-    // The first look: any area has the full scale that all have.
-    views_.enter(planner_.graph(), planner_.areas(), 0);
-    field_ = planner_.field(0);
-  }
-  const Seen seen{view, pack(view, views_.memory().full_scale()), homing_view(view)};
+  const std::uint64_t bytes_before = views_.bytes_read();
+  Seen seen{view, SeenView(view, full_scale_, needs_all_components() ? 0 : coarse_components_)};
   locate(seen, report, decision);
   if (state_ == NavigationState::moving) notice_obstacles(seen, report, decision);
   if (state_ == NavigationState::moving && !guide().reachable()) {
@@ -375,12 +441,18 @@ NavigationDecision Navigator::look(const FourierSignature& view, const RobotRepo
   if (state_ == NavigationState::moving && looks_ >= options_.most_looks) {
     state_ = NavigationState::blocked;
   }
-  last_view_ = seen.view;
+  last_view_ = seen.view.view;
   decision.state = state_;
   if (state_ != NavigationState::moving) decision.advance_m = 0.0;
   decision.nearest = planner_.graph().view(*node_);
   decision.area = *views_.area();
   decision.way = guide().way;
+  decision.components = seen.view.components;
+  decision.bytes_read = views_.bytes_read() - bytes_before;
+  // A look that entered an area has loaded enough.
+  const bool entered =
+      std::ranges::find(decision.events, NavigationEvent::entered_area) != decision.events.end();
+  if (state_ == NavigationState::moving && !entered) load_ahead();
   return decision;
 }
 

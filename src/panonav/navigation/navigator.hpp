@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <set>
@@ -20,6 +21,12 @@ namespace panonav {
 struct NavigatorOptions {
   double step_m = 0.25;  ///< longest way between two looks; about half the references' spacing
   int near_links = 2;    ///< the next place is looked for within so many passages of the last one
+  /// Of the signatures, compared in the open: 3 or more, or 0 for all. All are compared so many
+  /// passages around narrow gates and the goal, and where a place is in doubt.
+  int coarse_components = 6;
+  /// Views of the area that comes next which a look loads, so that none waits for all of them. 0:
+  /// none ahead.
+  int views_ahead = 20;
   /// The last stretch. Its difference and length of arrival come from the references around the
   /// goal, its longest step is `step_m` at most.
   HomingPursuitOptions homing;
@@ -61,7 +68,10 @@ enum class NavigationEvent {
 struct RobotReport {
   /// Something stopped the robot before the last step was done.
   bool obstacle = false;
-  /// Where another estimate, as Monte-Carlo localisation is, has the robot: the nearest reference.
+  /// Where another estimate has the robot: the nearest reference, as of `MonteCarlo`'s position or
+  /// of `Localiser`. The navigator takes it for the last place and looks around it, so it need not
+  /// be exact; it is for places that look alike, where a single view misleads, and to start with.
+  /// Leave it empty where the estimate is not certain: the views decide then.
   std::optional<ViewId> estimate;
 };
 
@@ -76,8 +86,10 @@ struct NavigationDecision {
   std::optional<ViewId> next;     ///< the reference ahead
   std::size_t area = 0;           ///< that is loaded
   double difference =
-      0.0;           ///< of what is seen from `nearest` (homing: the goal), `image_difference`
-  double way = 0.0;  ///< that is left along the passages, in the graph's unit
+      0.0;             ///< of what is seen from `nearest` (homing: the goal), `image_difference`
+  double way = 0.0;    ///< that is left along the passages, in the graph's unit
+  int components = 0;  ///< of the signatures, by which references were compared
+  std::uint64_t bytes_read = 0;  ///< of the loaded area's signatures and index, by this look
   std::vector<NavigationEvent> events;
 };
 /// A line for a log.
@@ -87,9 +99,10 @@ struct NavigationDecision {
 /// reference, take its direction, move, look again; the last stretch by homing. As every look
 /// decides anew, neither a distorted map nor a step that leads elsewhere matters.
 ///
-/// Holds the state of a run, and of the memory the views of one area only. Knows nothing of how the
-/// robot moves: `command_towards` (motion/velocity.hpp) does. Same calls, same bits. Cost of a look
-/// without a change of area: the search among the loaded views and three home vectors at most.
+/// Holds the state of a run, and of the memory the views of one area, two at a border. Knows
+/// nothing of how the robot moves: `command_towards` (motion/velocity.hpp) does. Same calls, same
+/// bits. Cost of a look without a change of area: the search among the loaded views and three home
+/// vectors at most.
 class Navigator {
  public:
   /// The source must hold all views of the planner's graph and outlive *this. Throws OptionError,
@@ -111,7 +124,7 @@ class Navigator {
   [[nodiscard]] const AreaPlanner& planner() const noexcept { return planner_; }
   [[nodiscard]] const PlaceScale& place_scale() const noexcept { return scale_; }
   [[nodiscard]] const ArrivalScale& arrival_scale() const noexcept { return arrival_; }
-  /// Views in memory now.
+  /// Views in memory now: of an area and its surroundings, and what is loaded ahead of the next.
   [[nodiscard]] std::size_t loaded_views() const noexcept { return views_.size(); }
 
  private:
@@ -122,7 +135,13 @@ class Navigator {
     int looks = 0;
     int obstructed = 0;
   };
-  void locate(const Seen& seen, const RobotReport& report, NavigationDecision& decision);
+  struct Located;
+  [[nodiscard]] bool needs_all_components() const;
+  [[nodiscard]] double limit(const SeenView& view) const noexcept;
+  [[nodiscard]] Located search_around(const SeenView& view);
+  void locate(Seen& seen, const RobotReport& report, NavigationDecision& decision);
+  void accept(const Located& located, NavigationDecision& decision);
+  void load_ahead();
   void relocalise(const Seen& seen, NavigationDecision& decision);
   void enter(std::size_t node, NavigationDecision& decision);
   void notice_obstacles(const Seen& seen, const RobotReport& report, NavigationDecision& decision);
@@ -139,7 +158,13 @@ class Navigator {
   AreaPlanner planner_;
   NavigatorOptions options_;
   PlaceScale scale_;
+  PlaceScale coarse_scale_;
   ArrivalScale arrival_;
+  float full_scale_ = 1.0F;
+  int components_ = 0;                 // of the memory
+  int coarse_components_ = 0;          // 0: all
+  std::vector<std::uint8_t> narrow_;   // by node
+  std::set<std::size_t> around_goal_;  // nodes
   AreaViews views_;
   std::vector<Guide> field_;  // of the loaded area
 

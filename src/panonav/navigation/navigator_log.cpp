@@ -55,6 +55,16 @@ void visit_options(NavigatorOptions& options, OptionVisitor& visitor) {
                  .low = 1,
                  .high = 10},
                 options.near_links);
+  visitor.visit({.name = "coarse_components",
+                 .help = "components compared in the open, 0 for all",
+                 .low = 0,
+                 .high = 1000},
+                options.coarse_components);
+  visitor.visit({.name = "views_ahead",
+                 .help = "views of the next area that a look loads",
+                 .low = 0,
+                 .high = 1e6},
+                options.views_ahead);
   visit_options(options.homing, visitor);
   visitor.visit({.name = "agreeing_looks",
                  .help = "looks that must agree before another place or a block is believed",

@@ -27,19 +27,22 @@ VisualMemory views_of(const ViewSource& source, const std::vector<ViewPair>& pai
   return source.load(views);
 }
 
-double median_difference(const ViewSource& source, const std::vector<ViewPair>& pairs) {
+double median_difference(const ViewSource& source, const std::vector<ViewPair>& pairs,
+                         int components) {
   const VisualMemory memory = views_of(source, pairs);
+  const auto view = [&](ViewId id) {
+    const HomingView whole = homing_view(memory.signature(id));
+    return components == 0 ? whole : first_components(whole, components);
+  };
   std::vector<double> differences;
-  for (const auto& [a, b] : pairs) {
-    differences.push_back(
-        image_difference(homing_view(memory.signature(a)), homing_view(memory.signature(b))));
-  }
+  for (const auto& [a, b] : pairs) differences.push_back(image_difference(view(a), view(b)));
   return upper_median(std::move(differences));
 }
 
 }  // namespace
 
-PlaceScale learn_place_scale(const ViewSource& source, const NavigationGraph& graph, int samples) {
+PlaceScale learn_place_scale(const ViewSource& source, const NavigationGraph& graph, int components,
+                             int samples) {
   require(samples >= 1, "samples", samples, ">= 1");
   const auto most = static_cast<std::size_t>(samples);
   PlaceScale scale;
@@ -49,7 +52,7 @@ PlaceScale learn_place_scale(const ViewSource& source, const NavigationGraph& gr
     const Passage& passage = graph.passages()[i * passages / std::min(most, passages)];
     linked.emplace_back(passage.a, passage.b);
   }
-  if (!linked.empty()) scale.neighbours = median_difference(source, linked);
+  if (!linked.empty()) scale.neighbours = median_difference(source, linked, components);
   // Views half of all views apart in their order: far from each other but for a few.
   std::vector<ViewPair> strange;
   const std::size_t half = graph.size() / 2;
@@ -57,7 +60,7 @@ PlaceScale learn_place_scale(const ViewSource& source, const NavigationGraph& gr
     const std::size_t first = i * half / std::min(most, half);
     strange.emplace_back(graph.view(first), graph.view(first + half));
   }
-  if (!strange.empty()) scale.strangers = median_difference(source, strange);
+  if (!strange.empty()) scale.strangers = median_difference(source, strange, components);
   return scale;
 }
 

@@ -16,11 +16,11 @@ struct PlaceScale {
   [[nodiscard]] double limit() const noexcept { return 0.5 * (neighbours + strangers); }
 };
 
-/// Learns it from at most `samples` pairs of each kind, evenly spread over the graph. Throws
-/// ContractError unless samples >= 1, and on views that the source has not. Cost: two comparisons
-/// for each sample, some 10 microseconds each.
+/// Learns it from at most `samples` pairs of each kind, evenly spread over the graph, compared by
+/// their first components (0: all). Throws ContractError unless samples >= 1, and on views that the
+/// source has not. Cost: two comparisons for each sample, some 10 microseconds each.
 [[nodiscard]] PlaceScale learn_place_scale(const ViewSource& source, const NavigationGraph& graph,
-                                           int samples = 200);
+                                           int components = 0, int samples = 200);
 
 /// When a robot stands at a place: half the spacing of the references around it, as the views
 /// themselves tell.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <numeric>
 #include <span>
 #include <utility>
@@ -234,6 +235,34 @@ SubAreas divide(const NavigationGraph& graph, const SubAreaOptions& options) {
     }
   }
   return areas;
+}
+
+std::vector<std::uint8_t> narrow_places(const NavigationGraph& graph, const SubAreas& areas,
+                                        int links) {
+  const auto ends_of = [&](std::size_t gate) {
+    const Passage& passage = graph.passages()[gate];
+    return std::pair(*graph.node_of(passage.a), *graph.node_of(passage.b));
+  };
+  std::map<std::pair<std::size_t, std::size_t>, std::size_t> widths;
+  const auto border_of = [&](std::size_t gate) {
+    const auto [a, b] = ends_of(gate);
+    return std::pair<std::size_t, std::size_t>(std::minmax(areas.area_of[a], areas.area_of[b]));
+  };
+  for (const std::size_t gate : areas.gates) ++widths[border_of(gate)];
+  std::vector<std::size_t> ends;
+  for (const std::size_t gate : areas.gates) {
+    const auto border = border_of(gate);
+    const std::size_t smaller =
+        std::min(areas.nodes[border.first].size(), areas.nodes[border.second].size());
+    const std::size_t width = widths[border];
+    if (width * width > smaller) continue;
+    const auto [a, b] = ends_of(gate);
+    ends.push_back(a);
+    ends.push_back(b);
+  }
+  std::vector<std::uint8_t> narrow(graph.size(), 0);
+  for (const std::size_t node : nodes_around(graph, ends, links)) narrow[node] = 1;
+  return narrow;
 }
 
 }  // namespace panonav

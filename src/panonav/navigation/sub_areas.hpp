@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "panonav/core/options.hpp"
@@ -36,5 +37,11 @@ struct SubAreas {
 /// OptionError. Cost: O(iterations passages log(areas)); 10,000 views with 12 links each take about
 /// half a second.
 [[nodiscard]] SubAreas divide(const NavigationGraph& graph, const SubAreaOptions& options = {});
+
+/// 1 for each node at most `links` passages away from a narrow gate, as doors are; 0 for the
+/// others. In the open, an area of n views is some sqrt(n) of them across, and its border on
+/// another one has three times as many passages; a third of that, over the smaller area, is narrow.
+[[nodiscard]] std::vector<std::uint8_t> narrow_places(const NavigationGraph& graph,
+                                                      const SubAreas& areas, int links);
 
 }  // namespace panonav
