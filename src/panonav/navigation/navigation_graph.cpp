@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <numeric>
 #include <set>
@@ -18,8 +19,6 @@ namespace panonav {
 
 namespace {
 
-// Both views of a passage must agree on its direction to this [mapping/lattice.hpp].
-constexpr double most_disagreement_rad = std::numbers::pi / 4.0;
 // Of the median length: what a passage between pictures of one place costs at least, and what one
 // costs of which nothing is known.
 constexpr double least_length_share = 0.1;
@@ -90,6 +89,59 @@ bool is_supported(const NavigationGraph& graph, const Passage& passage) {
   return triangles == 0 || 2 * closed > telling;
 }
 
+// Reads some passages from the phases of their views.
+void read_passages(const ViewSource& source, std::span<const Link> links,
+                   std::span<Passage> passages, Executor& executor) {
+  std::set<ViewId> wanted;
+  for (const Link& link : links) wanted.insert({link.a, link.b});
+  const VisualMemory memory = source.load(std::vector<ViewId>(wanted.begin(), wanted.end()));
+  constexpr std::size_t links_per_chunk = 64;
+  executor.for_chunks(
+      links.size(), links_per_chunk, [&](std::size_t begin, std::size_t end, std::size_t) {
+        for (std::size_t i = begin; i < end; ++i) {
+          passages[i] = {links[i].a, links[i].b, 0.0, std::nullopt};
+          const auto reading = read_phases(homing_view(memory.signature(links[i].a)),
+                                           homing_view(memory.signature(links[i].b)));
+          if (!reading) continue;
+          passages[i].a_from_b = motion_of(*reading);
+          if (passages[i].a_from_b) passages[i].length = reading->length;
+        }
+      });
+}
+
+// For each link the motion of the robot between its views, if it is known, in the unit of `read`.
+std::vector<Passage> driven_passages(std::span<const Link> links,
+                                     std::span<const CoarseMotion> motion,
+                                     std::span<const Passage> read) {
+  std::map<std::pair<ViewId, ViewId>, Pose2> ways;
+  for (const CoarseMotion& way : motion) {
+    if (!is_finite(way.step)) throw ContractError("motion of the robot", "not finite", "finite");
+    ways[{way.from, way.to}] = way.step;
+    ways[{way.to, way.from}] = inverse(way.step);
+  }
+  std::vector<Passage> driven;
+  std::vector<double> units;
+  for (std::size_t i = 0; i < links.size(); ++i) {
+    driven.push_back({links[i].a, links[i].b, 0.0, std::nullopt});
+    const auto way = ways.find({links[i].a, links[i].b});
+    if (way == ways.end()) continue;
+    driven[i].a_from_b = way->second;
+    driven[i].length = std::hypot(way->second.x_m, way->second.y_m);
+    const bool both = driven[i].length > 0.0 && read[i].length > 0.0;
+    if (both && agree(way->second, *read[i].a_from_b)) {
+      units.push_back(read[i].length / driven[i].length);
+    }
+  }
+  const double unit = units.empty() ? 1.0 : upper_median(units);
+  for (Passage& passage : driven) {
+    if (!passage.a_from_b) continue;
+    passage.a_from_b->x_m *= unit;
+    passage.a_from_b->y_m *= unit;
+    passage.length *= unit;
+  }
+  return driven;
+}
+
 }  // namespace
 
 NavigationGraph::NavigationGraph(std::vector<ViewId> views, std::vector<Passage> passages)
@@ -156,33 +208,35 @@ std::vector<std::size_t> nodes_around(const NavigationGraph& graph,
   return {found.begin(), found.end()};
 }
 
-NavigationGraph navigation_graph(const VisualMemory& memory, Executor& executor) {
-  const std::span<const ViewId> views = memory.views();
-  const std::span<const Link> links = memory.links();
+NavigationGraph navigation_graph(const ViewSource& source, std::span<const Link> links,
+                                 std::span<const CoarseMotion> motion, Executor& executor) {
+  const std::span<const ViewId> views = source.views();
   std::vector<Passage> passages(links.size());
-  constexpr std::size_t links_per_chunk = 64;
-  executor.for_chunks(
-      links.size(), links_per_chunk, [&](std::size_t begin, std::size_t end, std::size_t) {
-        for (std::size_t i = begin; i < end; ++i) {
-          Passage& passage = passages[i];
-          passage = {links[i].a, links[i].b, 0.0, std::nullopt};
-          const auto reading = read_phases(homing_view(memory.signature(links[i].a)),
-                                           homing_view(memory.signature(links[i].b)));
-          if (!reading) continue;
-          passage.a_from_b = motion_of(*reading);
-          if (passage.a_from_b) passage.length = reading->length;
-        }
-      });
+  constexpr std::size_t links_at_once = 2048;
+  for (std::size_t first = 0; first < links.size(); first += links_at_once) {
+    const std::size_t count = std::min(links_at_once, links.size() - first);
+    read_passages(source, links.subspan(first, count), std::span(passages).subspan(first, count),
+                  executor);
+  }
+  const std::vector<Passage> driven = driven_passages(links, motion, passages);
   std::vector<Passage> read = passages;
   complete_lengths(read);
   const NavigationGraph graph({views.begin(), views.end()}, std::move(read));
-  for (Passage& passage : passages) {
-    if (passage.a_from_b && !is_supported(graph, passage)) {
+  for (std::size_t i = 0; i < passages.size(); ++i) {
+    Passage& passage = passages[i];
+    if (driven[i].a_from_b) {
+      passage = driven[i];
+    } else if (passage.a_from_b && !is_supported(graph, passage)) {
       passage = {passage.a, passage.b, 0.0, std::nullopt};
     }
   }
   complete_lengths(passages);
   return {{views.begin(), views.end()}, std::move(passages)};
+}
+
+NavigationGraph navigation_graph(const VisualMemory& memory, Executor& executor,
+                                 std::span<const CoarseMotion> motion) {
+  return navigation_graph(MemoryViewSource(memory), memory.links(), motion, executor);
 }
 
 NavigationGraph navigation_graph(const TopologicalMap& map, double least_weight) {

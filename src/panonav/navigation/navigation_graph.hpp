@@ -10,6 +10,7 @@
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/mapping/lattice.hpp"
 #include "panonav/mapping/topological_map.hpp"
+#include "panonav/memory/view_source.hpp"
 #include "panonav/memory/visual_memory.hpp"
 
 namespace panonav {
@@ -64,13 +65,26 @@ class NavigationGraph {
 [[nodiscard]] std::vector<std::size_t> nodes_around(const NavigationGraph& graph,
                                                     std::span<const std::size_t> from, int links);
 
-/// A passage for each link of the memory, read from the phases of its two views by their home
-/// vectors [M04 section 3.5]: no position is looked at. Lengths are in units of R, the typical
-/// distance of the things around, and at least a tenth of their median. Where the answers of both
-/// views differ by more than 45 degrees, or not more than half of the triangles with third views
-/// close to that, as `arrange` asks, nothing is told: the passage counts as three times the median
-/// length. Cost: two home vectors a link, about a millisecond.
-[[nodiscard]] NavigationGraph navigation_graph(const VisualMemory& memory, Executor& executor);
+/// The two views of a passage must agree on its direction to this [mapping/lattice.hpp].
+inline constexpr double most_disagreement_rad = 0.78539816339744831;
+
+/// A passage for each link, read from the phases of its two views by their home vectors [M04
+/// section 3.5]: no position is looked at. Lengths are in units of R, the typical distance of the
+/// things around, and at least a tenth of their median. Where the answers of both views differ by
+/// more than 45 degrees, or not more than half of the triangles with third views close to that, as
+/// `arrange` asks, nothing is told: the passage counts as three times the median length. `motion`:
+/// ways of the robot between linked views, in either direction; they tell more than phases and
+/// count instead, in units of the latter as passages that have both tell these (none does: of
+/// metres). Motions of views without a link do not count. No more than some thousand views are held
+/// at once. Throws ContractError on a link of a view that the source has not and on a motion that is
+/// not finite. Cost: two home vectors a link, about a millisecond.
+[[nodiscard]] NavigationGraph navigation_graph(const ViewSource& source,
+                                               std::span<const Link> links,
+                                               std::span<const CoarseMotion> motion,
+                                               Executor& executor);
+/// The same of a memory that is held whole, and its links.
+[[nodiscard]] NavigationGraph navigation_graph(const VisualMemory& memory, Executor& executor,
+                                               std::span<const CoarseMotion> motion = {});
 
 /// A passage for each edge of a map within one part whose weight is at least `least_weight`: what
 /// lies below contradicts the rest of the map. Motions and lengths follow from the poses. Throws
