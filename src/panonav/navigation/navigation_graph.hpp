@@ -76,8 +76,8 @@ inline constexpr double most_disagreement_rad = 0.78539816339744831;
 /// ways of the robot between linked views, in either direction; they tell more than phases and
 /// count instead, in units of the latter as passages that have both tell these (none does: of
 /// metres). Motions of views without a link do not count. No more than some thousand views are held
-/// at once. Throws ContractError on a link of a view that the source has not and on a motion that is
-/// not finite. Cost: two home vectors a link, about a millisecond.
+/// at once. Throws ContractError on a link of a view that the source has not and on a motion that
+/// is not finite. Cost: two home vectors a link, about a millisecond.
 [[nodiscard]] NavigationGraph navigation_graph(const ViewSource& source,
                                                std::span<const Link> links,
                                                std::span<const CoarseMotion> motion,

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/median.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/homing/fourier_homing.hpp"
 #include "panonav/navigation/obstacle.hpp"
@@ -20,13 +21,16 @@ namespace {
 constexpr double least_confidence = 0.5;
 // The next reference as the robot sees it now counts where it does not contradict the field.
 constexpr double most_correction_rad = std::numbers::pi / 3.0;
-// How a robot that is obstructed tries to get past before the way counts as blocked.
+// How a robot that is obstructed tries to get past: so many times before the way counts as blocked.
 constexpr std::array<double, 5> detours_rad{0.0, 0.7, -0.7, 1.3, -1.3};
-// A step that is turned aside by more says nothing about the passage ahead.
+// A search step that is turned aside by more says nothing about the passage ahead.
 constexpr double most_aside_rad = 1.0;
 // So often the bar of what is closed is made twice as wide at most.
 constexpr int most_widenings = 6;
 
+// A passage so much longer than usual is held to until its end. `step_m` is half a usual passage.
+constexpr double least_long = 2.0;
+constexpr double steps_of_passage = 2.0;
 // Fewer tell no home vector.
 constexpr int least_components = 3;
 
@@ -70,6 +74,9 @@ Navigator::Navigator(const ViewSource& source, AreaPlanner planner, const Naviga
   coarse_scale_ = coarse_components_ == 0
                       ? scale_
                       : learn_place_scale(source, planner_.graph(), coarse_components_);
+  std::vector<double> lengths;
+  for (const Passage& passage : planner_.graph().passages()) lengths.push_back(passage.length);
+  if (!lengths.empty()) typical_length_ = upper_median(std::move(lengths));
   narrow_ = narrow_places(planner_.graph(), planner_.areas(), options_.near_links);
 }
 
@@ -87,7 +94,6 @@ void Navigator::set_goal(ViewId goal) {
   elsewhere_.reset();
   aimed_for_.reset();
   tries_.clear();
-  visited_.clear();
   suspects_.clear();
   obstructed_ = false;
   looks_in_vain_ = closings_in_vain_ = 0;
@@ -101,11 +107,13 @@ void Navigator::forget_place() {
   homing_.reset();
   last_view_.reset();
   commanded_rad_.reset();
+  under_way_.reset();
 }
 
 // The field of the loaded area, and progress, start anew.
 void Navigator::plan_fields() {
   if (views_.area()) field_ = planner_.field(*views_.area());
+  under_way_.reset();
   least_way_ = std::numeric_limits<double>::infinity();
 }
 
@@ -132,13 +140,14 @@ void Navigator::relocalise(const Seen& seen, NavigationDecision& decision) {
   if (node_) decision.events.push_back(NavigationEvent::kidnapped);
   decision.difference = found->difference;
   homing_.reset();
+  under_way_.reset();
   enter(found->node, decision);
 }
 
 bool Navigator::needs_all_components() const {
   return coarse_components_ == 0 || !node_ || narrow_[*node_] != 0 ||
          around_goal_.contains(*node_) || unknown_looks_ > 0 || elsewhere_looks_ > 0 ||
-         2 * looks_in_vain_ > options_.passage_patience;
+         2 * looks_in_vain_ > patience();
 }
 
 double Navigator::limit(const SeenView& view) const noexcept {
@@ -183,6 +192,7 @@ void Navigator::accept(const Located& located, NavigationDecision& decision) {
     elsewhere_looks_ = 0;
     elsewhere_.reset();
     homing_.reset();
+    under_way_.reset();
   }
 }
 
@@ -203,7 +213,13 @@ void Navigator::locate(Seen& seen, const RobotReport& report, NavigationDecision
     }
     accept(located, decision);
   }
-  if (decision.difference <= limit(seen.view)) {
+  if (under_way_) {
+    const bool beyond =
+        decision.difference <= limit(seen.view) && guide().way < under_way_->guide.way;
+    if (beyond || --under_way_->looks_left < 0) under_way_.reset();
+  }
+  // Between references that stand far apart no place looks right.
+  if (decision.difference <= limit(seen.view) || under_way_) {
     unknown_looks_ = 0;
     return;
   }
@@ -233,13 +249,14 @@ void Navigator::load_ahead() {
 
 // Closes a passage that was tried in vain, and all that cross a bar half way along it where
 // something stood in the way. The bar is twice as wide each time that closing brought the robot
-// nowhere new: so a wide thing is soon closed as a whole, and a narrow one leaves its sides open.
+// no farther away: so a wide thing is soon closed as a whole, and a narrow one leaves its sides
+// open.
 void Navigator::close_way(std::size_t passage, NavigationDecision& decision) {
   const NavigationGraph& graph = planner_.graph();
   const Tries tried = tries_.at(passage);
   std::vector<std::size_t> shut{passage};
   const auto motion = graph.motion_from(tried.node, passage);
-  const bool is_wide = tried.obstructed > 1 || closings_in_vain_ > 0;
+  const bool is_wide = tried.obstructed > 1 || closings_in_vain_ > 0 || !suspects_.empty();
   if (is_wide && motion && (motion->x_m != 0.0 || motion->y_m != 0.0)) {
     const double half = 0.5 * std::hypot(motion->x_m, motion->y_m);
     const auto across = passages_across(graph,
@@ -249,11 +266,14 @@ void Navigator::close_way(std::size_t passage, NavigationDecision& decision) {
     shut.insert(shut.end(), across.begin(), across.end());
   }
   // What was closed before and is no better now is closed as a whole.
-  if (suspects_.contains(passage)) shut.insert(shut.end(), suspects_.begin(), suspects_.end());
+  if (std::ranges::any_of(shut, [&](std::size_t p) { return suspects_.contains(p); })) {
+    shut.insert(shut.end(), suspects_.begin(), suspects_.end());
+  }
   planner_.close(shut);
   decision.events.push_back(NavigationEvent::closed);
   obstruction_ = looks_in_vain_ = 0;
   closings_in_vain_ = std::min(closings_in_vain_ + 1, most_widenings);
+  around_closed_ = nodes_around(graph, {&tried.node, 1}, 2 * options_.near_links);
   tries_.clear();
   plan_fields();
 }
@@ -272,7 +292,6 @@ void Navigator::try_again(NavigationDecision& decision, NavigationState otherwis
   }
   planner_.open_all();
   tries_.clear();
-  visited_.clear();
   looks_in_vain_ = closings_in_vain_ = 0;
   decision.events.push_back(NavigationEvent::reopened);
   plan_fields();
@@ -280,7 +299,7 @@ void Navigator::try_again(NavigationDecision& decision, NavigationState otherwis
 
 // What became of the step before, and whether the robot comes nearer to the goal.
 void Navigator::count_try() {
-  if (visited_.insert(*node_).second) closings_in_vain_ = 0;
+  if (!std::ranges::binary_search(around_closed_, *node_)) closings_in_vain_ = 0;
   const auto tried = aimed_for_ ? tries_.find(*aimed_for_) : tries_.end();
   if (tried != tries_.end()) tried->second.obstructed += static_cast<int>(obstructed_);
   ++looks_in_vain_;
@@ -308,6 +327,7 @@ void Navigator::notice_obstacles(const Seen& seen, const RobotReport& report,
   }
   if (obstructed_) {
     obstruction_ += 2;
+    under_way_.reset();
     decision.events.push_back(NavigationEvent::obstructed);
   } else if (obstruction_ > 0) {
     --obstruction_;
@@ -322,13 +342,34 @@ void Navigator::notice_obstacles(const Seen& seen, const RobotReport& report,
   if (tries_.empty() || !guide().reachable()) return;
   const auto most_obstructed =
       std::ranges::max_element(tries_, {}, [](const auto& t) { return t.second.obstructed; });
-  if (most_obstructed->second.obstructed >= options_.agreeing_looks) {
+  if (most_obstructed->second.obstructed >= static_cast<int>(detours_rad.size())) {
     close_way(most_obstructed->first, decision);
-  } else if (looks_in_vain_ > options_.passage_patience) {
+  } else if (looks_in_vain_ > patience()) {
     close_way(
         std::ranges::max_element(tries_, {}, [](const auto& t) { return t.second.looks; })->first,
         decision);
   }
+}
+
+// Of the passage ahead over that of a usual one; 0 where nothing tells.
+double Navigator::relative_length(const Guide& ahead) const {
+  if (!ahead.reachable()) return 0.0;
+  const Passage& passage = planner_.graph().passages()[ahead.passage];
+  return passage.a_from_b ? passage.length / typical_length_ : 0.0;
+}
+
+// A robot along a passage has come to no other view yet, so a long one takes more looks.
+int Navigator::patience() const {
+  double length = 0.0;
+  if (*node_ != *goal_) length = relative_length(under_way_ ? under_way_->guide : guide());
+  return static_cast<int>(std::ceil(options_.passage_patience * std::max(1.0, length)));
+}
+
+// Along a long passage the robot goes on for its end, whatever reference is nearest meanwhile.
+void Navigator::begin_long_way() {
+  const double length = relative_length(guide());
+  if (under_way_ || length < least_long) return;
+  under_way_ = {*node_, guide(), static_cast<int>(std::ceil(steps_of_passage * length))};
 }
 
 // By how much the direction is turned: to get past what is in the way, or, where a direction turned
@@ -337,7 +378,7 @@ double Navigator::detour_rad() const {
   if (obstruction_ >= 2) {
     return detours_rad[static_cast<std::size_t>(obstruction_ / 2) % detours_rad.size()];
   }
-  const int searching = looks_in_vain_ - (options_.passage_patience + 1) / 2;
+  const int searching = looks_in_vain_ - (patience() + 1) / 2;
   return searching <= 0 ? 0.0 : wrap_angle(golden_angle_rad * searching);
 }
 
@@ -374,11 +415,14 @@ void Navigator::go_home(const Seen& seen, NavigationDecision& decision) {
 
 void Navigator::follow(const Seen& seen, NavigationDecision& decision) {
   const NavigationGraph& graph = planner_.graph();
-  const Guide& ahead = guide();
+  begin_long_way();
+  const std::size_t from = under_way_ ? under_way_->from : *node_;
+  const Guide ahead = under_way_ ? under_way_->guide : guide();
   decision.next = graph.view(ahead.next);
   // The direction of the reference in the frame of the robot, which is turned against it.
   std::optional<double> direction;
-  const auto turned = views_.turn_against(graph.view(*node_), seen.view);
+  std::optional<CompassReading> turned;
+  if (views_.holds(graph.view(from))) turned = views_.turn_against(graph.view(from), seen.view);
   if (ahead.direction_rad && turned) {
     direction = wrap_angle(*ahead.direction_rad - turned->heading_rad);
   }
@@ -403,9 +447,9 @@ void Navigator::follow(const Seen& seen, NavigationDecision& decision) {
   decision.direction_rad = wrap_angle(*direction + detour);
   decision.advance_m = options_.step_m;
   commanded_rad_ = decision.direction_rad;
-  Tries& tries = tries_.try_emplace(ahead.passage, Tries{*node_, 0, 0}).first->second;
+  Tries& tries = tries_.try_emplace(ahead.passage, Tries{from, 0, 0}).first->second;
   ++tries.looks;
-  if (std::abs(detour) < most_aside_rad) aimed_for_ = ahead.passage;
+  if (obstruction_ >= 2 || std::abs(detour) < most_aside_rad) aimed_for_ = ahead.passage;
 }
 
 NavigationDecision Navigator::look(const FourierSignature& view, const RobotReport& report) {

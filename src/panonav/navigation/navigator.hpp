@@ -32,8 +32,8 @@ struct NavigatorOptions {
   HomingPursuitOptions homing;
   int agreeing_looks = 3;  ///< looks that must agree before another place or a block is believed
   int lost_patience = 12;  ///< looks without a known place after which the robot is lost
-  /// Looks without coming nearer to the goal; from half of them on the robot searches around. Then
-  /// the passage that was tried most counts as blocked.
+  /// Looks without coming nearer to the goal, more along a longer passage than usual; from half of
+  /// them on the robot searches around. Then the passage that was tried most counts as blocked.
   int passage_patience = 8;
   int attempts = 3;       ///< times that closed passages, or the last stretch, are tried
   int most_looks = 5000;  ///< after which a run ends as blocked
@@ -139,6 +139,14 @@ class Navigator {
   [[nodiscard]] bool needs_all_components() const;
   [[nodiscard]] double limit(const SeenView& view) const noexcept;
   [[nodiscard]] Located search_around(const SeenView& view);
+  /// A passage so long that other references may be nearer than its ends on the way.
+  struct UnderWay {
+    std::size_t from = 0;  // node
+    Guide guide;           // there
+    int looks_left = 0;
+  };
+  [[nodiscard]] double relative_length(const Guide& ahead) const;
+  void begin_long_way();
   void locate(Seen& seen, const RobotReport& report, NavigationDecision& decision);
   void accept(const Located& located, NavigationDecision& decision);
   void load_ahead();
@@ -152,6 +160,7 @@ class Navigator {
   void go_home(const Seen& seen, NavigationDecision& decision);
   void follow(const Seen& seen, NavigationDecision& decision);
   void plan_fields();
+  [[nodiscard]] int patience() const;
   [[nodiscard]] double detour_rad() const;
 
   const ViewSource* source_;
@@ -163,6 +172,7 @@ class Navigator {
   float full_scale_ = 1.0F;
   int components_ = 0;                 // of the memory
   int coarse_components_ = 0;          // 0: all
+  double typical_length_ = 1.0;        // of a passage
   std::vector<std::uint8_t> narrow_;   // by node
   std::set<std::size_t> around_goal_;  // nodes
   AreaViews views_;
@@ -177,6 +187,7 @@ class Navigator {
       commanded_rad_;  // direction of the step before, in the frame of `last_view_`
   std::optional<double> heading_for_rad_;  // the same in the current frame, unless it failed
   NavigationState state_ = NavigationState::moving;
+  std::optional<UnderWay> under_way_;
   int looks_ = 0;
   int unknown_looks_ = 0;
   int elsewhere_looks_ = 0;
@@ -186,11 +197,11 @@ class Navigator {
   int attempts_ = 0;
   double least_way_ = 0.0;    // since the last plan
   int looks_in_vain_ = 0;     // since the way became shorter or a passage was closed
-  int closings_in_vain_ = 0;  // since the robot came to a view where it had not been before
-  std::map<std::size_t, Tries> tries_;    // of passages, since the way became shorter
-  std::set<std::size_t> visited_;         // nodes, in this attempt
-  std::set<std::size_t> suspects_;        // passages that were closed in earlier attempts
-  std::optional<std::size_t> aimed_for_;  // passage of the step before, unless that led around
+  int closings_in_vain_ = 0;  // since the robot was far from the last passage that was closed
+  std::map<std::size_t, Tries> tries_;      // of passages, since the way became shorter
+  std::vector<std::size_t> around_closed_;  // nodes around that passage, ascending
+  std::set<std::size_t> suspects_;          // passages that were closed in earlier attempts
+  std::optional<std::size_t> aimed_for_;    // passage of the step before, unless that led around
 };
 
 }  // namespace panonav
