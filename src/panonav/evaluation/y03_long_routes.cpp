@@ -93,6 +93,7 @@ void report_routes(const RouteReproductionOptions& options, const std::string& n
   std::size_t runs = 0;
   std::size_t lines = 0;
   std::size_t off_route = 0;
+  std::size_t turned_aside = 0;
   for (const RepeatedRoute& route : routes) {
     for (std::size_t i = 0; i < route.runs.size(); ++i) {
       const RouteRun& run = route.runs[i];
@@ -104,6 +105,7 @@ void report_routes(const RouteReproductionOptions& options, const std::string& n
       completed += run.completes() ? 1 : 0;
       lines += run.truth.size();
       off_route += run.off_route;
+      turned_aside += run.turned_aside;
       ++runs;
     }
   }
@@ -129,6 +131,8 @@ void report_routes(const RouteReproductionOptions& options, const std::string& n
   }
   add_rate(result, id + ".off_route", what + ": lines taken for not on this route", off_route,
            lines);
+  add_rate(result, id + ".turned_aside", what + ": steps at which something was in the way",
+           turned_aside, lines);
   const std::string file = "route_" + name + ".png";
   write_plot(options.out / file, map_of(first_place, routes.front()));
   result.pictures.push_back(

@@ -118,6 +118,28 @@ Pose2 start_beside(const RouteScene& place, std::span<const Point2> path, const 
   return start;
 }
 
+// Past what stands in the way: the nearest direction to the wanted one, 15 degrees apart, in which
+// half of the step is free; empty when there is none. A differential drive turns, then drives.
+std::optional<Pose2> step_past(const RouteScene& place, const Pose2& robot, const Pose2& wanted) {
+  if (reaches(place, robot.position(), (robot * wanted).position())) return wanted;
+  const double half_m = 0.5 * std::hypot(wanted.x_m, wanted.y_m);
+  constexpr int feelers_each_side = 11;
+  for (int i = 1; i <= feelers_each_side; ++i) {
+    for (const double side : {1.0, -1.0}) {
+      const Pose2 aside = Pose2{0.0, 0.0, side * i * radians(15.0)} * Pose2{half_m, 0.0, 0.0};
+      if (reaches(place, robot.position(), (robot * aside).position())) return aside;
+    }
+  }
+  return std::nullopt;
+}
+
+// Looking for the route: ever wider around where the robot is, 0.5 m after some 25 steps.
+Pose2 spiral_step(int step) {
+  const double turn = 1.0 / (1.0 + 0.15 * step);
+  constexpr double step_m = 0.1;
+  return {step_m * std::cos(0.5 * turn), step_m * std::sin(0.5 * turn), turn};
+}
+
 }  // namespace
 
 RouteScene make_route_scene(Scene scene, const std::string& name, Executor& executor) {
@@ -219,11 +241,15 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
   const auto most_steps = static_cast<int>(3.0 * follower.length_m() / options.step_m) + 50;
   RouteRun run;
   Pose2 told;
+  // Odometry carries over a few lines that tell nothing; after that the route must be looked for.
+  constexpr int patience = 4;
+  int unknown = 0;
   for (int step = 0; step < most_steps; ++step) {
     const auto line = take_line(*place.renderer, robot, place.camera, noise_of_lines.next());
     const auto found = tracker.track(line, told);
     run.truth.push_back(robot);
     run.lateral_m.push_back(off_part_m(robot.position(), way, follower.along_m()));
+    unknown = found ? 0 : unknown + 1;
     if (found) {
       run.position_m.push_back(distance(found->fix.pose.position(), robot.position()));
     } else {
@@ -234,11 +260,21 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
       run.arrived = true;
       break;
     }
-    told = *next;
-    robot = robot * wheels.true_step(told, random);
-    if (!has_room(place, robot.position())) {
+    const Pose2 wanted = unknown < patience ? *next : spiral_step(unknown - patience);
+    const auto free_step = step_past(place, robot, wanted);
+    if (!free_step) {
       run.blocked = true;
       break;
+    }
+    told = *free_step;
+    run.turned_aside += static_cast<std::size_t>(told != wanted);
+    const Pose2 there = robot * wheels.true_step(told, random);
+    // Where the wheels led it astray it touches something: it turns, but does not move.
+    if (reaches(place, robot.position(), there.position())) {
+      robot = there;
+    } else {
+      robot.heading_rad = there.heading_rad;
+      ++run.turned_aside;
     }
   }
   run.end_distance_m = distance(robot.position(), path.back());

@@ -61,7 +61,8 @@ struct RouteRun {
   std::vector<double> position_m;  ///< error of the fixes
   std::size_t off_route = 0;       ///< lines that it took for not on this route
   bool arrived = false;            ///< by its own word
-  bool blocked = false;            ///< something was in its way
+  std::size_t turned_aside = 0;    ///< steps at which something was in its way
+  bool blocked = false;            ///< on all sides
   double end_distance_m = 0.0;     ///< from the end of the route
 
   /// Not stopped, and at the end of the route where it says so.
@@ -71,8 +72,10 @@ struct RouteRun {
 };
 
 /// A robot repeats a route in closed loop: each line is fitted into the route panorama from where
-/// the wheels put it, and the robot steers to the place a little ahead on the path. `tracker` is
-/// one of this route. The same seed gives the same run. Cost: a line a step.
+/// the wheels put it, and the robot steers to the place a little ahead on the path. It feels
+/// what is in its way and goes past, and drives a spiral when some lines one after the other are
+/// not of the route. `tracker` is one of this route. The same seed gives the same run. Cost: a line
+/// a step.
 [[nodiscard]] RouteRun repeat_route(const RouteScene& place, RouteTracker tracker,
                                     const RouteRunOptions& options, std::uint64_t seed);
 
