@@ -34,6 +34,23 @@ TEST(Velocity, SlowTurnsJoinStraightLines) {
   }
 }
 
+TEST(Velocity, AnyStepIsMadeByItsVelocity) {
+  Random random(5);
+  for (int i = 0; i < 200; ++i) {
+    const double turn = i % 10 == 0 ? random.uniform(-1e-7, 1e-7) : random.uniform(-pi, pi);
+    const Pose2 step{random.uniform(-1, 1), random.uniform(-1, 1), turn};
+    const double t = random.uniform(0.05, 2.0);
+    const Velocity velocity = velocity_for(step, t);
+    const Pose2 made = motion_after(velocity, t);
+    EXPECT_NEAR(distance(made.position(), step.position()), 0.0, 1e-12);
+    EXPECT_NEAR(std::remainder(made.heading_rad - turn, 2.0 * pi), 0.0, 1e-12);
+  }
+  // Wheels without slip: the chord has half the turn.
+  const Velocity arc = velocity_for({std::cos(0.2), std::sin(0.2), 0.4}, 0.5);
+  EXPECT_NEAR(arc.left_m_s, 0.0, 1e-12);
+  EXPECT_GT(arc.forward_m_s, 2.0);
+}
+
 TEST(Velocity, BothDrivesReachAnyPointAndKeepTheirLimits) {
   for (const DriveKind drive : {DriveKind::holonomic, DriveKind::differential}) {
     const BaseOptions options{.drive = drive};
@@ -71,6 +88,8 @@ TEST(Velocity, StandsAtThePointAndRefusesWhatIsNoNumber) {
   EXPECT_THROW((void)command_towards(0.0, -1.0, {}), ContractError);
   EXPECT_THROW((void)command_towards(0.0, 1.0, {.speed_m_s = 0.0}), OptionError);
   EXPECT_THROW((void)motion_after({}, -1.0), ContractError);
+  EXPECT_THROW((void)velocity_for({}, 0.0), ContractError);
+  EXPECT_THROW((void)velocity_for({nan, 0.0, 0.0}, 1.0), ContractError);
 }
 
 }  // namespace

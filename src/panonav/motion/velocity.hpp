@@ -43,6 +43,11 @@ void visit_options(BaseOptions& options, OptionVisitor& visitor);
 /// robot_old_from_robot_new after driving so for a time >= 0: an arc, or a straight line.
 [[nodiscard]] Pose2 motion_after(const Velocity& velocity, double duration_s);
 
+/// The constant velocity that makes an odometry step in a time > 0, as of `PathFollower`:
+/// motion_after(velocity_for(step, t), t) is the step. A differential drive can make it only if the
+/// chord of the step has half its turn. Throws ContractError.
+[[nodiscard]] Velocity velocity_for(const Pose2& step, double duration_s);
+
 /// What is left of a way to a point (in the old robot frame) after the robot moved by
 /// `robot_old_from_robot_new`: the point in the new frame.
 [[nodiscard]] inline Point2 remaining_way(Point2 target, const Pose2& robot_old_from_robot_new) {

@@ -162,9 +162,10 @@ NavigationGraph::NavigationGraph(std::vector<ViewId> views, std::vector<Passage>
     ends.push_back({std::min(*a, *b), std::max(*a, *b), ends.size()});
   }
   std::ranges::sort(ends, {}, [](const Ends& e) { return std::tuple(e.low, e.high, e.passage); });
-  const auto doubles = std::ranges::unique(
-      ends, [](const Ends& x, const Ends& y) { return x.low == y.low && x.high == y.high; });
-  ends.erase(doubles.begin(), doubles.end());
+  ends.erase(
+      std::unique(ends.begin(), ends.end(),
+                  [](const Ends& x, const Ends& y) { return x.low == y.low && x.high == y.high; }),
+      ends.end());
   for (const Ends& e : ends) {
     ++begins_[e.low + 1];
     ++begins_[e.high + 1];

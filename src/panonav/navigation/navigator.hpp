@@ -68,10 +68,10 @@ enum class NavigationEvent {
 struct RobotReport {
   /// Something stopped the robot before the last step was done.
   bool obstacle = false;
-  /// Where another estimate has the robot: the nearest reference, as of `MonteCarlo`'s position or
-  /// of `Localiser`. The navigator takes it for the last place and looks around it, so it need not
-  /// be exact; it is for places that look alike, where a single view misleads, and to start with.
-  /// Leave it empty where the estimate is not certain: the views decide then.
+  /// Where another estimate has the robot: the reference nearest to a position of
+  /// `MonteCarloLocaliser`, or the first of `Localiser`. It is taken for the last place, and the
+  /// navigator looks around it, so it need not be exact. For places that look alike, where a single
+  /// view misleads. Leave it empty where the estimate is not certain: the views decide then.
   std::optional<ViewId> estimate;
 };
 
