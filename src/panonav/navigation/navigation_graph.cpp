@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <numeric>
@@ -257,10 +258,55 @@ NavigationGraph navigation_graph(const TopologicalMap& map, double least_weight)
   return {std::move(views), std::move(passages)};
 }
 
+namespace {
+
+// Passages that are much farther than from a view to its nearest one are left out where nearer ones
+// lead there, too. `far`: by passage.
+void leave_out_far_ones(const std::vector<ViewId>& views, const std::vector<double>& far,
+                        std::vector<Passage>& passages) {
+  // Views of a square grid have others at 1.41 and 2 spacings.
+  constexpr double most_spacings = 2.0;
+  const auto node_of = [&](ViewId view) {
+    return static_cast<std::size_t>(std::ranges::lower_bound(views, view) - views.begin());
+  };
+  std::vector<double> nearest(views.size(), std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i < passages.size(); ++i) {
+    for (const ViewId end : {passages[i].a, passages[i].b}) {
+      nearest[node_of(end)] = std::min(nearest[node_of(end)], far[i]);
+    }
+  }
+  std::erase_if(nearest, [](double length) { return !std::isfinite(length); });
+  if (nearest.empty()) return;
+  const auto middle = nearest.begin() + static_cast<std::ptrdiff_t>(nearest.size() / 2);
+  std::ranges::nth_element(nearest, middle);
+  const double most = most_spacings * *middle;
+  // The nearest first, so that far ones come when all near ones have joined what they can.
+  std::vector<std::size_t> order(passages.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return far[i]; });
+  std::vector<std::size_t> group(views.size());
+  std::iota(group.begin(), group.end(), std::size_t{0});
+  const auto group_of = [&](std::size_t node) {
+    while (group[node] != node) node = group[node] = group[group[node]];
+    return node;
+  };
+  std::vector<Passage> kept;
+  for (const std::size_t i : order) {
+    const std::size_t a = group_of(node_of(passages[i].a));
+    const std::size_t b = group_of(node_of(passages[i].b));
+    group[std::max(a, b)] = std::min(a, b);
+    if (far[i] <= most || a != b) kept.push_back(passages[i]);
+  }
+  passages = std::move(kept);
+}
+
+}  // namespace
+
 NavigationGraph navigation_graph(const Lattice& lattice, double least_weight) {
   std::vector<ViewId> views;
   for (const LatticeNode& node : lattice.nodes) views.push_back(node.view);
   std::vector<Passage> passages;
+  std::vector<double> far;
   for (const LatticeSpring& spring : lattice.springs) {
     const LatticeNode& a = lattice.nodes.at(spring.a);
     const LatticeNode& b = lattice.nodes.at(spring.b);
@@ -276,8 +322,11 @@ NavigationGraph navigation_graph(const Lattice& lattice, double least_weight) {
       a_from_b->y_m *= length / spring.phases->length;
     }
     passages.push_back({a.view, b.view, length, a_from_b});
+    // As the two views say, or as all others do, whichever is more.
+    far.push_back(std::max(length, spring.length));
   }
   complete_lengths(passages);
+  leave_out_far_ones(views, far, passages);
   return {std::move(views), std::move(passages)};
 }
 

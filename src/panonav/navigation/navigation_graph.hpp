@@ -92,9 +92,11 @@ inline constexpr double most_disagreement_rad = 0.78539816339744831;
 [[nodiscard]] NavigationGraph navigation_graph(const TopologicalMap& map,
                                                double least_weight = 0.1);
 
-/// A passage for each spring that kept `least_weight` of itself. Lengths follow from the
-/// arrangement, directions and turns from the phases of its two views where these tell them: so the
-/// distortion of the arrangement bends no direction.
+/// A passage for each spring that kept `least_weight` of itself and is no longer than two spacings,
+/// and those longer ones without which parts of the lattice would not be joined: views that are far
+/// from each other tell less of the direction, and nothing of what stands between. Lengths follow
+/// from the arrangement, directions and turns from the phases of its two views where these tell
+/// them: so the distortion of the arrangement bends no direction.
 [[nodiscard]] NavigationGraph navigation_graph(const Lattice& lattice, double least_weight = 0.1);
 
 }  // namespace panonav

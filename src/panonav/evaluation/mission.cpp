@@ -1,0 +1,265 @@
+#include "panonav/evaluation/mission.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/evaluation/mapping_run.hpp"
+#include "panonav/geometry/positions.hpp"
+#include "panonav/mapping/lattice.hpp"
+#include "panonav/panorama/preprocessing.hpp"
+#include "panonav/signature/fourier_signature.hpp"
+#include "panonav/simulation/recording.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr double pi = std::numbers::pi;
+// Between robot and things where references are taken.
+constexpr double room_m = 0.2;
+
+std::vector<FourierSignature> see_all(const MissionPlace& place, const std::vector<Pose2>& poses,
+                                      std::uint64_t seed, Executor& executor) {
+  std::vector<std::optional<FourierSignature>> seen(poses.size());
+  executor.for_chunks(poses.size(), 4, [&](std::size_t begin, std::size_t end, std::size_t) {
+    for (std::size_t i = begin; i < end; ++i) {
+      seen[i] = see(place, poses[i], Random(seed, i).next());
+    }
+  });
+  std::vector<FourierSignature> views;
+  for (auto& view : seen) views.push_back(std::move(*view));
+  return views;
+}
+
+// Packed so that the largest magnitude just fits.
+VisualMemory memory_of(const std::vector<FourierSignature>& views) {
+  float largest = 0.0F;
+  for (const FourierSignature& view : views) {
+    largest = std::max(largest, *std::ranges::max_element(view.magnitudes().subspan(
+                                    static_cast<std::size_t>(view.rows()))));
+  }
+  VisualMemory memory({views.front().rows(), views.front().components()},
+                      largest > 0.0F ? largest : 1.0F, views.front().elevations());
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    static_cast<void>(memory.append(views[i], {.name = std::to_string(i)}));
+  }
+  return memory;
+}
+
+// Whether the robot touches nothing on the straight way. Scenes name areas to drive in, too, whose
+// borders are nothing to touch.
+bool has_room(const FreeSpace& space, double robot_radius_m, Point2 from, Point2 to) {
+  constexpr double fine_m = 0.01;
+  const int steps = std::max(1, static_cast<int>(std::ceil(distance(from, to) / fine_m)));
+  for (int i = 1; i <= steps; ++i) {
+    const double share = static_cast<double>(i) / steps;
+    if (space.clearance_m({from.x_m + share * (to.x_m - from.x_m),
+                           from.y_m + share * (to.y_m - from.y_m)}) < robot_radius_m) {
+      return false;
+    }
+  }
+  return true;
+}
+
+// The shortest way, or the straight one where the map of free places has none.
+double shortest_way_m(const FreeSpace& space, Point2 from, Point2 to) {
+  const auto way = space.shortest_path(from, to);
+  if (!way) return distance(from, to);
+  double length = 0.0;
+  for (std::size_t i = 1; i < way->size(); ++i) length += distance((*way)[i - 1], (*way)[i]);
+  return length;
+}
+
+}  // namespace
+
+MissionPlace make_mission_place(Scene scene, Executor& executor, std::optional<Point2> inside) {
+  MissionPlace place;
+  place.scene = std::move(scene);
+  place.free_space =
+      std::make_shared<const FreeSpace>(place.scene, free_space_options(place.scene), inside);
+  place.renderer = std::make_shared<const Renderer>(place.scene, RendererOptions{}, executor);
+  return place;
+}
+
+FourierSignature see(const MissionPlace& place, const Pose2& pose, std::uint64_t seed) {
+  Executor here(1);
+  const FrameOptions frame{.camera_height_m = place.scene.camera_height_m};
+  return compute_signature(preprocess(take_panorama(*place.renderer, pose, place.rendering, frame,
+                                                    place.sensor, seed, here),
+                                      {}),
+                           place.components);
+}
+
+RememberedPlace remember_grid(const MissionPlace& place, double spacing_m, std::uint64_t seed,
+                              Executor& executor) {
+  Random random(seed, 1);
+  std::vector<Pose2> poses;
+  for (const GridPosition& at : place.free_space->grid(spacing_m)) {
+    const double heading_rad = random.uniform(-pi, pi);
+    if (place.free_space->clearance_m(at.position) < place.scene.robot_radius_m + room_m) continue;
+    poses.push_back({at.position.x_m, at.position.y_m, heading_rad});
+  }
+  VisualMemory memory = memory_of(see_all(place, poses, seed, executor));
+  const Lattice lattice = arrange(memory, {}, {}, executor);
+  RememberedPlace remembered{
+      std::move(memory), navigation_graph(lattice), std::move(poses), spacing_m, {}};
+  for (const LatticeNode& node : lattice.nodes) remembered.drawn.push_back(node.pose.position());
+  return remembered;
+}
+
+RememberedPlace remember_drive(const MissionPlace& place, const std::vector<Pose2>& poses,
+                               const OdometryNoise& wheels, std::uint64_t seed,
+                               Executor& executor) {
+  const auto views = see_all(place, poses, seed, executor);
+  const auto told = simulate_odometry(poses, wheels, seed);
+  VisualMemory memory({views.front().rows(), views.front().components()},
+                      memory_of(views).full_scale(), views.front().elevations());
+  TopologicalMapper mapper(memory);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    std::optional<Pose2> moved;
+    if (i > 0) moved = inverse(told[i - 1]) * told[i];
+    static_cast<void>(mapper.add(memory.append(views[i], {.name = std::to_string(i)}),
+                                 OdometryView(views[i]), moved));
+  }
+  mapper.finish();
+  const TopologicalMap map = mapper.map();
+  double way_m = 0.0;
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    way_m += distance(poses[i - 1].position(), poses[i].position());
+  }
+  RememberedPlace remembered{
+      std::move(memory),
+      navigation_graph(map),
+      poses,
+      way_m / static_cast<double>(std::max<std::size_t>(1, poses.size() - 1)),
+      {}};
+  for (const MapNode& node : map.nodes) remembered.drawn.push_back(node.pose.position());
+  return remembered;
+}
+
+MissionRobot::MissionRobot(const MissionPlace& place, const BaseOptions& base,
+                           const OdometryNoise& motion, const Pose2& start, std::uint64_t seed)
+    : space_(place.free_space.get()),
+      robot_radius_m_(place.scene.robot_radius_m),
+      base_(base),
+      motion_(motion),
+      pose_(start),
+      random_(seed, 1) {
+  validate(base_);
+  motion_.drive = base_.drive;
+  validate(motion_);
+}
+
+void MissionRobot::command(const Velocity& velocity) {
+  const Pose2 step = sample_step(motion_after(velocity, base_.period_s), motion_, random_);
+  const Pose2 there = pose_ * step;
+  if (!has_room(*space_, robot_radius_m_, pose_.position(), there.position())) {
+    // It touches something: it turns, but does not move.
+    obstacle_ = true;
+    pose_.heading_rad = there.heading_rad;
+    return;
+  }
+  travelled_m_ += std::hypot(step.x_m, step.y_m);
+  pose_ = there;
+}
+
+bool MissionRobot::take_obstacle() noexcept {
+  return std::exchange(obstacle_, false);
+}
+
+namespace {
+
+// To a point as far as the robot knows its own speeds, until it is there, something stops it or it
+// should long be there. Returns whether it was stopped.
+bool drive(MissionRobot& robot, const BaseOptions& base, double direction_rad, double distance_m) {
+  Point2 target{distance_m * std::cos(direction_rad), distance_m * std::sin(direction_rad)};
+  constexpr double near_m = 0.003;
+  const double longest_s = 2.0 * (pi / base.turn_rad_s + distance_m / base.speed_m_s) + 1.0;
+  for (double time_s = 0.0; time_s < longest_s; time_s += base.period_s) {
+    const double left_m = std::hypot(target.x_m, target.y_m);
+    if (left_m <= near_m) return false;
+    const Velocity velocity = command_towards(std::atan2(target.y_m, target.x_m), left_m, base);
+    robot.command(velocity);
+    if (robot.take_obstacle()) return true;
+    target = remaining_way(target, motion_after(velocity, base.period_s));
+  }
+  return false;
+}
+
+}  // namespace
+
+MissionRun run_mission(const MissionPlace& place, const RememberedPlace& remembered,
+                       Navigator& navigator, const Mission& mission, const MissionOptions& options,
+                       std::uint64_t seed) {
+  const auto node = remembered.graph.node_of(mission.goal);
+  if (!node) throw ContractError("goal", std::to_string(mission.goal.value), "a view of the graph");
+  const Point2 goal = remembered.truth.at(*node).position();
+  const FreeSpace& space = *place.free_space;
+  MissionRobot robot(place, options.base, options.motion, mission.start, seed);
+  Random noise_of_views(seed, 2);
+  MissionRun run;
+  run.shortest_m = shortest_way_m(space, mission.start.position(), goal);
+  const double carried_after_m = 0.5 * run.shortest_m;
+  navigator.forget_place();
+  navigator.set_goal(mission.goal);
+  RobotReport report;
+  for (;;) {
+    run.path.push_back(robot.pose());
+    const NavigationDecision decision =
+        navigator.look(see(place, robot.pose(), noise_of_views.next()), report);
+    run.decisions.push_back(decision);
+    if (decision.state != NavigationState::moving) {
+      run.end = decision.state;
+      break;
+    }
+    report.obstacle = drive(robot, options.base, decision.direction_rad, decision.advance_m);
+    if (mission.carried_to && !run.carried_at && robot.travelled_m() >= carried_after_m) {
+      run.carried_at = run.path.size() - 1;
+      run.shortest_m += shortest_way_m(space, mission.carried_to->position(), goal) -
+                        shortest_way_m(space, robot.pose().position(), goal);
+      robot.carry_to(*mission.carried_to);
+      report.obstacle = false;
+    }
+  }
+  run.travelled_m = robot.travelled_m();
+  run.end_distance_m = distance(robot.pose().position(), goal);
+  return run;
+}
+
+std::vector<MissionRun> run_missions(const MissionPlace& place, const RememberedPlace& remembered,
+                                     const std::vector<Mission>& missions,
+                                     const MissionOptions& options, std::uint64_t seed,
+                                     Executor& executor) {
+  std::vector<MissionRun> runs(missions.size());
+  const AreaPlanner planner(remembered.graph, options.planner);
+  const MemoryViewSource source(remembered.memory);
+  executor.for_chunks(missions.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
+    for (std::size_t i = begin; i < end; ++i) {
+      Navigator navigator(source, planner, options.navigator);
+      runs[i] =
+          run_mission(place, remembered, navigator, missions[i], options, Random(seed, i).next());
+    }
+  });
+  return runs;
+}
+
+std::vector<Mission> random_missions(const MissionPlace& place, const RememberedPlace& remembered,
+                                     int count, bool carried, std::uint64_t seed) {
+  Random random(seed, 3);
+  std::vector<Mission> missions;
+  const double least_m = 2.0 * remembered.spacing_m;
+  while (missions.size() < static_cast<std::size_t>(count)) {
+    const std::size_t goal = random.index(remembered.truth.size());
+    Mission mission{remembered.graph.view(goal), place.free_space->random_pose(random), {}};
+    if (carried) mission.carried_to = place.free_space->random_pose(random);
+    if (distance(mission.start.position(), remembered.truth[goal].position()) < least_m) continue;
+    missions.push_back(mission);
+  }
+  return missions;
+}
+
+}  // namespace panonav

@@ -1,0 +1,141 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "panonav/core/executor.hpp"
+#include "panonav/core/options.hpp"
+#include "panonav/memory/visual_memory.hpp"
+#include "panonav/motion/odometry.hpp"
+#include "panonav/motion/velocity.hpp"
+#include "panonav/navigation/navigation_graph.hpp"
+#include "panonav/navigation/navigator.hpp"
+#include "panonav/simulation/free_space.hpp"
+#include "panonav/simulation/renderer.hpp"
+#include "panonav/simulation/scene.hpp"
+#include "panonav/simulation/sensor.hpp"
+
+namespace panonav {
+
+/// A place to explore and to go about in. Shared by any number of runs on any number of threads.
+struct MissionPlace {
+  Scene scene;
+  std::shared_ptr<const FreeSpace> free_space;
+  std::shared_ptr<const Renderer> renderer;
+  PanoramaRendering rendering{.rows = 40, .columns = 256, .rays_per_axis = 1};
+  SensorOptions sensor;
+  int components = 15;
+};
+
+/// `inside`: of a place in several parts, a position in the part that is meant; empty: the largest.
+/// Throws ContractError as the parts.
+[[nodiscard]] MissionPlace make_mission_place(Scene scene, Executor& executor,
+                                              std::optional<Point2> inside = std::nullopt);
+
+/// What a robot there sees, preprocessed as the command's defaults have it. The same pose and seed
+/// give the same bits.
+[[nodiscard]] FourierSignature see(const MissionPlace& place, const Pose2& pose,
+                                   std::uint64_t seed);
+
+/// What a robot remembers of a place, and, for the record, where its views were taken.
+struct RememberedPlace {
+  VisualMemory memory;
+  NavigationGraph graph;
+  std::vector<Pose2> truth;   ///< by node of the graph
+  double spacing_m = 0.0;     ///< of the references
+  std::vector<Point2> drawn;  ///< where the map has them, by node, in the map's own unit and frame
+};
+
+/// Views on a grid, 20 cm or more from all things, each in a heading at random, arranged by their
+/// likeness alone: no positions, no order, no motion [M04 section 3].
+[[nodiscard]] RememberedPlace remember_grid(const MissionPlace& place, double spacing_m,
+                                            std::uint64_t seed, Executor& executor);
+
+/// Views along a drive, mapped by visual odometry and closure of loops, lengths by `wheels`
+/// [F11 section 4].
+[[nodiscard]] RememberedPlace remember_drive(const MissionPlace& place,
+                                             const std::vector<Pose2>& poses,
+                                             const OdometryNoise& wheels, std::uint64_t seed,
+                                             Executor& executor);
+
+/// The robot of a mission: drives as it is told, with the errors of its drive, and stops where
+/// something stands in its way. Holds the true pose.
+class MissionRobot final : public RobotBase {
+ public:
+  /// `place` must outlive the robot. Throws OptionError.
+  MissionRobot(const MissionPlace& place, const BaseOptions& base, const OdometryNoise& motion,
+               const Pose2& start, std::uint64_t seed);
+
+  void command(const Velocity& velocity) override;
+
+  [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }
+  [[nodiscard]] double travelled_m() const noexcept { return travelled_m_; }
+  /// Since the last time: whether something stopped it.
+  [[nodiscard]] bool take_obstacle() noexcept;
+  /// Somebody carries it away.
+  void carry_to(const Pose2& pose) noexcept { pose_ = pose; }
+
+ private:
+  const FreeSpace* space_;
+  double robot_radius_m_;
+  BaseOptions base_;
+  OdometryNoise motion_;
+  Pose2 pose_;
+  Random random_;
+  bool obstacle_ = false;
+  double travelled_m_ = 0.0;
+};
+
+struct MissionOptions {
+  NavigatorOptions navigator;
+  PlannerOptions planner;
+  BaseOptions base;
+  OdometryNoise motion;  ///< its drive is that of `base`
+};
+
+/// A goal to reach, and what happens on the way.
+struct Mission {
+  ViewId goal;
+  Pose2 start;
+  /// Where somebody carries the robot once half of the way is driven; empty: nobody does.
+  std::optional<Pose2> carried_to;
+};
+
+/// Missions from random free places to references at random that are at least two spacings away
+/// when `count` >= 1; `carried`: with somebody who carries the robot to a random free place.
+[[nodiscard]] std::vector<Mission> random_missions(const MissionPlace& place,
+                                                   const RememberedPlace& remembered, int count,
+                                                   bool carried, std::uint64_t seed);
+
+struct MissionRun {
+  NavigationState end = NavigationState::moving;
+  std::vector<Pose2> path;  ///< true poses at the looks, and the last one
+  std::vector<NavigationDecision> decisions;
+  std::optional<std::size_t> carried_at;  ///< the look after which the robot was carried away
+  double end_distance_m = 0.0;            ///< from where the goal's view was taken
+  double travelled_m = 0.0;
+  double shortest_m = 0.0;  ///< shortest way through free places, in parts when carried away
+
+  /// The robot says that it arrived, and is within `radius_m` of the goal.
+  [[nodiscard]] bool arrives(double radius_m) const noexcept {
+    return end == NavigationState::arrived && end_distance_m <= radius_m;
+  }
+};
+
+/// Sends a robot over what is remembered; `place` may differ from the place that was remembered.
+/// The same seed gives the same run. Cost: a picture a look.
+[[nodiscard]] MissionRun run_mission(const MissionPlace& place, const RememberedPlace& remembered,
+                                     Navigator& navigator, const Mission& mission,
+                                     const MissionOptions& options, std::uint64_t seed);
+
+/// All runs, mission by mission, each by a navigator of its own; run i has the stream (seed, i).
+[[nodiscard]] std::vector<MissionRun> run_missions(const MissionPlace& place,
+                                                   const RememberedPlace& remembered,
+                                                   const std::vector<Mission>& missions,
+                                                   const MissionOptions& options,
+                                                   std::uint64_t seed, Executor& executor);
+
+}  // namespace panonav
