@@ -308,7 +308,7 @@ TEST(Navigator, IsLostInAnotherPlace) {
     const ViewId goal = remembered.memory.views()[random.index(remembered.memory.size())];
     const Drive run = drive(elsewhere, remembered, navigator, goal, free_pose(elsewhere, random),
                             DriveKind::holonomic, random.next());
-    EXPECT_EQ(run.end.state, NavigationState::lost);
+    EXPECT_EQ(run.end.state, NavigationState::lost) << describe(run.end);
     EXPECT_TRUE(run.had(NavigationEvent::relocalised));
   }
 }

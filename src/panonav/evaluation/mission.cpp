@@ -8,7 +8,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/evaluation/mapping_run.hpp"
-#include "panonav/geometry/positions.hpp"
+#include "panonav/geometry/angles.hpp"
 #include "panonav/mapping/lattice.hpp"
 #include "panonav/panorama/preprocessing.hpp"
 #include "panonav/signature/fourier_signature.hpp"
@@ -131,9 +131,10 @@ RememberedPlace remember_drive(const MissionPlace& place, const std::vector<Pose
   for (std::size_t i = 1; i < poses.size(); ++i) {
     way_m += distance(poses[i - 1].position(), poses[i].position());
   }
+  NavigationGraph graph = navigation_graph(map, memory, executor);
   RememberedPlace remembered{
       std::move(memory),
-      navigation_graph(map),
+      std::move(graph),
       poses,
       way_m / static_cast<double>(std::max<std::size_t>(1, poses.size() - 1)),
       {}};
@@ -165,6 +166,33 @@ void MissionRobot::command(const Velocity& velocity) {
   }
   travelled_m_ += std::hypot(step.x_m, step.y_m);
   pose_ = there;
+}
+
+std::optional<double> MissionRobot::free_direction(double wanted_rad, double distance_m) {
+  const auto is_open = [&](double direction_rad, double way_m) {
+    return has_room(
+        *space_, robot_radius_m_, pose_.position(),
+        pose_ * Point2{way_m * std::cos(direction_rad), way_m * std::sin(direction_rad)});
+  };
+  if (is_open(wanted_rad, distance_m)) {
+    side_ = 0;
+    return wanted_rad;
+  }
+  const double apart_rad = radians(15.0);
+  // Farther round it would turn back: whoever sends it must know that the way is shut.
+  constexpr int feelers_each_side = 6;
+  const int kept = side_;
+  for (int i = 1; i <= feelers_each_side; ++i) {
+    for (const int side : {1, -1}) {
+      if (kept != 0 && side != kept) continue;
+      const double direction_rad = wanted_rad + side * i * apart_rad;
+      if (!is_open(direction_rad, 0.5 * distance_m)) continue;
+      side_ = side;
+      return wrap_angle(direction_rad);
+    }
+  }
+  side_ = -kept;
+  return std::nullopt;
 }
 
 bool MissionRobot::take_obstacle() noexcept {
@@ -216,7 +244,13 @@ MissionRun run_mission(const MissionPlace& place, const RememberedPlace& remembe
       run.end = decision.state;
       break;
     }
-    report.obstacle = drive(robot, options.base, decision.direction_rad, decision.advance_m);
+    const auto free_rad = robot.free_direction(decision.direction_rad, decision.advance_m);
+    report.obstacle = !free_rad;
+    if (free_rad) {
+      const bool wanted = *free_rad == decision.direction_rad;
+      report.obstacle =
+          drive(robot, options.base, *free_rad, (wanted ? 1.0 : 0.5) * decision.advance_m);
+    }
     if (mission.carried_to && !run.carried_at && robot.travelled_m() >= carried_after_m) {
       run.carried_at = run.path.size() - 1;
       run.shortest_m += shortest_way_m(space, mission.carried_to->position(), goal) -
@@ -248,14 +282,28 @@ std::vector<MissionRun> run_missions(const MissionPlace& place, const Remembered
 }
 
 std::vector<Mission> random_missions(const MissionPlace& place, const RememberedPlace& remembered,
-                                     int count, bool carried, std::uint64_t seed) {
+                                     const RandomMissionOptions& options, std::uint64_t seed) {
+  require(options.count >= 0, "missions", options.count, ">= 0");
+  require(options.beside_m > 0.0, "distance from a reference", options.beside_m, "> 0");
   Random random(seed, 3);
+  const FreeSpace& space = *place.free_space;
+  const auto anywhere = [&] {
+    if (!std::isfinite(options.beside_m)) return space.random_pose(random);
+    for (;;) {
+      const Pose2& reference = remembered.truth[random.index(remembered.truth.size())];
+      const double off_m = options.beside_m * std::sqrt(random.uniform());
+      const double direction_rad = random.uniform(-pi, pi);
+      const Pose2 there{reference.x_m + off_m * std::cos(direction_rad),
+                        reference.y_m + off_m * std::sin(direction_rad), random.uniform(-pi, pi)};
+      if (space.is_free_between(reference.position(), there.position())) return there;
+    }
+  };
   std::vector<Mission> missions;
   const double least_m = 2.0 * remembered.spacing_m;
-  while (missions.size() < static_cast<std::size_t>(count)) {
+  while (missions.size() < static_cast<std::size_t>(options.count)) {
     const std::size_t goal = random.index(remembered.truth.size());
-    Mission mission{remembered.graph.view(goal), place.free_space->random_pose(random), {}};
-    if (carried) mission.carried_to = place.free_space->random_pose(random);
+    Mission mission{remembered.graph.view(goal), anywhere(), {}};
+    if (options.carried) mission.carried_to = anywhere();
     if (distance(mission.start.position(), remembered.truth[goal].position()) < least_m) continue;
     missions.push_back(mission);
   }

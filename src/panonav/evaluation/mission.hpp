@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -62,7 +63,7 @@ struct RememberedPlace {
                                              Executor& executor);
 
 /// The robot of a mission: drives as it is told, with the errors of its drive, and stops where
-/// something stands in its way. Holds the true pose.
+/// something stands in its way. It feels what is near. Holds the true pose.
 class MissionRobot final : public RobotBase {
  public:
   /// `place` must outlive the robot. Throws OptionError.
@@ -73,6 +74,10 @@ class MissionRobot final : public RobotBase {
 
   [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }
   [[nodiscard]] double travelled_m() const noexcept { return travelled_m_; }
+  /// The direction nearest to the wanted one, 15 degrees apart, in which half of the way is free;
+  /// as long as that one is not free it keeps to the side that it chose. Empty: none is, as far as
+  /// it turns.
+  [[nodiscard]] std::optional<double> free_direction(double wanted_rad, double distance_m);
   /// Since the last time: whether something stopped it.
   [[nodiscard]] bool take_obstacle() noexcept;
   /// Somebody carries it away.
@@ -85,6 +90,7 @@ class MissionRobot final : public RobotBase {
   OdometryNoise motion_;
   Pose2 pose_;
   Random random_;
+  int side_ = 0;  // on which it goes past something: 1 left, -1 right
   bool obstacle_ = false;
   double travelled_m_ = 0.0;
 };
@@ -104,11 +110,20 @@ struct Mission {
   std::optional<Pose2> carried_to;
 };
 
-/// Missions from random free places to references at random that are at least two spacings away
-/// when `count` >= 1; `carried`: with somebody who carries the robot to a random free place.
+struct RandomMissionOptions {
+  int count = 100;
+  /// Starts, and places that the robot is carried to, lie within so much of a reference at random;
+  /// infinite: anywhere.
+  double beside_m = std::numeric_limits<double>::infinity();
+  bool carried = false;  ///< somebody carries the robot away on its way
+};
+
+/// Missions from random free places, in any heading, to references at random that are at least two
+/// spacings away.
 [[nodiscard]] std::vector<Mission> random_missions(const MissionPlace& place,
-                                                   const RememberedPlace& remembered, int count,
-                                                   bool carried, std::uint64_t seed);
+                                                   const RememberedPlace& remembered,
+                                                   const RandomMissionOptions& options,
+                                                   std::uint64_t seed);
 
 struct MissionRun {
   NavigationState end = NavigationState::moving;

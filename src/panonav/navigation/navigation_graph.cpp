@@ -13,7 +13,9 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/median.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/homing/fourier_homing.hpp"
 #include "panonav/homing/homing_view.hpp"
+#include "panonav/localisation/sample.hpp"
 #include "panonav/mapping/view_pair.hpp"
 
 namespace panonav {
@@ -256,6 +258,90 @@ NavigationGraph navigation_graph(const TopologicalMap& map, double least_weight)
   }
   complete_lengths(passages);
   return {std::move(views), std::move(passages)};
+}
+
+namespace {
+
+struct NodePair {
+  std::size_t a = 0;
+  std::size_t b = 0;
+};
+
+// Nodes of one part of a map within `reach` of each other, without those that have an edge.
+std::vector<NodePair> near_pairs(const TopologicalMap& map, double reach) {
+  std::set<std::pair<ViewId, ViewId>> known;
+  for (const MapEdge& edge : map.edges) known.insert(std::minmax(edge.a, edge.b));
+  // From west to east, so that those too far to the east need not be looked at.
+  std::vector<std::size_t> order(map.nodes.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return map.nodes[i].pose.x_m; });
+  std::vector<NodePair> pairs;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const MapNode& node = map.nodes[order[i]];
+    for (std::size_t j = i + 1; j < order.size(); ++j) {
+      const MapNode& other = map.nodes[order[j]];
+      if (other.pose.x_m - node.pose.x_m > reach) break;
+      if (other.part != node.part ||
+          distance(node.pose.position(), other.pose.position()) > reach ||
+          known.contains(std::minmax(node.view, other.view))) {
+        continue;
+      }
+      pairs.push_back({std::min(order[i], order[j]), std::max(order[i], order[j])});
+    }
+  }
+  std::ranges::sort(pairs, {}, [](const NodePair& p) { return std::pair(p.a, p.b); });
+  return pairs;
+}
+
+}  // namespace
+
+NavigationGraph navigation_graph(const TopologicalMap& map, const VisualMemory& memory,
+                                 Executor& executor, double least_weight) {
+  const NavigationGraph edges = navigation_graph(map, least_weight);
+  if (edges.passages().empty()) return edges;
+  std::vector<double> lengths;
+  std::vector<double> differences;
+  for (const Passage& passage : edges.passages()) {
+    lengths.push_back(passage.length);
+    differences.push_back(image_difference(homing_view(memory.signature(passage.a)),
+                                           homing_view(memory.signature(passage.b))));
+  }
+  // What a grid's diagonal is to its spacing; as different as nearly all passages are.
+  const double reach = 1.5 * upper_median(lengths);
+  const double most_difference = quantile(differences, 0.9);
+  const std::vector<NodePair> pairs = near_pairs(map, reach);
+  std::vector<std::optional<Passage>> found(pairs.size());
+  constexpr std::size_t pairs_per_chunk = 64;
+  executor.for_chunks(pairs.size(), pairs_per_chunk,
+                      [&](std::size_t begin, std::size_t end, std::size_t) {
+                        for (std::size_t i = begin; i < end; ++i) {
+                          const MapNode& a = map.nodes[pairs[i].a];
+                          const MapNode& b = map.nodes[pairs[i].b];
+                          const HomingView view_a = homing_view(memory.signature(a.view));
+                          const HomingView view_b = homing_view(memory.signature(b.view));
+                          if (image_difference(view_a, view_b) > most_difference) continue;
+                          const Pose2 mapped = inverse(a.pose) * b.pose;
+                          const auto reading =
+                              read_phases(view_a, view_b, TurnHint{.turn_rad = mapped.heading_rad});
+                          if (!reading || reading->disagreement_rad > most_disagreement_rad)
+                            continue;
+                          auto motion = motion_of(*reading);
+                          if (!motion) continue;
+                          const double length = std::hypot(mapped.x_m, mapped.y_m);
+                          const double read = std::hypot(motion->x_m, motion->y_m);
+                          if (read > 0.0) {
+                            motion->x_m *= length / read;
+                            motion->y_m *= length / read;
+                          }
+                          found[i] = Passage{a.view, b.view, length, motion};
+                        }
+                      });
+  std::vector<Passage> passages(edges.passages().begin(), edges.passages().end());
+  for (const auto& passage : found) {
+    if (passage) passages.push_back(*passage);
+  }
+  complete_lengths(passages);
+  return {{edges.views().begin(), edges.views().end()}, std::move(passages)};
 }
 
 namespace {

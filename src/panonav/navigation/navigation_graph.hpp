@@ -92,6 +92,15 @@ inline constexpr double most_disagreement_rad = 0.78539816339744831;
 [[nodiscard]] NavigationGraph navigation_graph(const TopologicalMap& map,
                                                double least_weight = 0.1);
 
+/// The same, and passages between nodes of one part that lie side by side in the map, up to one and
+/// a half of the median length of its edges, when their views look as alike as those of most edges
+/// and agree on a direction: a robot that comes by a place for the second time goes on as it went
+/// the first time. The memory must hold the map's views. Cost: a home vector and a half for each
+/// such pair.
+[[nodiscard]] NavigationGraph navigation_graph(const TopologicalMap& map,
+                                               const VisualMemory& memory, Executor& executor,
+                                               double least_weight = 0.1);
+
 /// A passage for each spring that kept `least_weight` of itself and is no longer than two spacings,
 /// and those longer ones without which parts of the lattice would not be joined: views that are far
 /// from each other tell less of the direction, and nothing of what stands between. Lengths follow

@@ -103,6 +103,7 @@ void Navigator::set_goal(ViewId goal) {
 }
 
 void Navigator::forget_place() {
+  known_node_.reset();
   node_.reset();
   homing_.reset();
   last_view_.reset();
@@ -221,6 +222,7 @@ void Navigator::locate(Seen& seen, const RobotReport& report, NavigationDecision
   // Between references that stand far apart no place looks right.
   if (decision.difference <= limit(seen.view) || under_way_) {
     unknown_looks_ = 0;
+    if (!under_way_) known_node_ = node_;
     return;
   }
   decision.events.push_back(NavigationEvent::unknown_place);
@@ -228,6 +230,7 @@ void Navigator::locate(Seen& seen, const RobotReport& report, NavigationDecision
   if (unknown_looks_ % options_.agreeing_looks == 0) relocalise(seen, decision);
   if (decision.difference <= limit(seen.view)) {
     unknown_looks_ = 0;
+    known_node_ = node_;
   } else if (unknown_looks_ >= options_.lost_patience) {
     state_ = NavigationState::lost;
   }
@@ -413,8 +416,32 @@ void Navigator::go_home(const Seen& seen, NavigationDecision& decision) {
   try_again(decision, NavigationState::lost);
 }
 
+// From an unknown place to where the robot still knew its own, if that can be seen from here.
+bool Navigator::go_back(const Seen& seen, NavigationDecision& decision) {
+  if (!known_node_ || obstructed_) return false;
+  const ViewId known = planner_.graph().view(*known_node_);
+  if (!views_.holds(known)) return false;
+  const HomeVector back = home_vector(views_.view(known, seen.view.components), seen.view.view);
+  if (back.confidence <= least_confidence) return false;
+  decision.next = known;
+  decision.direction_rad = back.direction_rad();
+  decision.advance_m = options_.step_m;
+  commanded_rad_ = decision.direction_rad;
+  return true;
+}
+
+// The goal, or another reference from which the goal is too near for a direction: views of several
+// drives may be from one place.
+bool Navigator::is_at_goal() const {
+  if (*node_ == *goal_) return true;
+  if (guide().next != *goal_) return false;
+  const auto motion = planner_.graph().motion_from(*node_, guide().passage);
+  return motion && std::hypot(motion->x_m, motion->y_m) <= 0.5 * typical_length_;
+}
+
 void Navigator::follow(const Seen& seen, NavigationDecision& decision) {
   const NavigationGraph& graph = planner_.graph();
+  if (unknown_looks_ > 0 && go_back(seen, decision)) return;
   begin_long_way();
   const std::size_t from = under_way_ ? under_way_->from : *node_;
   const Guide ahead = under_way_ ? under_way_->guide : guide();
@@ -475,7 +502,7 @@ NavigationDecision Navigator::look(const FourierSignature& view, const RobotRepo
   // At an unknown place the robot waits for the looks to agree; then it goes by the best guess.
   const bool waits = unknown_looks_ > 0 && unknown_looks_ < options_.agreeing_looks && !obstructed_;
   if (state_ == NavigationState::moving && !waits) {
-    if (*node_ == *goal_) {
+    if (is_at_goal()) {
       go_home(seen, decision);
     } else {
       homing_.reset();

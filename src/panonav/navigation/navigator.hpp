@@ -158,6 +158,8 @@ class Navigator {
   void try_again(NavigationDecision& decision, NavigationState otherwise);
   [[nodiscard]] const Guide& guide() const;
   void go_home(const Seen& seen, NavigationDecision& decision);
+  [[nodiscard]] bool go_back(const Seen& seen, NavigationDecision& decision);
+  [[nodiscard]] bool is_at_goal() const;
   void follow(const Seen& seen, NavigationDecision& decision);
   void plan_fields();
   [[nodiscard]] int patience() const;
@@ -181,7 +183,8 @@ class Navigator {
   std::optional<std::size_t> goal_;  // node
   std::optional<HomingView> goal_view_;
   std::optional<HomingPursuit> homing_;
-  std::optional<std::size_t> node_;  // where the robot is
+  std::optional<std::size_t> node_;        // where the robot is
+  std::optional<std::size_t> known_node_;  // where its place last looked right
   std::optional<HomingView> last_view_;
   std::optional<double>
       commanded_rad_;  // direction of the step before, in the frame of `last_view_`

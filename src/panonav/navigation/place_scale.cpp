@@ -69,9 +69,20 @@ ArrivalScale learn_arrival_scale(const ViewSource& source, const NavigationGraph
   const auto node = graph.node_of(goal);
   require(node.has_value(), "goal", static_cast<double>(goal.value), "a view of the graph");
   std::vector<ViewPair> pairs;
-  for (const auto& exit : graph.exits(*node)) pairs.emplace_back(goal, graph.view(exit.node));
   ArrivalScale scale;
-  if (pairs.empty()) return scale;
+  if (graph.exits(*node).empty()) return scale;
+  std::vector<double> lengths;
+  for (const Passage& passage : graph.passages()) lengths.push_back(passage.length);
+  const double usual = upper_median(std::move(lengths));
+  // Views of the goal itself from another drive tell nothing of the spacing, unless there are no
+  // others.
+  for (const double least : {0.5 * usual, 0.0}) {
+    for (const auto& exit : graph.exits(*node)) {
+      if (graph.passages()[exit.passage].length < least) continue;
+      pairs.emplace_back(goal, graph.view(exit.node));
+    }
+    if (!pairs.empty()) break;
+  }
   const VisualMemory memory = views_of(source, pairs);
   const HomingView home = homing_view(memory.signature(goal));
   std::vector<std::pair<double, double>> nearest;  // length, difference
