@@ -335,12 +335,7 @@ void Navigator::notice_obstacles(const Seen& seen, const RobotReport& report,
   } else if (obstruction_ > 0) {
     --obstruction_;
   }
-  if (homing_) {
-    if (obstruction_ < 2 * options_.agreeing_looks) return;
-    obstruction_ = 0;
-    try_again(decision, NavigationState::blocked);
-    return;
-  }
+  if (homing_) return;
   count_try();
   if (tries_.empty() || !guide().reachable()) return;
   const auto most_obstructed =
@@ -368,11 +363,18 @@ int Navigator::patience() const {
   return static_cast<int>(std::ceil(options_.passage_patience * std::max(1.0, length)));
 }
 
-// Along a long passage the robot goes on for its end, whatever reference is nearest meanwhile.
+// Along a long passage the robot goes on for its end, whatever reference is nearest meanwhile;
+// along any other when it has come back to where that begins though nothing stood in the way: then
+// a reference beside it has sent it back.
 void Navigator::begin_long_way() {
   const double length = relative_length(guide());
-  if (under_way_ || length < least_long) return;
-  under_way_ = {*node_, guide(), static_cast<int>(std::ceil(steps_of_passage * length))};
+  const bool is_free =
+      std::ranges::none_of(tries_, [](const auto& t) { return t.second.obstructed > 0; });
+  const bool came_back = looks_in_vain_ >= options_.agreeing_looks && is_free &&
+                         guide().way <= least_way_ && length > 0.0;
+  if (under_way_ || (length < least_long && !came_back)) return;
+  const double steps = steps_of_passage * std::max(1.0, length);
+  under_way_ = {*node_, guide(), static_cast<int>(std::ceil(steps))};
 }
 
 // By how much the direction is turned: to get past what is in the way, or, where a direction turned
@@ -381,6 +383,7 @@ double Navigator::detour_rad() const {
   if (obstruction_ >= 2) {
     return detours_rad[static_cast<std::size_t>(obstruction_ / 2) % detours_rad.size()];
   }
+  if (under_way_) return 0.0;
   const int searching = looks_in_vain_ - (patience() + 1) / 2;
   return searching <= 0 ? 0.0 : wrap_angle(golden_angle_rad * searching);
 }
@@ -401,7 +404,8 @@ void Navigator::go_home(const Seen& seen, NavigationDecision& decision) {
   decision.next = planner_.graph().view(*goal_);
   decision.direction_rad = step.turn_rad;
   decision.advance_m = step.advance_m;
-  if (step.state == PursuitState::moving) return;
+  const bool obstructed = obstruction_ >= 2 * options_.agreeing_looks;
+  if (step.state == PursuitState::moving && !obstructed) return;
   // Homing may stop for other reasons than a short vector; the place decides. Noise makes a
   // difference, too: a robot that sees no way left is there when it is more alike than the
   // references around.
@@ -413,7 +417,8 @@ void Navigator::go_home(const Seen& seen, NavigationDecision& decision) {
   }
   decision.events.push_back(NavigationEvent::homing_failed);
   homing_.reset();
-  try_again(decision, NavigationState::lost);
+  obstruction_ = 0;
+  try_again(decision, obstructed ? NavigationState::blocked : NavigationState::lost);
 }
 
 // From an unknown place to where the robot still knew its own, if that can be seen from here.

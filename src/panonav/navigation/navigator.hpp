@@ -139,7 +139,7 @@ class Navigator {
   [[nodiscard]] bool needs_all_components() const;
   [[nodiscard]] double limit(const SeenView& view) const noexcept;
   [[nodiscard]] Located search_around(const SeenView& view);
-  /// A passage so long that other references may be nearer than its ends on the way.
+  /// A passage that is held to until its end: other references may be nearer on the way.
   struct UnderWay {
     std::size_t from = 0;  // node
     Guide guide;           // there
