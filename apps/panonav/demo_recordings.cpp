@@ -34,8 +34,8 @@ constexpr std::array<std::string_view, 19> made{
 
 SimulationArguments simulation_of(const DemoOptions& options, int stream) {
   SimulationArguments wanted;
-  wanted.simulation.seed = static_cast<int>(3 * (options.seed % 100000000) + stream);
-  wanted.simulation.scene_seed = static_cast<int>(options.seed % 1000000000);
+  wanted.simulation.scene.seed = static_cast<int>(3 * (options.seed % 100000000) + stream);
+  wanted.simulation.scene.scene_seed = static_cast<int>(options.seed % 1000000000);
   // One ray a pixel: unwrapping averages over pixels, and it takes a third of the time.
   wanted.frame.rays_per_axis = 1;
   // What automatic exposure would choose in these rooms.
@@ -56,7 +56,7 @@ PlannedRun plan(const std::string& scene, SimulationArguments wanted, Executor& 
   const auto& settled = world.arguments();
   auto poses =
       plan_recording(world.scene(), world.free_space(), settled.recording, settled.odometry,
-                     static_cast<std::uint64_t>(settled.simulation.seed));
+                     static_cast<std::uint64_t>(settled.simulation.scene.seed));
   return {std::move(world), std::move(poses), settled.recording.path != RecordingPath::random};
 }
 

@@ -21,6 +21,9 @@ class MemoryPipeline {
 
   /// Throws FileError on a picture that is missing, damaged or of another size than the memory's.
   [[nodiscard]] Panorama read(const DatasetEntry& entry) const;
+  /// The same of a picture that is not in a file. Throws ContractError on one whose size is not the
+  /// camera's.
+  [[nodiscard]] Panorama convert(ImageView picture) const { return reader_.convert(picture); }
   [[nodiscard]] FourierSignature signature(const Panorama& panorama) const;
   [[nodiscard]] PackedSignature packed(const Panorama& panorama) const;
 

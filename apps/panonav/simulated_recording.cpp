@@ -35,7 +35,7 @@ void refuse_variations_of_file(const std::string& file, const Given& given) {
   }
 }
 
-Scene load_scene(const std::string& name, const SimulationOptions& options, const Given& given) {
+Scene load_scene(const std::string& name, const SceneOptions& options, const Given& given) {
   const auto names = scene_names();
   if (std::find(names.begin(), names.end(), name) != names.end()) {
     return make_scene(name, {.seed = static_cast<std::uint64_t>(options.scene_seed),
@@ -84,19 +84,7 @@ void discard(const Dataset& dataset, bool with_folder) {
 
 }  // namespace
 
-void visit_options(SimulationOptions& options, OptionVisitor& visitor) {
-  static constexpr std::array<std::string_view, 2> kinds{"mirror", "panorama"};
-  visitor.visit({.name = "kind", .help = "what the camera writes"}, kinds, options.kind);
-  visitor.visit({.name = "rows", .help = "rows of panoramas", .low = 1, .high = 4096},
-                options.rows);
-  visitor.visit({.name = "columns", .help = "columns of panoramas", .low = 4, .high = 16384},
-                options.columns);
-  visitor.visit(
-      {.name = "elevation_low_deg", .help = "lower edge of panoramas", .low = -90, .high = 90},
-      options.elevation_low_deg);
-  visitor.visit(
-      {.name = "elevation_high_deg", .help = "upper edge of panoramas", .low = -90, .high = 90},
-      options.elevation_high_deg);
+void visit_options(SceneOptions& options, OptionVisitor& visitor) {
   visitor.visit({.name = "seed", .help = "of poses, noise, tilt and odometry", .low = 0},
                 options.seed);
   visitor.visit(
@@ -117,6 +105,22 @@ void visit_options(SimulationOptions& options, OptionVisitor& visitor) {
                 options.light);
 }
 
+void visit_options(SimulationOptions& options, OptionVisitor& visitor) {
+  static constexpr std::array<std::string_view, 2> kinds{"mirror", "panorama"};
+  visitor.visit({.name = "kind", .help = "what the camera writes"}, kinds, options.kind);
+  visitor.visit({.name = "rows", .help = "rows of panoramas", .low = 1, .high = 4096},
+                options.rows);
+  visitor.visit({.name = "columns", .help = "columns of panoramas", .low = 4, .high = 16384},
+                options.columns);
+  visitor.visit(
+      {.name = "elevation_low_deg", .help = "lower edge of panoramas", .low = -90, .high = 90},
+      options.elevation_low_deg);
+  visitor.visit(
+      {.name = "elevation_high_deg", .help = "upper edge of panoramas", .low = -90, .high = 90},
+      options.elevation_high_deg);
+  visit_options(options.scene, visitor);
+}
+
 void declare_simulation(Arguments& arguments, SimulationArguments& wanted) {
   arguments.options("recording", wanted.recording);
   arguments.options("simulation", wanted.simulation);
@@ -129,7 +133,7 @@ void declare_simulation(Arguments& arguments, SimulationArguments& wanted) {
 SimulatedWorld::SimulatedWorld(
     const std::string& scene, SimulationArguments wanted,
     const std::function<bool(const std::string&, const std::string&)>& given, Executor& executor)
-    : wanted_(wanted), scene_(load_scene(scene, wanted.simulation, given)) {
+    : wanted_(wanted), scene_(load_scene(scene, wanted.simulation.scene, given)) {
   const auto& simulation = wanted_.simulation;
   if (simulation.elevation_low_deg >= simulation.elevation_high_deg) {
     throw OptionError("elevation_low_deg is " + to_text(simulation.elevation_low_deg) +
@@ -145,8 +149,8 @@ SimulatedWorld::SimulatedWorld(
   if (!given("free_space", "robot_height_m")) robot.robot_height_m = usual.robot_height_m;
   if (!given("free_space", "step_height_m")) robot.step_height_m = usual.step_height_m;
   if (!given("free_space", "cell_m")) robot.cell_m = usual.cell_m;
-  free_space_ = std::make_unique<FreeSpace>(scene_, wanted_.free_space);
-  renderer_ = std::make_unique<Renderer>(scene_, RendererOptions{}, executor);
+  free_space_ = std::make_shared<const FreeSpace>(scene_, wanted_.free_space);
+  renderer_ = std::make_shared<const Renderer>(scene_, RendererOptions{}, executor);
 }
 
 RecordingCamera SimulatedWorld::camera() const {
@@ -171,6 +175,17 @@ PictureSource SimulatedWorld::source() const {
   return source;
 }
 
+MissionPlace SimulatedWorld::place() const {
+  MissionPlace place;
+  place.scene = scene_;
+  place.scene.robot_radius_m = wanted_.free_space.robot_radius_m;
+  place.scene.camera_height_m = wanted_.frame.camera_height_m;
+  place.free_space = free_space_;
+  place.renderer = renderer_;
+  place.sensor = wanted_.sensor;
+  return place;
+}
+
 Dataset record_dataset(const SimulatedWorld& world, const fs::path& folder,
                        std::span<const RecordedPose> poses, bool with_path, Executor& executor,
                        const std::function<void()>& advance) {
@@ -182,7 +197,7 @@ Dataset record_dataset(const SimulatedWorld& world, const fs::path& folder,
   const auto& wanted = world.arguments();
   try {
     record(world.renderer(), poses, world.camera(), wanted.frame, wanted.sensor,
-           static_cast<std::uint64_t>(wanted.simulation.seed), executor,
+           static_cast<std::uint64_t>(wanted.simulation.scene.seed), executor,
            [&](std::size_t number, const RecordedPose& recorded, const Image& image) {
              DatasetEntry entry;
              entry.file = picture_name(number);

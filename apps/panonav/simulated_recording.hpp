@@ -8,6 +8,7 @@
 
 #include "arguments.hpp"
 #include "panonav/core/executor.hpp"
+#include "panonav/evaluation/mission.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/simulation/free_space.hpp"
 #include "panonav/simulation/recording.hpp"
@@ -16,18 +17,24 @@
 
 namespace panonav::command {
 
-/// The simulated camera, and how the scene differs from the plain one.
+/// How the scene differs from the plain one, and what is drawn at random.
+struct SceneOptions {
+  int seed = 1;  ///< poses, noise, tilt, odometry
+  int scene_seed = 1;
+  double moved_objects = 0.0;
+  int moved_seed = 1;
+  double light = 1.0;
+};
+void visit_options(SceneOptions& options, OptionVisitor& visitor);
+
+/// The simulated camera and the scene.
 struct SimulationOptions {
   int kind = 0;  ///< mirror, panorama
   int rows = 80;
   int columns = 512;
   double elevation_low_deg = -30.0;
   double elevation_high_deg = 40.0;
-  int seed = 1;  ///< poses, noise, tilt, odometry
-  int scene_seed = 1;
-  double moved_objects = 0.0;
-  int moved_seed = 1;
-  double light = 1.0;
+  SceneOptions scene;
 };
 void visit_options(SimulationOptions& options, OptionVisitor& visitor);
 
@@ -60,12 +67,14 @@ class SimulatedWorld {
   [[nodiscard]] RecordingCamera camera() const;
   /// How the robot's pictures lie.
   [[nodiscard]] PictureSource source() const;
+  /// The same for missions: a robot of the chosen size and sensor in it.
+  [[nodiscard]] MissionPlace place() const;
 
  private:
   SimulationArguments wanted_;
   Scene scene_;
-  std::unique_ptr<FreeSpace> free_space_;
-  std::unique_ptr<Renderer> renderer_;
+  std::shared_ptr<const FreeSpace> free_space_;
+  std::shared_ptr<const Renderer> renderer_;
 };
 
 /// Writes a data set: pictures first, dataset.toml last. `with_path`: the poses are a path, so

@@ -1,4 +1,3 @@
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -6,6 +5,7 @@
 
 #include "home_answer.hpp"
 #include "homing_pictures.hpp"
+#include "named_view.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/storage/memory_file.hpp"
@@ -56,16 +56,6 @@ std::string as_text(const HomeAnswer& answer, Session& session) {
            fixed(found.length(), 2) + " R away; " + turn_in_words(found.heading_rad) + sure;
   }
   return answer.file + "  " + session.bad("no direction home") + ": " + why_none(found) + sure;
-}
-
-/// A name first; a number that is no name is an id.
-ViewId goal_view(const VisualMemory& memory, const std::string& wanted, const std::string& file) {
-  if (const auto named = memory.find(wanted)) return *named;
-  std::uint32_t id = 0;
-  const auto [end, error] = std::from_chars(wanted.data(), wanted.data() + wanted.size(), id);
-  const bool number = error == std::errc() && end == wanted.data() + wanted.size();
-  if (number && memory.contains(ViewId{id})) return ViewId{id};
-  throw FileError(file, "has no view of the name or id '" + wanted + "'");
 }
 
 /// A picture beside a dataset.toml lies as that says.
@@ -150,7 +140,7 @@ ExitCode home_from_memory(const Arguments& arguments, const HomeArguments& wante
   }
   const auto options = homing_options(arguments, wanted.homing, components);
   const auto memory = file.load();
-  const ViewId view = goal_view(memory, wanted.goal, *wanted.memory);
+  const ViewId view = named_view(memory, wanted.goal, *wanted.memory);
   const auto recording = open_recording(wanted.current, wanted.pictures, header.source);
   const MemoryPipeline pipeline(header, recording.source);
   const auto view_of = [&](const FourierSignature& signature) {

@@ -73,7 +73,7 @@ std::vector<RecordedPose> poses_of_file(const std::string& path,
   }
   if (recorded.empty()) throw FileError(path, "holds no pose; allowed: one or more");
   const auto odometry =
-      simulate_odometry(poses, wanted.odometry, static_cast<std::uint64_t>(wanted.simulation.seed));
+      simulate_odometry(poses, wanted.odometry, static_cast<std::uint64_t>(wanted.simulation.scene.seed));
   for (std::size_t i = 0; i < recorded.size(); ++i) recorded[i].odometry = odometry[i];
   return recorded;
 }
@@ -100,7 +100,7 @@ ExitCode simulate(const Arguments& arguments, SimulateArguments wanted, Session&
       wanted.trajectory
           ? poses_of_file(*wanted.trajectory, settled)
           : plan_recording(world.scene(), world.free_space(), settled.recording, settled.odometry,
-                           static_cast<std::uint64_t>(settled.simulation.seed));
+                           static_cast<std::uint64_t>(settled.simulation.scene.seed));
   const bool with_path =
       wanted.trajectory.has_value() || settled.recording.path != RecordingPath::random;
   Progress progress("rendering", poses.size());

@@ -20,6 +20,7 @@ namespace panonav::command {
 [[nodiscard]] Verb localise_verb();
 [[nodiscard]] Verb map_verb();
 [[nodiscard]] Verb memorise_verb();
+[[nodiscard]] Verb navigate_verb();
 [[nodiscard]] Verb prune_verb();
 [[nodiscard]] Verb reproduce_verb();
 [[nodiscard]] Verb route_follow_verb();

@@ -14,6 +14,7 @@
 #include "panonav/core/executor.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/homing/fourier_homing.hpp"
+#include "panonav/mapping/lattice_map.hpp"
 #include "panonav/mapping/view_pair.hpp"
 #include "panonav/memory/view_source.hpp"
 #include "panonav/navigation/area_views.hpp"
@@ -123,6 +124,33 @@ TEST(NavigationGraph, ALatticeGivesLengthsAndPhasesGiveDirections) {
                                        std::atan2(truth.y_m, truth.x_m))) < radians(25.0);
   }
   EXPECT_GE(right, static_cast<int>(graph.passages().size()) * 9 / 10);
+}
+
+TEST(NavigationGraph, AStoredLatticeSaysTheSameAsTheLattice) {
+  const Grid grid;
+  Executor executor(1);
+  const Lattice lattice = arrange(grid.memory, {}, {}, executor);
+  const NavigationGraph graph = navigation_graph(lattice);
+  const NavigationGraph stored =
+      navigation_graph(map_of(lattice), MemoryViewSource(grid.memory), executor);
+  ASSERT_EQ(stored.size(), graph.size());
+  // Springs may be longer than they came to lie, so the stored lattice has some passages more.
+  ASSERT_GE(stored.passages().size(), graph.passages().size() * 9 / 10);
+  std::size_t same = 0;
+  for (const Passage& passage : graph.passages()) {
+    const auto found = std::ranges::find_if(stored.passages(), [&](const Passage& other) {
+      return other.a == passage.a && other.b == passage.b;
+    });
+    if (found == stored.passages().end()) continue;
+    const bool both = found->a_from_b && passage.a_from_b;
+    if (both) {
+      EXPECT_NEAR(found->length, passage.length, 1e-9);
+      EXPECT_NEAR(found->a_from_b->x_m, passage.a_from_b->x_m, 1e-9);
+      EXPECT_NEAR(found->a_from_b->y_m, passage.a_from_b->y_m, 1e-9);
+    }
+    same += both == (found->a_from_b || passage.a_from_b) ? 1 : 0;
+  }
+  EXPECT_GE(same, graph.passages().size() * 9 / 10);
 }
 
 TEST(PlaceScale, TellsNeighboursFromStrangers) {

@@ -67,6 +67,7 @@ bool has_room(const FreeSpace& space, double robot_radius_m, Point2 from, Point2
 
 // The shortest way, or the straight one where the map of free places has none.
 double shortest_way_m(const FreeSpace& space, Point2 from, Point2 to) {
+  if (!std::isfinite(to.x_m) || !std::isfinite(to.y_m)) return distance(from, to);
   const auto way = space.shortest_path(from, to);
   if (!way) return distance(from, to);
   double length = 0.0;
@@ -86,6 +87,7 @@ MissionPlace make_mission_place(Scene scene, Executor& executor, std::optional<P
 }
 
 FourierSignature see(const MissionPlace& place, const Pose2& pose, std::uint64_t seed) {
+  if (place.sight) return place.sight(pose, seed);
   Executor here(1);
   const FrameOptions frame{.camera_height_m = place.scene.camera_height_m};
   return compute_signature(preprocess(take_panorama(*place.renderer, pose, place.rendering, frame,
@@ -222,7 +224,7 @@ bool drive(MissionRobot& robot, const BaseOptions& base, double direction_rad, d
 
 MissionRun run_mission(const MissionPlace& place, const RememberedPlace& remembered,
                        Navigator& navigator, const Mission& mission, const MissionOptions& options,
-                       std::uint64_t seed) {
+                       std::uint64_t seed, const LookReport& report_look) {
   const auto node = remembered.graph.node_of(mission.goal);
   if (!node) throw ContractError("goal", std::to_string(mission.goal.value), "a view of the graph");
   const Point2 goal = remembered.truth.at(*node).position();
@@ -240,6 +242,7 @@ MissionRun run_mission(const MissionPlace& place, const RememberedPlace& remembe
     const NavigationDecision decision =
         navigator.look(see(place, robot.pose(), noise_of_views.next()), report);
     run.decisions.push_back(decision);
+    if (report_look) report_look(decision, robot.pose());
     if (decision.state != NavigationState::moving) {
       run.end = decision.state;
       break;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -29,6 +30,9 @@ struct MissionPlace {
   PanoramaRendering rendering{.rows = 40, .columns = 256, .rays_per_axis = 1};
   SensorOptions sensor;
   int components = 15;
+  /// What a robot sees through another camera or preprocessing than that of `see`, which then asks
+  /// this instead; any number of threads may ask. Empty: as `see` says.
+  std::function<FourierSignature(const Pose2& pose, std::uint64_t seed)> sight;
 };
 
 /// `inside`: of a place in several parts, a position in the part that is meant; empty: the largest.
@@ -36,8 +40,8 @@ struct MissionPlace {
 [[nodiscard]] MissionPlace make_mission_place(Scene scene, Executor& executor,
                                               std::optional<Point2> inside = std::nullopt);
 
-/// What a robot there sees, preprocessed as the command's defaults have it. The same pose and seed
-/// give the same bits.
+/// What a robot there sees: the place's `sight`, or a panorama rendered directly and preprocessed
+/// as the command's defaults have it. The same pose and seed give the same bits.
 [[nodiscard]] FourierSignature see(const MissionPlace& place, const Pose2& pose,
                                    std::uint64_t seed);
 
@@ -45,7 +49,7 @@ struct MissionPlace {
 struct RememberedPlace {
   VisualMemory memory;
   NavigationGraph graph;
-  std::vector<Pose2> truth;   ///< by node of the graph
+  std::vector<Pose2> truth;   ///< by node of the graph; NaN where it is not known
   double spacing_m = 0.0;     ///< of the references
   std::vector<Point2> drawn;  ///< where the map has them, by node, in the map's own unit and frame
 };
@@ -130,9 +134,10 @@ struct MissionRun {
   std::vector<Pose2> path;  ///< true poses at the looks, and the last one
   std::vector<NavigationDecision> decisions;
   std::optional<std::size_t> carried_at;  ///< the look after which the robot was carried away
-  double end_distance_m = 0.0;            ///< from where the goal's view was taken
+  double end_distance_m = 0.0;            ///< from where the goal's view was taken; NaN: unknown
   double travelled_m = 0.0;
-  double shortest_m = 0.0;  ///< shortest way through free places, in parts when carried away
+  /// Shortest way through free places, in parts when carried away; NaN: unknown.
+  double shortest_m = 0.0;
 
   /// The robot says that it arrived, and is within `radius_m` of the goal.
   [[nodiscard]] bool arrives(double radius_m) const noexcept {
@@ -140,11 +145,16 @@ struct MissionRun {
   }
 };
 
+/// Called after each look, with the true pose.
+using LookReport = std::function<void(const NavigationDecision& decision, const Pose2& pose)>;
+
 /// Sends a robot over what is remembered; `place` may differ from the place that was remembered.
-/// The same seed gives the same run. Cost: a picture a look.
+/// Where it is not known where the goal's view was taken, nobody carries the robot away. The same
+/// seed gives the same run. Cost: a picture a look.
 [[nodiscard]] MissionRun run_mission(const MissionPlace& place, const RememberedPlace& remembered,
                                      Navigator& navigator, const Mission& mission,
-                                     const MissionOptions& options, std::uint64_t seed);
+                                     const MissionOptions& options, std::uint64_t seed,
+                                     const LookReport& report_look = {});
 
 /// All runs, mission by mission, each by a navigator of its own; run i has the stream (seed, i).
 [[nodiscard]] std::vector<MissionRun> run_missions(const MissionPlace& place,

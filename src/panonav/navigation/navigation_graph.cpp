@@ -92,9 +92,9 @@ bool is_supported(const NavigationGraph& graph, const Passage& passage) {
   return triangles == 0 || 2 * closed > telling;
 }
 
-// Reads some passages from the phases of their views.
-void read_passages(const ViewSource& source, std::span<const Link> links,
-                   std::span<Passage> passages, Executor& executor) {
+// Reads some passages from the phases of their views, which are all held at once.
+void read_some_passages(const ViewSource& source, std::span<const Link> links,
+                        std::span<Passage> passages, Executor& executor) {
   std::set<ViewId> wanted;
   for (const Link& link : links) wanted.insert({link.a, link.b});
   const VisualMemory memory = source.load(std::vector<ViewId>(wanted.begin(), wanted.end()));
@@ -110,6 +110,19 @@ void read_passages(const ViewSource& source, std::span<const Link> links,
           if (passages[i].a_from_b) passages[i].length = reading->length;
         }
       });
+}
+
+// Length 0 and no motion where nothing tells.
+std::vector<Passage> read_passages(const ViewSource& source, std::span<const Link> links,
+                                   Executor& executor) {
+  std::vector<Passage> passages(links.size());
+  constexpr std::size_t links_at_once = 2048;
+  for (std::size_t first = 0; first < links.size(); first += links_at_once) {
+    const std::size_t count = std::min(links_at_once, links.size() - first);
+    read_some_passages(source, links.subspan(first, count),
+                       std::span(passages).subspan(first, count), executor);
+  }
+  return passages;
 }
 
 // For each link the motion of the robot between its views, if it is known, in the unit of `read`.
@@ -215,13 +228,7 @@ std::vector<std::size_t> nodes_around(const NavigationGraph& graph,
 NavigationGraph navigation_graph(const ViewSource& source, std::span<const Link> links,
                                  std::span<const CoarseMotion> motion, Executor& executor) {
   const std::span<const ViewId> views = source.views();
-  std::vector<Passage> passages(links.size());
-  constexpr std::size_t links_at_once = 2048;
-  for (std::size_t first = 0; first < links.size(); first += links_at_once) {
-    const std::size_t count = std::min(links_at_once, links.size() - first);
-    read_passages(source, links.subspan(first, count), std::span(passages).subspan(first, count),
-                  executor);
-  }
+  std::vector<Passage> passages = read_passages(source, links, executor);
   const std::vector<Passage> driven = driven_passages(links, motion, passages);
   std::vector<Passage> read = passages;
   complete_lengths(read);
@@ -413,6 +420,39 @@ NavigationGraph navigation_graph(const Lattice& lattice, double least_weight) {
   }
   complete_lengths(passages);
   leave_out_far_ones(views, far, passages);
+  return {std::move(views), std::move(passages)};
+}
+
+NavigationGraph navigation_graph(const TopologicalMap& arrangement, const ViewSource& source,
+                                 Executor& executor, double least_weight) {
+  validate(arrangement);
+  std::vector<ViewId> views;
+  for (const MapNode& node : arrangement.nodes) views.push_back(node.view);
+  std::vector<Link> links;
+  std::vector<double> lengths;
+  for (const MapEdge& edge : arrangement.edges) {
+    if (edge.weight < least_weight) continue;
+    const MapNode& a = *std::ranges::lower_bound(arrangement.nodes, edge.a, {}, &MapNode::view);
+    const MapNode& b = *std::ranges::lower_bound(arrangement.nodes, edge.b, {}, &MapNode::view);
+    if (a.part != b.part) continue;
+    links.push_back({edge.a, edge.b, edge.kind});
+    lengths.push_back(distance(a.pose.position(), b.pose.position()));
+  }
+  std::vector<Passage> passages = read_passages(source, links, executor);
+  std::vector<Passage> read = passages;
+  complete_lengths(read);
+  const NavigationGraph graph(views, std::move(read));
+  for (std::size_t i = 0; i < passages.size(); ++i) {
+    Passage& passage = passages[i];
+    if (passage.a_from_b && !is_supported(graph, passage)) passage.a_from_b.reset();
+    if (passage.a_from_b && passage.length > 0.0) {
+      passage.a_from_b->x_m *= lengths[i] / passage.length;
+      passage.a_from_b->y_m *= lengths[i] / passage.length;
+    }
+    passage.length = lengths[i];
+  }
+  complete_lengths(passages);
+  leave_out_far_ones(views, lengths, passages);
   return {std::move(views), std::move(passages)};
 }
 

@@ -1,0 +1,139 @@
+#include "navigated_run.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <utility>
+
+#include "memory_pipeline.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/mapping/lattice.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+constexpr std::array<std::string_view, 4> origin_names{"map", "lattice", "links", "arrangement"};
+
+/// Empty when the file has nothing of the kind.
+std::optional<NavigationGraph> graph_from(GraphOrigin origin, const MemoryFile& file,
+                                          const VisualMemory& memory, Executor& executor) {
+  switch (origin) {
+    case GraphOrigin::map: {
+      const auto map = file.map("map");
+      if (!map) return std::nullopt;
+      return navigation_graph(*map);
+    }
+    case GraphOrigin::lattice: {
+      const auto map = file.map("lattice");
+      if (!map) return std::nullopt;
+      return navigation_graph(*map, MemoryViewSource(memory), executor);
+    }
+    case GraphOrigin::links:
+      if (memory.links().empty()) return std::nullopt;
+      return navigation_graph(memory, executor);
+    case GraphOrigin::arrangement:
+      return navigation_graph(arrange(memory, {}, {}, executor));
+  }
+  return std::nullopt;
+}
+
+/// By node; not a number where nobody knows.
+std::vector<Pose2> true_poses(const NavigationGraph& graph, const VisualMemory& memory) {
+  constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+  std::vector<Pose2> poses;
+  for (const ViewId view : graph.views()) {
+    const auto& pose = memory.info(view).pose;
+    poses.push_back(pose ? Pose2{pose->x_m, pose->y_m, pose->heading_rad.value_or(unknown)}
+                         : Pose2{unknown, unknown, unknown});
+  }
+  return poses;
+}
+
+/// Median length of the passages between views whose places are known; 0 without any.
+double spacing_of(const NavigationGraph& graph, const std::vector<Pose2>& truth) {
+  std::vector<double> lengths;
+  for (const Passage& passage : graph.passages()) {
+    const double length = distance(truth[*graph.node_of(passage.a)].position(),
+                                   truth[*graph.node_of(passage.b)].position());
+    if (std::isfinite(length)) lengths.push_back(length);
+  }
+  if (lengths.empty()) return 0.0;
+  const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
+  std::ranges::nth_element(lengths, middle);
+  return *middle;
+}
+
+}  // namespace
+
+std::string_view name_of(GraphOrigin origin) {
+  return origin_names.at(static_cast<std::size_t>(origin));
+}
+
+std::optional<GraphOrigin> graph_origin(std::string_view name) {
+  const auto found = std::ranges::find(origin_names, name);
+  if (found == origin_names.end()) return std::nullopt;
+  return static_cast<GraphOrigin>(found - origin_names.begin());
+}
+
+Remembered remember(const MemoryFile& file, std::optional<GraphOrigin> wanted, Executor& executor) {
+  VisualMemory memory = file.load();
+  if (memory.empty()) throw FileError(file.path().string(), "holds no views; allowed: 2 or more");
+  std::optional<NavigationGraph> graph;
+  GraphOrigin origin = wanted.value_or(GraphOrigin::map);
+  if (wanted) {
+    graph = graph_from(*wanted, file, memory, executor);
+    if (!graph) {
+      throw FileError(file.path().string(), "has no " + std::string(name_of(*wanted)) +
+                                                "; leave out --passages for what there is");
+    }
+  }
+  for (std::size_t i = 0; !graph; ++i) {
+    origin = static_cast<GraphOrigin>(i);
+    graph = graph_from(origin, file, memory, executor);
+  }
+  std::vector<Pose2> truth = true_poses(*graph, memory);
+  const double spacing_m = spacing_of(*graph, truth);
+  return {{std::move(memory), std::move(*graph), std::move(truth), spacing_m, {}}, origin};
+}
+
+MissionPlace place_as_remembered(
+    const std::string& scene, SimulationArguments wanted, const MemoryFile& memory,
+    const std::function<bool(const std::string&, const std::string&)>& given, Session& session) {
+  const MemoryHeader& header = memory.header();
+  const bool mirror = header.source.kind == PictureKind::mirror;
+  if (!mirror) {
+    if (!header.elevations) {
+      throw FileError(memory.path().string(),
+                      "does not say which elevations its views show, so no camera of a simulated "
+                      "robot sees alike; make it from a data set with elevation_deg");
+    }
+    const PanoramaShape shape =
+        header.picture_shape.value_or(PanoramaShape{header.shape.rows, header.panorama_columns});
+    wanted.simulation.kind = 1;
+    wanted.simulation.rows = shape.rows;
+    wanted.simulation.columns = shape.columns;
+    wanted.simulation.elevation_low_deg = degrees(header.elevations->bottom_rad);
+    wanted.simulation.elevation_high_deg = degrees(header.elevations->top_rad);
+  }
+  const auto world =
+      std::make_shared<const SimulatedWorld>(scene, wanted, given, session.executor());
+  for (const auto& warning : world->scene().warnings) session.note("warning: " + warning);
+  const RecordingCamera camera = mirror ? RecordingCamera(*header.source.camera) : world->camera();
+  const auto pipeline =
+      std::make_shared<const MemoryPipeline>(header, mirror ? header.source : world->source());
+  MissionPlace place = world->place();
+  place.sight = [world, camera, pipeline, &executor = session.executor()](const Pose2& pose,
+                                                                          std::uint64_t seed) {
+    const SimulationArguments& settled = world->arguments();
+    const Image picture = take_picture(world->renderer(), pose, camera, settled.frame,
+                                       settled.sensor, seed, executor);
+    return pipeline->signature(pipeline->convert(picture.view()));
+  };
+  return place;
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "arguments.hpp"
+#include "panonav/evaluation/mission.hpp"
+#include "panonav/storage/memory_file.hpp"
+#include "session.hpp"
+#include "simulated_recording.hpp"
+
+namespace panonav::command {
+
+/// What the passages of a memory are taken from.
+enum class GraphOrigin {
+  map,          ///< of the verb `map`: motions as the map has them
+  lattice,      ///< of the verb `arrange`: directions from the views' phases
+  links,        ///< of the memory: lengths, too
+  arrangement,  ///< none of these is there: the views are arranged first
+};
+/// "map", "lattice", "links", "arrangement".
+[[nodiscard]] std::string_view name_of(GraphOrigin origin);
+[[nodiscard]] std::optional<GraphOrigin> graph_origin(std::string_view name);
+
+/// What a robot remembers that has this memory file, and where its passages are from.
+struct Remembered {
+  RememberedPlace place;
+  GraphOrigin origin = GraphOrigin::map;
+};
+
+/// Reads a memory file; `wanted` empty: the first of `GraphOrigin` that is there. Throws FileError
+/// when it holds no views, and when what is wanted is not there.
+[[nodiscard]] Remembered remember(const MemoryFile& file, std::optional<GraphOrigin> wanted,
+                                  Executor& executor);
+
+/// A robot in a simulated world that sees as the memory's views were seen: by the camera, size and
+/// preprocessing of its header. `wanted.simulation` says what differs in the scene, the rest of it
+/// is the header's. Throws FileError when the memory does not know which elevations its rows show;
+/// else as `SimulatedWorld`. `executor` must outlive the place.
+[[nodiscard]] MissionPlace place_as_remembered(
+    const std::string& scene, SimulationArguments wanted, const MemoryFile& memory,
+    const std::function<bool(const std::string&, const std::string&)>& given, Session& session);
+
+}  // namespace panonav::command

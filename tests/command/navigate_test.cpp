@@ -1,0 +1,186 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "command_runner.hpp"
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/storage/memory_file.hpp"
+
+namespace panonav::testing {
+namespace {
+
+using nlohmann::json;
+
+constexpr double spacing_m = 0.5;
+
+/// A memory of an office, arranged. Made once: rendering takes most of the time.
+class Navigate : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder = std::make_unique<TemporaryFolder>();
+    run_well({"simulate", "office", *folder / "run", "--grid", "0.5", "--kind", "panorama",
+              "--rows", "40", "--columns", "256"});
+    memory = *folder / "office.panonav";
+    run_well({"memorise", *folder / "run", memory});
+    bare = *folder / "bare.panonav";
+    std::filesystem::copy_file(memory, bare);
+    run_well({"arrange", memory});
+  }
+  static void TearDownTestSuite() { folder.reset(); }
+  static void run_well(const std::vector<std::string>& arguments) {
+    const auto result = run_panonav(arguments);
+    ASSERT_EQ(result.exit_code, 0) << arguments.front() << ": " << result.err;
+  }
+  /// The view that is nearest to a place.
+  static std::string view_near(Point2 place) {
+    const VisualMemory views = MemoryFile::open(memory, Access::read_only).load();
+    const auto nearest = std::ranges::min_element(views.views(), {}, [&](ViewId view) {
+      return distance(views.info(view).pose->position(), place);
+    });
+    return views.info(*nearest).name;
+  }
+  static std::vector<std::string> there(const std::string& file,
+                                        const std::vector<std::string>& more) {
+    const VisualMemory views = MemoryFile::open(memory, Access::read_only).load();
+    const auto& first = views.info(views.views().front());
+    const auto& last = views.info(views.views().back());
+    std::vector<std::string> arguments{
+        "navigate",
+        file,
+        "--goal",
+        last.name,
+        "--scene",
+        "office",
+        "--start",
+        std::to_string(first.pose->x_m) + "," + std::to_string(first.pose->y_m) + ",40"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+  static std::vector<json> objects(const std::string& out) {
+    std::vector<json> result;
+    for (const std::string& line : lines(out)) result.push_back(json::parse(line));
+    return result;
+  }
+
+  inline static std::unique_ptr<TemporaryFolder> folder;
+  inline static std::string memory;
+  inline static std::string bare;
+};
+
+TEST_F(Navigate, ArrivesAndTellsEachLook) {
+  const auto result = run_panonav(
+      there(memory, {"--json", "--log", *folder / "run.log", "--picture", *folder / "run.png"}));
+  ASSERT_EQ(result.exit_code, 0) << result.err << result.out;
+  const auto told = objects(result.out);
+  ASSERT_GT(told.size(), 5U);
+  for (std::size_t i = 0; i + 1 < told.size(); ++i) {
+    EXPECT_EQ(told[i]["look"], i + 1);
+    EXPECT_EQ(told[i]["state"], i + 2 < told.size() ? "moving" : "arrived");
+    EXPECT_TRUE(told[i]["nearest"].is_string());
+  }
+  const json& summary = told.back();
+  EXPECT_EQ(summary["end"], "arrived");
+  EXPECT_EQ(summary["passages_from"], "lattice");
+  EXPECT_EQ(summary["looks"], told.size() - 1);
+  EXPECT_LT(summary["goal_distance_m"], 0.5 * spacing_m);
+  EXPECT_GT(summary["shortest_m"], 4.0 * spacing_m);
+  EXPECT_GT(summary["travelled_m"], summary["shortest_m"].get<double>() - 0.5 * spacing_m);
+  EXPECT_TRUE(summary["carried_after_look"].is_null());
+
+  std::ifstream log(*folder / "run.log");
+  std::size_t logged = 0;
+  for (std::string line; std::getline(log, line);) ++logged;
+  EXPECT_EQ(logged, told.size() - 1);
+  std::ifstream picture(*folder / "run.png", std::ios::binary);
+  std::string start(8, '\0');
+  picture.read(start.data(), 8);
+  EXPECT_EQ(start, "\x89PNG\r\n\x1a\n");
+}
+
+TEST_F(Navigate, SameSeedSameRunOnAnyNumberOfThreads) {
+  const auto once = run_panonav(there(memory, {"--json", "--threads", "1"}));
+  const auto again = run_panonav(there(memory, {"--json", "--threads", "2"}));
+  ASSERT_FALSE(once.out.empty()) << once.err;
+  EXPECT_EQ(once.out, again.out);
+  const auto other = run_panonav(there(memory, {"--json", "--seed", "2"}));
+  EXPECT_NE(once.out, other.out);
+}
+
+TEST_F(Navigate, ArrangesViewsThatNothingConnects) {
+  const auto result = run_panonav(there(bare, {"--json"}));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto told = objects(result.out);
+  EXPECT_EQ(told.back()["passages_from"], "arrangement");
+  EXPECT_LT(told.back()["goal_distance_m"], 0.5 * spacing_m);
+}
+
+TEST_F(Navigate, NoticesThatItIsCarriedAway) {
+  const VisualMemory views = MemoryFile::open(memory, Access::read_only).load();
+  const auto& first = views.info(views.views().front());
+  const auto result =
+      run_panonav(there(memory, {"--kidnap", std::to_string(first.pose->x_m) + "," +
+                                                 std::to_string(first.pose->y_m) + ",-100"}));
+  EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
+  EXPECT_NE(result.out.find("carried away after look"), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find("finds itself at another place"), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find("arrived"), std::string::npos) << result.out;
+}
+
+TEST_F(Navigate, WithoutPosesItCannotSayHowFarOffItEnded) {
+  const std::string nowhere = *folder / "nowhere.panonav";
+  std::filesystem::copy_file(memory, nowhere);
+  {
+    auto file = MemoryFile::open(nowhere, Access::read_write);
+    for (const ViewId view : file.views()) file.set_pose(view, std::nullopt);
+  }
+  const auto result = run_panonav(there(nowhere, {"--json", "--picture", *folder / "nowhere.png"}));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto summary = objects(result.out).back();
+  EXPECT_EQ(summary["end"], "arrived");
+  EXPECT_TRUE(summary["goal_distance_m"].is_null());
+  EXPECT_TRUE(summary["shortest_m"].is_null());
+  EXPECT_TRUE(std::filesystem::exists(*folder / "nowhere.png"));
+  EXPECT_NE(refusal(there(nowhere, {"--kidnap", "1,1,0"})).find("--kidnap"), std::string::npos);
+}
+
+TEST_F(Navigate, RefusesInOneLine) {
+  const auto ask = [](const std::string& file, const std::string& goal) {
+    return std::vector<std::string>{"navigate", file, "--goal", goal, "--scene", "office"};
+  };
+  EXPECT_NE(refusal(ask(memory, "no_view.png")).find("no_view.png"), std::string::npos);
+  EXPECT_NE(refusal(ask(*folder / "none.panonav", "1")).find("none.panonav"), std::string::npos);
+  auto wrong = ask(memory, view_near({0.0, 0.0}));
+  wrong.insert(wrong.end(), {"--start", "900,900,0"});
+  EXPECT_NE(refusal(wrong).find("--start"), std::string::npos);
+  wrong.back() = "1,2";
+  EXPECT_NE(refusal(wrong).find("X,Y,HEADING_DEG"), std::string::npos);
+  wrong = ask(bare, view_near({0.0, 0.0}));
+  wrong.insert(wrong.end(), {"--passages", "links"});
+  EXPECT_NE(refusal(wrong).find("links"), std::string::npos);
+
+  const std::string empty = *folder / "empty.panonav";
+  static_cast<void>(
+      MemoryFile::create(empty, MemoryFile::open(memory, Access::read_only).header()));
+  EXPECT_NE(refusal(ask(empty, "1")).find("holds no views"), std::string::npos);
+  const std::string lonely = *folder / "lonely.panonav";
+  std::filesystem::copy_file(memory, lonely);
+  {
+    auto file = MemoryFile::open(lonely, Access::read_write);
+    const ViewId view = file.views().front();
+    for (const Link& link : file.links()) {
+      if (link.a == view || link.b == view) file.unlink(link.a, link.b);
+    }
+    file.remove_map("lattice");
+  }
+  const VisualMemory views = MemoryFile::open(lonely, Access::read_only).load();
+  const std::string name = views.info(views.views().front()).name;
+  EXPECT_NE(refusal(ask(lonely, name)).find("no passage leads to the view " + name),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace panonav::testing
