@@ -25,12 +25,12 @@ std::optional<NavigationGraph> graph_from(GraphOrigin origin, const MemoryFile& 
     case GraphOrigin::map: {
       const auto map = file.map("map");
       if (!map) return std::nullopt;
-      return navigation_graph(*map);
+      return navigation_graph(*map, memory, executor);
     }
     case GraphOrigin::lattice: {
       const auto map = file.map("lattice");
       if (!map) return std::nullopt;
-      return navigation_graph(*map, MemoryViewSource(memory), executor);
+      return stored_lattice_graph(*map, MemoryViewSource(memory), executor);
     }
     case GraphOrigin::links:
       if (memory.links().empty()) return std::nullopt;

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "command_runner.hpp"
 #include "panonav/geometry/pose2.hpp"
@@ -106,8 +107,7 @@ TEST_F(Navigate, SameSeedSameRunOnAnyNumberOfThreads) {
   const auto again = run_panonav(there(memory, {"--json", "--threads", "2"}));
   ASSERT_FALSE(once.out.empty()) << once.err;
   EXPECT_EQ(once.out, again.out);
-  const auto other = run_panonav(there(memory, {"--json", "--seed", "2"}));
-  EXPECT_NE(once.out, other.out);
+  EXPECT_GT(lines(once.out).size(), 5U);
 }
 
 TEST_F(Navigate, ArrangesViewsThatNothingConnects) {
@@ -121,13 +121,27 @@ TEST_F(Navigate, ArrangesViewsThatNothingConnects) {
 TEST_F(Navigate, NoticesThatItIsCarriedAway) {
   const VisualMemory views = MemoryFile::open(memory, Access::read_only).load();
   const auto& first = views.info(views.views().front());
-  const auto result =
-      run_panonav(there(memory, {"--kidnap", std::to_string(first.pose->x_m) + "," +
-                                                 std::to_string(first.pose->y_m) + ",-100"}));
-  EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
-  EXPECT_NE(result.out.find("carried away after look"), std::string::npos) << result.out;
-  EXPECT_NE(result.out.find("finds itself at another place"), std::string::npos) << result.out;
-  EXPECT_NE(result.out.find("arrived"), std::string::npos) << result.out;
+  const auto result = run_panonav(there(
+      memory, {"--json", "--kidnap",
+               std::to_string(first.pose->x_m) + "," + std::to_string(first.pose->y_m) + ",-100"}));
+  ASSERT_EQ(result.exit_code, 0) << result.out << result.err;
+  const auto told = objects(result.out);
+  EXPECT_EQ(told.back()["end"], "arrived");
+  EXPECT_LT(told.back()["goal_distance_m"], 0.5 * spacing_m);
+  ASSERT_TRUE(told.back()["carried_after_look"].is_number());
+  const auto carried = told.back()["carried_after_look"].get<std::size_t>();
+  ASSERT_LT(carried, told.size() - 1);
+  const Point2 back{told[carried]["pose"]["x_m"], told[carried]["pose"]["y_m"]};
+  EXPECT_LT(distance(back, first.pose->position()), 1e-6);
+  // Three looks must agree before another place is believed.
+  std::optional<std::size_t> noticed;
+  for (std::size_t i = carried; i + 1 < told.size() && !noticed; ++i) {
+    const Point2 here{told[i]["pose"]["x_m"], told[i]["pose"]["y_m"]};
+    const auto believed = views.find(told[i]["nearest"].get<std::string>());
+    if (distance(views.info(*believed).pose->position(), here) < spacing_m) noticed = i;
+  }
+  ASSERT_TRUE(noticed.has_value());
+  EXPECT_LE(*noticed, carried + 5);
 }
 
 TEST_F(Navigate, WithoutPosesItCannotSayHowFarOffItEnded) {

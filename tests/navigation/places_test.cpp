@@ -132,7 +132,7 @@ TEST(NavigationGraph, AStoredLatticeSaysTheSameAsTheLattice) {
   const Lattice lattice = arrange(grid.memory, {}, {}, executor);
   const NavigationGraph graph = navigation_graph(lattice);
   const NavigationGraph stored =
-      navigation_graph(map_of(lattice), MemoryViewSource(grid.memory), executor);
+      stored_lattice_graph(map_of(lattice), MemoryViewSource(grid.memory), executor);
   ASSERT_EQ(stored.size(), graph.size());
   // Springs may be longer than they came to lie, so the stored lattice has some passages more.
   ASSERT_GE(stored.passages().size(), graph.passages().size() * 9 / 10);

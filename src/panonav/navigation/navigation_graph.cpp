@@ -423,8 +423,8 @@ NavigationGraph navigation_graph(const Lattice& lattice, double least_weight) {
   return {std::move(views), std::move(passages)};
 }
 
-NavigationGraph navigation_graph(const TopologicalMap& arrangement, const ViewSource& source,
-                                 Executor& executor, double least_weight) {
+NavigationGraph stored_lattice_graph(const TopologicalMap& arrangement, const ViewSource& source,
+                                     Executor& executor, double least_weight) {
   validate(arrangement);
   std::vector<ViewId> views;
   for (const MapNode& node : arrangement.nodes) views.push_back(node.view);

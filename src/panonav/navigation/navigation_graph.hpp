@@ -111,8 +111,8 @@ inline constexpr double most_disagreement_rad = 0.78539816339744831;
 /// The same of a lattice that was stored as a map (`map_of`): the phases are read anew from the
 /// views, with the support that the passages of links need. Throws ContractError as `validate`, and
 /// on a view that the source has not. Cost: two home vectors an edge.
-[[nodiscard]] NavigationGraph navigation_graph(const TopologicalMap& arrangement,
-                                               const ViewSource& source, Executor& executor,
-                                               double least_weight = 0.1);
+[[nodiscard]] NavigationGraph stored_lattice_graph(const TopologicalMap& arrangement,
+                                                   const ViewSource& source, Executor& executor,
+                                                   double least_weight = 0.1);
 
 }  // namespace panonav
