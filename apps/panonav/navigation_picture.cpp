@@ -49,6 +49,19 @@ std::vector<MapLayer> field_layers(const RememberedPlace& remembered, const Fiel
   return {arrows, references};
 }
 
+/// Things around, but for frames that the robot can drive through: their outlines would bar doors.
+std::vector<MapLayer> things_layers(const MissionPlace& place) {
+  std::vector<MapLayer> layers = furniture_layers(place.scene);
+  for (MapLayer& layer : layers) {
+    std::erase_if(layer.filled_polygons, [&](const std::vector<Point2>& corners) {
+      const Point2 middle{0.5 * (corners[0].x_m + corners[2].x_m),
+                          0.5 * (corners[0].y_m + corners[2].y_m)};
+      return place.free_space->is_free(middle);
+    });
+  }
+  return layers;
+}
+
 /// Over the references, from that which the robot was nearest to at first.
 MapLayer planned_layer(const RememberedPlace& remembered, const PlannerOptions& options,
                        ViewId goal, const MissionRun& run) {
@@ -85,7 +98,7 @@ void write_navigation_picture(const std::filesystem::path& path, const std::stri
   const FreeSpace& space = *place.free_space;
   const double side_m =
       std::max(space.high().x_m - space.low().x_m, space.high().y_m - space.low().y_m);
-  MapPlot plot{.title = title, .layers = furniture_layers(place.scene)};
+  MapPlot plot{.title = title, .layers = things_layers(place)};
   plot.layers.push_back(obstacle_layer(space, space.low(), space.high(), side_m / dots_a_side));
   for (MapLayer& layer : field_layers(remembered, options.field, goal)) {
     plot.layers.push_back(std::move(layer));
