@@ -213,13 +213,41 @@ std::pair<PaperText, Reproduction> run_y03(const ReproduceArguments& wanted, Ses
   return {text, reproduce_y03(options, session.executor(), progress)};
 }
 
-constexpr std::array<std::string_view, 5> papers{"f11", "m03", "m04", "s06", "y03"};
+std::pair<PaperText, Reproduction> run_navigation(const ReproduceArguments& wanted,
+                                                  Session& session,
+                                                  const ReproductionProgress& progress) {
+  refuse(wanted.queries.has_value(), "--queries", wanted);
+  refuse(wanted.rows.has_value(), "--rows", wanted);
+  refuse(wanted.only.has_value(), "--only", wanted);
+  NavigationReproductionOptions options{.out = wanted.out, .data = data_folder(wanted)};
+  set_scenes(wanted, options);
+  if (wanted.runs) options.runs = *wanted.runs;
+  if (options.runs < options.scenes) {
+    throw OptionError("--runs is '" + std::to_string(options.runs) +
+                      "'; allowed for navigation: from --scenes (" +
+                      std::to_string(options.scenes) + ")");
+  }
+  const PaperText text{
+      "Going somewhere over the visual memory",
+      "Menegatti, Maeda, Ishiguro 2004, section 3.5 and figure 18, and what its authors left to "
+      "later work: " +
+          std::to_string(options.runs) +
+          " missions from random starts to random goals in each kind of place, " +
+          std::to_string(options.scenes) +
+          " variants of each. The robot sees pictures and feels what is in its way; it knows "
+          "neither where it is nor where its references were taken."};
+  return {text, reproduce_navigation(options, session.executor(), progress)};
+}
+
+constexpr std::array<std::string_view, 6> papers{"f11", "m03", "m04", "navigation", "s06", "y03"};
 
 void reproduce_paper(const ReproduceArguments& wanted, Session& session) {
   if (std::ranges::find(papers, wanted.paper) == papers.end()) {
-    throw OptionError("PAPER is '" + wanted.paper +
-                      "'; allowed: f11 (visual odometry and maps), m03 (Monte-Carlo "
-                      "localisation), m04 (localisation), s06 (homing), y03 (routes), all");
+    throw OptionError(
+        "PAPER is '" + wanted.paper +
+        "'; allowed: f11 (visual odometry and maps), m03 (Monte-Carlo "
+        "localisation), m04 (localisation), navigation ([M04] figure 18 and beyond), s06 "
+        "(homing), y03 (routes), all");
   }
   Progress progress("reproduce " + wanted.paper, 100);
   std::size_t shown_percent = 0;
@@ -228,7 +256,9 @@ void reproduce_paper(const ReproduceArguments& wanted, Session& session) {
     if (percent > shown_percent) progress.advance(percent - shown_percent);
     shown_percent = std::max(shown_percent, percent);
   };
-  const auto [text, result] = wanted.paper == "m04"   ? run_m04(wanted, session, report)
+  const auto [text, result] = wanted.paper == "m04" ? run_m04(wanted, session, report)
+                              : wanted.paper == "navigation"
+                                  ? run_navigation(wanted, session, report)
                               : wanted.paper == "m03" ? run_m03(wanted, session, report)
                               : wanted.paper == "f11" ? run_f11(wanted, session, report)
                               : wanted.paper == "y03" ? run_y03(wanted, session, report)
@@ -280,7 +310,7 @@ ExitCode reproduce(const ReproduceArguments& wanted, Session& session) {
 
 Run declare(Arguments& arguments) {
   auto wanted = std::make_shared<ReproduceArguments>();
-  arguments.positional("PAPER", wanted->paper, "f11, m03, m04, s06, y03 or all");
+  arguments.positional("PAPER", wanted->paper, "f11, m03, m04, navigation, s06, y03 or all");
   arguments.option("-o,--out", wanted->out, "Folder for the report (default: reproduction)");
   arguments.flag("--quick", wanted->quick, "A smoke run: few scenes, few questions or runs");
   const ReproductionOptions m04;
@@ -288,32 +318,39 @@ Run declare(Arguments& arguments) {
   const HomingReproductionOptions s06;
   const MappingReproductionOptions f11;
   const RouteReproductionOptions y03;
-  const auto defaults = [](auto f11_value, auto m03_value, auto m04_value, auto s06_value,
-                           auto y03_value) {
+  const NavigationReproductionOptions navigation;
+  const auto defaults = [](auto f11_value, auto m03_value, auto m04_value, auto navigation_value,
+                           auto s06_value, auto y03_value) {
     return " (default: " + std::to_string(f11_value) + " for f11, " + std::to_string(m03_value) +
-           " for m03, " + std::to_string(m04_value) + " for m04, " + std::to_string(s06_value) +
+           " for m03, " + std::to_string(m04_value) + " for m04, " +
+           std::to_string(navigation_value) + " for navigation, " + std::to_string(s06_value) +
            " for s06, " + std::to_string(y03_value) + " for y03";
   };
   const auto fallback = [](int value) { return " (default: " + std::to_string(value); };
   arguments.option("--seed", wanted->seed,
                    "First of the scene seeds" +
-                       defaults(f11.seed, m03.seed, m04.seed, s06.seed, y03.seed) + ")");
-  arguments.option("--scenes", wanted->scenes, 1,
-                   "Variants of the scene" +
-                       defaults(f11.scenes, m03.scenes, m04.scenes, s06.scenes, y03.scenes) + ")");
+                       defaults(f11.seed, m03.seed, m04.seed, navigation.seed, s06.seed, y03.seed) +
+                       ")");
+  arguments.option(
+      "--scenes", wanted->scenes, 1,
+      "Variants of the scene" +
+          defaults(f11.scenes, m03.scenes, m04.scenes, navigation.scenes, s06.scenes, y03.scenes) +
+          ")");
   arguments.option("--queries", wanted->queries, 1,
                    "m04: questions in each" + fallback(m04.queries) + "; from 1)");
   arguments.option("--runs", wanted->runs, 2,
                    "m03: runs in each variant of an office" + fallback(m03.runs) +
                        "); f11: paths in each Gazebo world" + fallback(f11.runs) +
+                       "); navigation: missions in each kind of place" + fallback(navigation.runs) +
                        "); y03: runs along routes of 60 m in each place" + fallback(y03.runs) +
                        "); from 2");
   arguments.option("--rows", wanted->rows, 1,
                    "m03, m04: rows of the views" + fallback(m03.rows) + "; from 1)");
-  arguments.option("--data", wanted->data,
-                   "f11, m03, s06, y03: folder with the recordings and Gazebo worlds (default: the "
-                   "environment's "
-                   "PANONAV_DATA; without it they are left out)");
+  arguments.option(
+      "--data", wanted->data,
+      "f11, m03, navigation, s06, y03: folder with the recordings and Gazebo worlds (default: the "
+      "environment's "
+      "PANONAV_DATA; without it they are left out)");
   const auto parts = tracking_reproduction_parts();
   arguments.choice("--only", wanted->only, {parts.begin(), parts.end()},
                    "m03: this part of the experiments (default: all)");
@@ -328,7 +365,7 @@ Verb reproduce_verb() {
           "takes some minutes.",
           "  panonav reproduce m03\n  panonav reproduce m04 --quick --json -o smoke\n"
           "  panonav reproduce s06 -o homing\n  panonav reproduce f11 -o maps\n  panonav reproduce "
-          "y03 -o routes",
+          "y03 -o routes\n  panonav reproduce navigation --data DATA",
           declare};
 }
 

@@ -145,4 +145,25 @@ struct RouteReproductionOptions {
                                          Executor& executor,
                                          const ReproductionProgress& progress = {});
 
+struct NavigationReproductionOptions {
+  std::filesystem::path out;  ///< folder for pictures; made when it is not there
+  int scenes = 4;             ///< variants of each scene and drives through each world, >= 2
+  int runs = 100;             ///< in each kind of place, shared by its variants, >= scenes
+  std::uint64_t seed = 1001;  ///< of the first scene; the others follow it
+  /// Folder of the Gazebo worlds (docs/formats.md); empty: these are left out.
+  std::filesystem::path data;
+};
+
+/// The same as a smoke run: two variants, two runs in each kind of place.
+[[nodiscard]] NavigationReproductionOptions quick_run(NavigationReproductionOptions options);
+
+/// Going somewhere over the memory as in [M04] section 3.5 and figure 18: office, hall and garden
+/// arranged by likeness alone; then what its authors left to later work: drives through corridors
+/// and Gazebo worlds mapped by visual odometry, other light and moved objects, a robot that is
+/// carried away, blocked passages. Same options: same rows and pictures on any number of threads.
+/// Throws ContractError, FileError.
+[[nodiscard]] Reproduction reproduce_navigation(const NavigationReproductionOptions& options,
+                                                Executor& executor,
+                                                const ReproductionProgress& progress = {});
+
 }  // namespace panonav

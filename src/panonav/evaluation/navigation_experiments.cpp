@@ -1,0 +1,315 @@
+#include "panonav/evaluation/navigation_experiments.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "panonav/core/random.hpp"
+#include "panonav/evaluation/m03_support.hpp"
+#include "panonav/evaluation/mapping_run.hpp"
+#include "panonav/evaluation/mission.hpp"
+#include "panonav/evaluation/plot.hpp"
+#include "panonav/evaluation/s06_support.hpp"
+#include "panonav/evaluation/statistics.hpp"
+#include "panonav/evaluation/surroundings.hpp"
+#include "panonav/geometry/positions.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav/navigation/direction_field.hpp"
+#include "panonav/simulation/load_gazebo.hpp"
+#include "panonav/simulation/recording.hpp"
+#include "panonav/simulation/scenes.hpp"
+
+namespace panonav {
+
+namespace {
+
+// Of every second variant; the others have as much more light.
+constexpr double light_change = 0.3;
+constexpr double moved_share = 0.1;
+// References along a drive, and how long that is.
+constexpr double drive_spacing_m = 0.25;
+constexpr double drive_m = 60.0;
+// What a start beside a drive is off, as where a robot is set down by hand.
+constexpr double beside_drive_m = 0.3;
+
+// What is measured of missions of one kind.
+struct Measures {
+  std::size_t runs = 0;
+  std::size_t arrived = 0;
+  std::size_t wrongly = 0;  // says that it arrived, but is elsewhere
+  std::map<NavigationState, std::size_t> ends;
+  std::vector<double> lengths;  // of those that arrived, over the shortest
+  std::vector<double> looks;
+
+  void add(const std::vector<MissionRun>& missions, double radius_m) {
+    for (const MissionRun& run : missions) {
+      ++runs;
+      const bool arrives = run.arrives(radius_m);
+      arrived += static_cast<std::size_t>(arrives);
+      wrongly += static_cast<std::size_t>(!arrives && run.end == NavigationState::arrived);
+      ++ends[run.end];
+      looks.push_back(static_cast<double>(run.decisions.size()));
+      if (arrives && run.shortest_m > 0.0) lengths.push_back(run.travelled_m / run.shortest_m);
+    }
+  }
+};
+
+void report(const std::string& id, const std::string& what, const Measures& measured,
+            std::optional<Target> arrival, std::optional<Target> length, Reproduction& result) {
+  add_rate(result, id + ".arrived", what + ": arrive within half the reference spacing",
+           measured.arrived, measured.runs, arrival);
+  if (!measured.lengths.empty()) {
+    add_median(result, id + ".length", what + ": way driven against the shortest", "x",
+               measured.lengths, length);
+  }
+  add_rate(result, id + ".wrongly", what + ": say that they arrived, and are farther off",
+           measured.wrongly, measured.runs);
+  for (const auto& [end, count] : measured.ends) {
+    if (end == NavigationState::arrived) continue;
+    add_rate(result, id + "." + std::string(name_of(end)),
+             what + ": end as " + std::string(name_of(end)), count, measured.runs);
+  }
+  add_median(result, id + ".looks", what + ": looks", "", measured.looks);
+}
+
+int runs_of(const NavigationReproductionOptions& options, int scene) {
+  return options.runs / options.scenes + (scene < options.runs % options.scenes ? 1 : 0);
+}
+
+// What is remembered, the directions towards the goal, the planned way and the driven one.
+void draw(const NavigationReproductionOptions& options, const std::string& name,
+          const MissionPlace& place, const RememberedPlace& remembered, const Mission& mission,
+          const MissionRun& run, Reproduction& result) {
+  const FreeSpace& space = *place.free_space;
+  const auto guides = direction_field(remembered.graph, mission.goal);
+  MapLayer references{.label = "references", .colour = "#7f7f7f"};
+  MapLayer arrows{.label = "direction towards the goal", .colour = "#1f77b4"};
+  MapLayer planned{.label = "planned way", .colour = "#2ca02c"};
+  MapLayer driven{.label = "driven way", .colour = "#d62728", .lines = {positions_of(run.path)}};
+  const double arrow_m = 0.6 * remembered.spacing_m;
+  for (std::size_t node = 0; node < remembered.truth.size(); ++node) {
+    const Pose2& pose = remembered.truth[node];
+    references.dots.push_back(pose.position());
+    if (!guides[node].direction_rad) continue;
+    const double direction = *guides[node].direction_rad;
+    arrows.lines.push_back({pose.position(), pose * Point2{arrow_m * std::cos(direction),
+                                                           arrow_m * std::sin(direction)}});
+  }
+  const AreaPlanner planner = [&] {
+    AreaPlanner made(remembered.graph);
+    made.set_goal(mission.goal);
+    return made;
+  }();
+  const auto first = run.decisions.front().nearest;
+  if (first) {
+    auto& way = planned.lines.emplace_back();
+    for (const std::size_t node : planner.planned_way(*remembered.graph.node_of(*first))) {
+      way.push_back(remembered.truth[node].position());
+    }
+  }
+  const std::size_t goal = *remembered.graph.node_of(mission.goal);
+  MapLayer ends{.label = "start (square) and goal (cross)", .colour = "#000000"};
+  ends.squares.push_back(mission.start.position());
+  ends.crosses.push_back(remembered.truth[goal].position());
+  const std::string file = "mission_" + name + ".png";
+  write_plot(options.out / file,
+             MapPlot{.title = name + ": x and y in metres",
+                     .layers = {obstacle_layer(space, space.low(), space.high(), 0.1), references,
+                                arrows, planned, driven, ends}});
+  result.pictures.push_back(
+      {file, "A mission in " + name +
+                 ": every reference view says in which direction the goal lies; the robot takes "
+                 "the direction of the one it is nearest to and looks again."});
+}
+
+Scene scene_of(const NavigationReproductionOptions& options, const std::string& name,
+               const SceneVariation& variation) {
+  const auto names = scene_names();
+  if (std::ranges::find(names, name) != names.end()) return make_scene(name, variation);
+  GazeboOptions reading;
+  reading.textures.read = [](const std::filesystem::path& path) { return read_image(path); };
+  Scene scene = load_gazebo(options.data / "scenes" / name / "worlds" / (name + ".world"), reading);
+  if (variation.light != 1.0) scale_light(scene, variation.light);
+  return scene;
+}
+
+// A drive of `drive_m`: the scene's round trip again and again, or ways between random places with
+// 10 cm to spare beside the robot.
+std::vector<Pose2> exploring_drive(const MissionPlace& place, std::uint64_t seed) {
+  Random random(seed, 5);
+  FreeSpaceOptions roomy = free_space_options(place.scene);
+  roomy.robot_radius_m += 0.1;
+  const FreeSpace space(place.scene, roomy);
+  std::vector<Point2> way;
+  double length_m = 0.0;
+  while (length_m < drive_m) {
+    const std::size_t before = way.size();
+    if (place.scene.tour.empty()) {
+      way.push_back(space.random_pose(random).position());
+    } else {
+      way.insert(way.end(), place.scene.tour.begin(), place.scene.tour.end());
+    }
+    for (std::size_t i = std::max<std::size_t>(1, before); i < way.size(); ++i) {
+      length_m += distance(way[i - 1], way[i]);
+    }
+  }
+  std::vector<Pose2> poses;
+  for (const RecordedPose& pose : plan_recording(place.scene, space,
+                                                 {.path = RecordingPath::tour,
+                                                 .heading = RecordingHeading::path,
+                                                 .spacing_m = drive_spacing_m},
+                                                 {}, seed, way)) {
+    poses.push_back(pose.pose);
+  }
+  poses.resize(std::min(poses.size(), static_cast<std::size_t>(drive_m / drive_spacing_m) + 1));
+  return poses;
+}
+
+// A screen as high as a robot across the way at `at`.
+void put_screen(Scene& scene, const Pose2& at) {
+  constexpr double half_width_m = 1.5;
+  constexpr double height_m = 1.0;
+  const auto material = static_cast<int>(scene.materials.size());
+  scene.materials.push_back({.colour = {0.8F, 0.3F, 0.2F}});
+  const Point2 left = at * Point2{0.0, half_width_m};
+  const Point2 right = at * Point2{0.0, -half_width_m};
+  scene.meshes.push_back({.object = "screen",
+                          .material = material,
+                          .vertices = {{left.x_m, left.y_m, 0.0},
+                                       {right.x_m, right.y_m, 0.0},
+                                       {right.x_m, right.y_m, height_m},
+                                       {left.x_m, left.y_m, height_m}},
+                          .texture_coordinates = {},
+                          .triangles = {{0, 1, 2}, {0, 2, 3}}});
+}
+
+}  // namespace
+
+void reproduce_grid_missions(const NavigationReproductionOptions& options, const std::string& scene,
+                             double spacing_m, Executor& executor, Reproduction& result) {
+  Measures measured;
+  for (int i = 0; i < options.scenes; ++i) {
+    const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
+    const MissionPlace place = make_mission_place(make_scene(scene, {.seed = seed}), executor);
+    const RememberedPlace remembered =
+        remember_grid(place, spacing_m, Random(seed, 1).next(), executor);
+    const auto missions =
+        random_missions(place, remembered, {.count = runs_of(options, i)}, Random(seed, 2).next());
+    MissionOptions mission;
+    mission.base.drive = i % 2 == 0 ? DriveKind::differential : DriveKind::holonomic;
+    const auto runs =
+        run_missions(place, remembered, missions, mission, Random(seed, 3).next(), executor);
+    measured.add(runs, 0.5 * spacing_m);
+    if (i == 0) draw(options, scene, place, remembered, missions.front(), runs.front(), result);
+  }
+  report("m04.fig18." + scene,
+         "figure 18: " + scene + ", references every " + centimetres(spacing_m) +
+             " arranged by likeness alone",
+         measured, at_least(0.98), at_most(1.3), result);
+}
+
+void reproduce_drive_missions(const NavigationReproductionOptions& options,
+                              const std::string& scene, Executor& executor, Reproduction& result) {
+  Measures same;
+  Measures changed;
+  Measures carried;
+  for (int i = 0; i < options.scenes; ++i) {
+    const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
+    SceneVariation variation{.seed = seed};
+    const MissionPlace place = make_mission_place(scene_of(options, scene, variation), executor);
+    const RememberedPlace remembered = remember_drive(
+        place, exploring_drive(place, seed), cheap_wheels(), Random(seed, 1).next(), executor);
+    variation.light = i % 2 == 0 ? 1.0 - light_change : 1.0 + light_change;
+    variation.moved_objects = moved_share;
+    variation.moved_seed = Random(seed, 4).next();
+    const MissionPlace other = make_mission_place(scene_of(options, scene, variation), executor);
+    MissionOptions mission;
+    mission.base.drive = i % 2 == 0 ? DriveKind::differential : DriveKind::holonomic;
+    const double radius_m = 0.5 * remembered.spacing_m;
+    const auto run = [&](const MissionPlace& where, bool is_carried, std::uint64_t stream,
+                         Measures& measures) {
+      const auto missions = random_missions(
+          where, remembered,
+          {.count = runs_of(options, i), .beside_m = beside_drive_m, .carried = is_carried},
+          Random(seed, stream).next());
+      const auto runs = run_missions(where, remembered, missions, mission,
+                                     Random(seed, stream + 1).next(), executor);
+      measures.add(runs, radius_m);
+      if (i == 0 && &measures == &same) {
+        draw(options, scene, where, remembered, missions.front(), runs.front(), result);
+      }
+    };
+    run(place, false, 5, same);
+    run(other, false, 7, changed);
+    run(place, true, 9, carried);
+  }
+  const std::string what = scene + ", map of a drive of 60 m";
+  report("navigation." + scene, what, same, at_least(0.95), std::nullopt, result);
+  const bool movable = std::ranges::find(scene_names(), scene) != scene_names().end();
+  report("navigation." + scene + ".changed",
+         what + (movable ? ", light changed by 30 % and 10 % of the objects moved"
+                         : ", light changed by 30 %"),
+         changed, at_least(0.9), std::nullopt, result);
+  report("navigation." + scene + ".carried", what + ", carried away half way", carried,
+         at_least(0.9), std::nullopt, result);
+}
+
+void reproduce_blocked_missions(const NavigationReproductionOptions& options, Executor& executor,
+                                Reproduction& result) {
+  Measures around;
+  Measures shut;
+  for (int i = 0; i < options.scenes; ++i) {
+    const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
+    const Scene scene = make_scene("loop", {.seed = seed});
+    const MissionPlace place = make_mission_place(scene, executor);
+    const auto way = exploring_drive(place, seed);
+    const RememberedPlace remembered =
+        remember_drive(place, way, cheap_wheels(), Random(seed, 1).next(), executor);
+    double tour_m = 0.0;
+    for (std::size_t k = 0; k < scene.tour.size(); ++k) {
+      tour_m += distance(scene.tour[k], scene.tour[(k + 1) % scene.tour.size()]);
+    }
+    const auto round = static_cast<std::size_t>(tour_m / drive_spacing_m);
+    Random random(seed, 11);
+    for (int k = 0; k < runs_of(options, i); ++k) {
+      // A quarter of the round trip apart, the screen half way between; the other one on the
+      // opposite side.
+      const std::size_t start = random.index(round);
+      const std::size_t goal = (start + round / 4) % round;
+      const Pose2 middle = way[(start + round / 8) % round];
+      const Pose2 opposite = way[(start + round / 8 + round / 2) % round];
+      const Mission mission{remembered.graph.view(goal), way[start], {}};
+      for (const bool both : {false, true}) {
+        Scene blocked = scene;
+        put_screen(blocked, middle);
+        if (both) put_screen(blocked, opposite);
+        const MissionPlace now =
+            make_mission_place(std::move(blocked), executor, mission.start.position());
+        const auto runs =
+            run_missions(now, remembered, {mission}, {},
+                         Random(seed, 100 + static_cast<std::uint64_t>(k)).next(), executor);
+        (both ? shut : around).add(runs, 0.5 * remembered.spacing_m);
+        if (i == 0 && k == 0 && !both) {
+          draw(options, "loop_blocked", now, remembered, mission, runs.front(), result);
+        }
+      }
+    }
+  }
+  const std::string what = "loop, a screen across the passage";
+  report("navigation.blocked", what + ", another way round", around, at_least(0.9), std::nullopt,
+         result);
+  add_rate(result, "navigation.shut.unreachable", what + " on both sides: told unreachable",
+           shut.ends[NavigationState::unreachable], shut.runs, at_least(0.9));
+  add_rate(result, "navigation.shut.arrived", what + " on both sides: say that they arrived",
+           shut.ends[NavigationState::arrived], shut.runs);
+  add_median(result, "navigation.shut.looks", what + " on both sides: looks until told", "",
+             shut.looks);
+  report_figure(result, "navigation.shut.most_looks", what + " on both sides: looks, most",
+                *std::ranges::max_element(shut.looks), "");
+}
+
+}  // namespace panonav

@@ -1,0 +1,53 @@
+#include <filesystem>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+#include "panonav/evaluation/navigation_experiments.hpp"
+#include "panonav/evaluation/reproduction.hpp"
+#include "panonav/evaluation/reproduction_stages.hpp"
+
+namespace panonav {
+
+NavigationReproductionOptions quick_run(NavigationReproductionOptions options) {
+  options.scenes = 2;
+  options.runs = 2;
+  return options;
+}
+
+Reproduction reproduce_navigation(const NavigationReproductionOptions& options, Executor& executor,
+                                  const ReproductionProgress& progress) {
+  require(options.scenes >= 2, "scenes", options.scenes, ">= 2");
+  require(options.runs >= options.scenes, "runs", options.runs, ">= scenes");
+  std::error_code error;
+  std::filesystem::create_directories(options.out, error);
+  if (error) throw FileError(options.out.string(), "cannot be made: " + error.message());
+  Reproduction result;
+  std::vector<ReproductionStage> stages;
+  const auto add_grid = [&](const std::string& scene, double spacing_m, double cost) {
+    stages.push_back(
+        {"missions in " + scene, cost, [&options, &executor, &result, scene, spacing_m] {
+           reproduce_grid_missions(options, scene, spacing_m, executor, result);
+         }});
+  };
+  add_grid("office", 0.3, 1.0);
+  add_grid("hall", 0.4, 2.0);
+  add_grid("garden", 0.3, 8.0);
+  std::vector<std::string> drives{"loop", "corridor"};
+  for (const std::string world : {"small_warehouse", "small_house"}) {
+    if (!options.data.empty() && std::filesystem::is_directory(options.data / "scenes" / world)) {
+      drives.push_back(world);
+    }
+  }
+  for (const std::string& scene : drives) {
+    stages.push_back({"missions in " + scene, 6.0,
+                      [&, scene] { reproduce_drive_missions(options, scene, executor, result); }});
+  }
+  stages.push_back(
+      {"blocked passages", 2.0, [&] { reproduce_blocked_missions(options, executor, result); }});
+  run_stages(stages, progress);
+  return result;
+}
+
+}  // namespace panonav
