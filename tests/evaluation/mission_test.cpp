@@ -1,0 +1,112 @@
+#include "panonav/evaluation/mission.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "panonav/core/error.hpp"
+#include "panonav/evaluation/reproduction.hpp"
+#include "panonav/simulation/scenes.hpp"
+#include "support/sanitizers.hpp"
+
+namespace panonav {
+namespace {
+
+TEST(MissionRobot, StopsWhereSomethingIsInItsWayAndFeelsItsWayPast) {
+  Executor executor(2);
+  const MissionPlace place = make_mission_place(make_scene("loop", {.seed = 3}), executor);
+  const OdometryNoise exact{.translation_from_translation = 0.0,
+                            .translation_from_rotation = 0.0,
+                            .rotation_from_translation = 0.0,
+                            .rotation_from_rotation = 0.0,
+                            .translation_scale_error = 0.0,
+                            .rotation_scale_error = 0.0};
+  const Point2 start = place.scene.tour.front();
+  const BaseOptions base;
+  // Straight on until it touches something, in every direction.
+  for (int k = 0; k < 8; ++k) {
+    MissionRobot robot(place, base, exact,
+                       {start.x_m, start.y_m, -std::numbers::pi + k * std::numbers::pi / 4.0}, 1);
+    bool stopped = false;
+    for (int step = 0; step < 2000 && !stopped; ++step) {
+      robot.command({.forward_m_s = base.speed_m_s});
+      stopped = robot.take_obstacle();
+      ASSERT_GE(place.free_space->clearance_m(robot.pose().position()), place.scene.robot_radius_m);
+    }
+    EXPECT_TRUE(stopped) << k;
+    EXPECT_FALSE(robot.take_obstacle());
+    // Ahead is no way; where there is one it is at most 90 degrees aside.
+    const auto aside = robot.free_direction(0.0, 0.3);
+    if (!aside) continue;
+    EXPECT_NE(*aside, 0.0);
+    EXPECT_LE(std::abs(*aside), std::numbers::pi / 2.0 + 1e-9);
+  }
+}
+
+TEST(Missions, ArriveOverAMemoryWithoutPositionsAndAreRepeatable) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  Executor two(2);
+  const MissionPlace place = make_mission_place(make_scene("office", {.seed = 71}), two);
+  const RememberedPlace remembered = remember_grid(place, 0.4, 5, two);
+  ASSERT_GT(remembered.truth.size(), 40U);
+  ASSERT_EQ(remembered.graph.size(), remembered.truth.size());
+  const auto missions = random_missions(place, remembered, {.count = 8}, 3);
+  const auto runs = run_missions(place, remembered, missions, {}, 9, two);
+  int arrived = 0;
+  for (const MissionRun& run : runs) {
+    ASSERT_FALSE(run.path.empty());
+    ASSERT_EQ(run.path.size(), run.decisions.size());
+    EXPECT_NE(run.end, NavigationState::moving);
+    EXPECT_GE(run.shortest_m, 0.0);
+    arrived += static_cast<int>(run.arrives(0.2));
+    // No robot ever stands in a thing.
+    for (const Pose2& pose : run.path) {
+      EXPECT_GE(place.free_space->clearance_m(pose.position()), place.scene.robot_radius_m);
+    }
+  }
+  EXPECT_GE(arrived, 7);
+  Executor one(1);
+  const auto again = run_missions(place, remembered, missions, {}, 9, one);
+  for (std::size_t i = 0; i < runs.size(); ++i) EXPECT_EQ(again[i].path, runs[i].path);
+}
+
+TEST(Missions, ARobotThatIsCarriedAwayFindsItsGoalAllTheSame) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  Executor executor(2);
+  const MissionPlace place = make_mission_place(make_scene("office", {.seed = 72}), executor);
+  const RememberedPlace remembered = remember_grid(place, 0.4, 5, executor);
+  const auto missions = random_missions(place, remembered, {.count = 8, .carried = true}, 4);
+  const auto runs = run_missions(place, remembered, missions, {}, 10, executor);
+  int carried = 0;
+  int arrived = 0;
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    if (!runs[i].carried_at) continue;
+    ++carried;
+    const std::size_t next = *runs[i].carried_at + 1;
+    ASSERT_LT(next, runs[i].path.size());
+    EXPECT_EQ(runs[i].path[next], *missions[i].carried_to);
+    arrived += static_cast<int>(runs[i].arrives(0.2));
+  }
+  ASSERT_GE(carried, 4);
+  EXPECT_GE(arrived, carried - 1);
+}
+
+TEST(Missions, RefuseWhatMakesNoSense) {
+  Executor executor(2);
+  const MissionPlace place = make_mission_place(make_scene("office", {.seed = 71}), executor);
+  const RememberedPlace remembered = remember_grid(place, 1.0, 5, executor);
+  EXPECT_THROW((void)random_missions(place, remembered, {.count = -1}, 1), ContractError);
+  EXPECT_THROW((void)random_missions(place, remembered, {.beside_m = 0.0}, 1), ContractError);
+  const MemoryViewSource source(remembered.memory);
+  Navigator navigator(source, AreaPlanner(remembered.graph));
+  EXPECT_THROW((void)run_mission(place, remembered, navigator, {ViewId{9999}, {}, {}}, {}, 1),
+               ContractError);
+  EXPECT_THROW((void)reproduce_navigation({.out = "x", .scenes = 1}, executor), ContractError);
+  EXPECT_THROW((void)reproduce_navigation({.out = "x", .scenes = 4, .runs = 3}, executor),
+               ContractError);
+}
+
+}  // namespace
+}  // namespace panonav
