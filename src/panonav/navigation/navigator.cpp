@@ -406,12 +406,13 @@ void Navigator::go_home(const Seen& seen, NavigationDecision& decision) {
   decision.advance_m = step.advance_m;
   const bool obstructed = obstruction_ >= 2 * options_.agreeing_looks;
   if (step.state == PursuitState::moving && !obstructed) return;
-  // Homing may stop for other reasons than a short vector; the place decides. Noise makes a
-  // difference, too: a robot that sees no way left is there when it is more alike than the
-  // references around.
+  // Homing may stop for other reasons than a short vector; the place decides. Noise and new things
+  // in view make a difference, too: a robot that sees no way left is there when the place may be
+  // this one.
   const double length = step.vector.length();
   if ((step.difference <= arrival_.difference && length <= arrival_.length) ||
-      (step.difference <= 2.0 * arrival_.difference && length <= 0.5 * arrival_.length)) {
+      (step.difference <= std::max(2.0 * arrival_.difference, scale_.limit()) &&
+       length <= 0.5 * arrival_.length)) {
     state_ = NavigationState::arrived;
     return;
   }
@@ -428,6 +429,16 @@ bool Navigator::go_back(const Seen& seen, NavigationDecision& decision) {
   if (!views_.holds(known)) return false;
   const HomeVector back = home_vector(views_.view(known, seen.view.components), seen.view.view);
   if (back.confidence <= least_confidence) return false;
+  const SubAreas& areas = planner_.areas();
+  if (unknown_looks_ == options_.agreeing_looks && areas.area_of[*known_node_] == views_.area()) {
+    // Something hides the place that should come next, as what stands in the way does.
+    const Guide& ahead = field_.at(areas.place_of[*known_node_]);
+    if (ahead.reachable() && ahead.next != *known_node_) {
+      Tries& tries = tries_.try_emplace(ahead.passage, Tries{*known_node_, 0, 0}).first->second;
+      ++tries.looks;
+      tries.obstructed += 2;
+    }
+  }
   decision.next = known;
   decision.direction_rad = back.direction_rad();
   decision.advance_m = options_.step_m;
