@@ -72,8 +72,8 @@ std::vector<RecordedPose> poses_of_file(const std::string& path,
     poses.push_back(stamped.pose);
   }
   if (recorded.empty()) throw FileError(path, "holds no pose; allowed: one or more");
-  const auto odometry =
-      simulate_odometry(poses, wanted.odometry, static_cast<std::uint64_t>(wanted.simulation.scene.seed));
+  const auto odometry = simulate_odometry(poses, wanted.odometry,
+                                          static_cast<std::uint64_t>(wanted.simulation.scene.seed));
   for (std::size_t i = 0; i < recorded.size(); ++i) recorded[i].odometry = odometry[i];
   return recorded;
 }

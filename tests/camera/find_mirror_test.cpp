@@ -196,7 +196,9 @@ TEST(FindMirror, ManySeedsOfAllKinds) {
 TEST(FindMirror, PicturesWithoutAMirrorGiveNothing) {
   for (const Plain kind : {Plain::black, Plain::noise, Plain::gradient, Plain::patches,
                            Plain::checkerboard, Plain::stripes, Plain::discs}) {
-    for (std::uint64_t seed = 0; seed < 3; ++seed) {
+    // It looks the same whatever the seed.
+    const bool only_one = kind == Plain::black;
+    for (std::uint64_t seed = 0; seed < (only_one ? 1U : 3U); ++seed) {
       const auto mirror = find_in(paint_without_mirror(kind, {320, 240}, seed));
       EXPECT_FALSE(mirror) << "kind " << static_cast<int>(kind) << " seed " << seed << " quality "
                            << mirror->quality << " radius " << mirror->rim_radius_px;
