@@ -9,6 +9,7 @@
 
 #include "memory_pipeline.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/core/median.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/mapping/lattice.hpp"
 
@@ -61,10 +62,7 @@ double spacing_of(const NavigationGraph& graph, const std::vector<Pose2>& truth)
                                    truth[*graph.node_of(passage.b)].position());
     if (std::isfinite(length)) lengths.push_back(length);
   }
-  if (lengths.empty()) return 0.0;
-  const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
-  std::ranges::nth_element(lengths, middle);
-  return *middle;
+  return lengths.empty() ? 0.0 : upper_median(std::move(lengths));
 }
 
 }  // namespace

@@ -35,19 +35,16 @@ std::vector<FourierSignature> see_all(const MissionPlace& place, const std::vect
   return views;
 }
 
-// Packed so that the largest magnitude just fits.
-VisualMemory memory_of(const std::vector<FourierSignature>& views) {
+// Without views; packs so that the largest magnitude of these just fits.
+VisualMemory empty_memory(const std::vector<FourierSignature>& views) {
   float largest = 0.0F;
   for (const FourierSignature& view : views) {
     largest = std::max(largest, *std::ranges::max_element(view.magnitudes().subspan(
                                     static_cast<std::size_t>(view.rows()))));
   }
-  VisualMemory memory({views.front().rows(), views.front().components()},
-                      largest > 0.0F ? largest : 1.0F, views.front().elevations());
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    static_cast<void>(memory.append(views[i], {.name = std::to_string(i)}));
-  }
-  return memory;
+  return {{views.front().rows(), views.front().components()},
+          largest > 0.0F ? largest : 1.0F,
+          views.front().elevations()};
 }
 
 // Whether the robot touches nothing on the straight way. Scenes name areas to drive in, too, whose
@@ -105,7 +102,11 @@ RememberedPlace remember_grid(const MissionPlace& place, double spacing_m, std::
     if (place.free_space->clearance_m(at.position) < place.scene.robot_radius_m + room_m) continue;
     poses.push_back({at.position.x_m, at.position.y_m, heading_rad});
   }
-  VisualMemory memory = memory_of(see_all(place, poses, seed, executor));
+  const auto views = see_all(place, poses, seed, executor);
+  VisualMemory memory = empty_memory(views);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    static_cast<void>(memory.append(views[i], {.name = std::to_string(i)}));
+  }
   const Lattice lattice = arrange(memory, {}, {}, executor);
   RememberedPlace remembered{
       std::move(memory), navigation_graph(lattice), std::move(poses), spacing_m, {}};
@@ -118,8 +119,7 @@ RememberedPlace remember_drive(const MissionPlace& place, const std::vector<Pose
                                Executor& executor) {
   const auto views = see_all(place, poses, seed, executor);
   const auto told = simulate_odometry(poses, wheels, seed);
-  VisualMemory memory({views.front().rows(), views.front().components()},
-                      memory_of(views).full_scale(), views.front().elevations());
+  VisualMemory memory = empty_memory(views);
   TopologicalMapper mapper(memory);
   for (std::size_t i = 0; i < views.size(); ++i) {
     std::optional<Pose2> moved;

@@ -370,9 +370,7 @@ void leave_out_far_ones(const std::vector<ViewId>& views, const std::vector<doub
   }
   std::erase_if(nearest, [](double length) { return !std::isfinite(length); });
   if (nearest.empty()) return;
-  const auto middle = nearest.begin() + static_cast<std::ptrdiff_t>(nearest.size() / 2);
-  std::ranges::nth_element(nearest, middle);
-  const double most = most_spacings * *middle;
+  const double most = most_spacings * upper_median_in_place(std::span(nearest));
   // The nearest first, so that far ones come when all near ones have joined what they can.
   std::vector<std::size_t> order(passages.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
