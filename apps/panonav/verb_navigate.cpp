@@ -7,9 +7,9 @@
 
 #include "named_view.hpp"
 #include "navigated_run.hpp"
-#include "navigation_picture.hpp"
 #include "option_values.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/evaluation/mission_picture.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/storage/memory_file_views.hpp"
@@ -262,7 +262,7 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
                   });
   if (wanted.log) write_log(*wanted.log, run);
   if (wanted.picture) {
-    write_navigation_picture(
+    write_mission_picture(
         *wanted.picture,
         "to " + goal_file + " in " + place.scene.name + ": " + std::string(name_of(run.end)), place,
         remembered.place, wanted.mission.planner, goal, run);

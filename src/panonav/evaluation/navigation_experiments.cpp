@@ -12,13 +12,10 @@
 #include "panonav/evaluation/m03_support.hpp"
 #include "panonav/evaluation/mapping_run.hpp"
 #include "panonav/evaluation/mission.hpp"
-#include "panonav/evaluation/plot.hpp"
+#include "panonav/evaluation/mission_picture.hpp"
 #include "panonav/evaluation/s06_support.hpp"
 #include "panonav/evaluation/statistics.hpp"
-#include "panonav/evaluation/surroundings.hpp"
-#include "panonav/geometry/positions.hpp"
 #include "panonav/io/image_file.hpp"
-#include "panonav/navigation/direction_field.hpp"
 #include "panonav/simulation/load_gazebo.hpp"
 #include "panonav/simulation/recording.hpp"
 #include "panonav/simulation/scenes.hpp"
@@ -80,46 +77,12 @@ int runs_of(const NavigationReproductionOptions& options, int scene) {
   return options.runs / options.scenes + (scene < options.runs % options.scenes ? 1 : 0);
 }
 
-// What is remembered, the directions towards the goal, the planned way and the driven one.
 void draw(const NavigationReproductionOptions& options, const std::string& name,
           const MissionPlace& place, const RememberedPlace& remembered, const Mission& mission,
           const MissionRun& run, Reproduction& result) {
-  const FreeSpace& space = *place.free_space;
-  const auto guides = direction_field(remembered.graph, mission.goal);
-  MapLayer references{.label = "references", .colour = "#7f7f7f"};
-  MapLayer arrows{.label = "direction towards the goal", .colour = "#1f77b4"};
-  MapLayer planned{.label = "planned way", .colour = "#2ca02c"};
-  MapLayer driven{.label = "driven way", .colour = "#d62728", .lines = {positions_of(run.path)}};
-  const double arrow_m = 0.6 * remembered.spacing_m;
-  for (std::size_t node = 0; node < remembered.truth.size(); ++node) {
-    const Pose2& pose = remembered.truth[node];
-    references.dots.push_back(pose.position());
-    if (!guides[node].direction_rad) continue;
-    const double direction = *guides[node].direction_rad;
-    arrows.lines.push_back({pose.position(), pose * Point2{arrow_m * std::cos(direction),
-                                                           arrow_m * std::sin(direction)}});
-  }
-  const AreaPlanner planner = [&] {
-    AreaPlanner made(remembered.graph);
-    made.set_goal(mission.goal);
-    return made;
-  }();
-  const auto first = run.decisions.front().nearest;
-  if (first) {
-    auto& way = planned.lines.emplace_back();
-    for (const std::size_t node : planner.planned_way(*remembered.graph.node_of(*first))) {
-      way.push_back(remembered.truth[node].position());
-    }
-  }
-  const std::size_t goal = *remembered.graph.node_of(mission.goal);
-  MapLayer ends{.label = "start (square) and goal (cross)", .colour = "#000000"};
-  ends.squares.push_back(mission.start.position());
-  ends.crosses.push_back(remembered.truth[goal].position());
   const std::string file = "mission_" + name + ".png";
-  write_plot(options.out / file,
-             MapPlot{.title = name + ": x and y in metres",
-                     .layers = {obstacle_layer(space, space.low(), space.high(), 0.1), references,
-                                arrows, planned, driven, ends}});
+  write_mission_picture(options.out / file, name + ": x and y in metres", place, remembered, {},
+                        mission.goal, run);
   result.pictures.push_back(
       {file, "A mission in " + name +
                  ": every reference view says in which direction the goal lies; the robot takes "

@@ -1,4 +1,4 @@
-#include "navigation_picture.hpp"
+#include "panonav/evaluation/mission_picture.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 #include "panonav/navigation/area_planner.hpp"
 #include "panonav/navigation/direction_field.hpp"
 
-namespace panonav::command {
+namespace panonav {
 
 namespace {
 
@@ -90,9 +90,9 @@ MapLayer driven_layer(const MissionRun& run) {
 
 }  // namespace
 
-void write_navigation_picture(const std::filesystem::path& path, const std::string& title,
-                              const MissionPlace& place, const RememberedPlace& remembered,
-                              const PlannerOptions& options, ViewId goal, const MissionRun& run) {
+void write_mission_picture(const std::filesystem::path& path, const std::string& title,
+                           const MissionPlace& place, const RememberedPlace& remembered,
+                           const PlannerOptions& options, ViewId goal, const MissionRun& run) {
   // Fine enough for a table's leg in a room, coarse enough for a hall.
   constexpr double dots_a_side = 150.0;
   const FreeSpace& space = *place.free_space;
@@ -119,4 +119,4 @@ void write_navigation_picture(const std::filesystem::path& path, const std::stri
   write_plot(path, plot);
 }
 
-}  // namespace panonav::command
+}  // namespace panonav
