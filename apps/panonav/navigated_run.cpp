@@ -95,7 +95,7 @@ Remembered remember(const MemoryFile& file, std::optional<GraphOrigin> wanted, E
   }
   std::vector<Pose2> truth = true_poses(*graph, memory);
   const double spacing_m = spacing_of(*graph, truth);
-  return {{std::move(memory), std::move(*graph), std::move(truth), spacing_m, {}}, origin};
+  return {{std::move(memory), std::move(*graph), std::move(truth), spacing_m}, origin};
 }
 
 MissionPlace place_as_remembered(

@@ -108,10 +108,7 @@ RememberedPlace remember_grid(const MissionPlace& place, double spacing_m, std::
     static_cast<void>(memory.append(views[i], {.name = std::to_string(i)}));
   }
   const Lattice lattice = arrange(memory, {}, {}, executor);
-  RememberedPlace remembered{
-      std::move(memory), navigation_graph(lattice), std::move(poses), spacing_m, {}};
-  for (const LatticeNode& node : lattice.nodes) remembered.drawn.push_back(node.pose.position());
-  return remembered;
+  return {std::move(memory), navigation_graph(lattice), std::move(poses), spacing_m};
 }
 
 RememberedPlace remember_drive(const MissionPlace& place, const std::vector<Pose2>& poses,
@@ -134,14 +131,8 @@ RememberedPlace remember_drive(const MissionPlace& place, const std::vector<Pose
     way_m += distance(poses[i - 1].position(), poses[i].position());
   }
   NavigationGraph graph = navigation_graph(map, memory, executor);
-  RememberedPlace remembered{
-      std::move(memory),
-      std::move(graph),
-      poses,
-      way_m / static_cast<double>(std::max<std::size_t>(1, poses.size() - 1)),
-      {}};
-  for (const MapNode& node : map.nodes) remembered.drawn.push_back(node.pose.position());
-  return remembered;
+  return {std::move(memory), std::move(graph), poses,
+          way_m / static_cast<double>(std::max<std::size_t>(1, poses.size() - 1))};
 }
 
 MissionRobot::MissionRobot(const MissionPlace& place, const BaseOptions& base,

@@ -49,9 +49,8 @@ struct MissionPlace {
 struct RememberedPlace {
   VisualMemory memory;
   NavigationGraph graph;
-  std::vector<Pose2> truth;   ///< by node of the graph; NaN where it is not known
-  double spacing_m = 0.0;     ///< of the references
-  std::vector<Point2> drawn;  ///< where the map has them, by node, in the map's own unit and frame
+  std::vector<Pose2> truth;  ///< by node of the graph; NaN where it is not known
+  double spacing_m = 0.0;    ///< of the references
 };
 
 /// Views on a grid, 20 cm or more from all things, each in a heading at random, arranged by their
