@@ -19,9 +19,13 @@ class ReproductionFolder : public ::testing::Test {
   void TearDown() override { std::filesystem::remove_all(folder_); }
   [[nodiscard]] Reproduction reproduce(int threads) const {
     Executor executor(threads);
-    return reproduce_m04(
-        {.out = folder_ / std::to_string(threads), .scenes = 2, .queries = 3, .rows = 6, .seed = 5},
-        executor);
+    return reproduce_m04({.out = folder_ / std::to_string(threads),
+                          .scenes = 2,
+                          .queries = 3,
+                          .rows = 6,
+                          .mission_grids = {},
+                          .seed = 5},
+                         executor);
   }
   std::filesystem::path folder_ =
       std::filesystem::path(::testing::TempDir()) / ("reproduction." + std::to_string(getpid()));
@@ -63,6 +67,10 @@ TEST_F(ReproductionFolder, SameSeedSameRowsOnOneAndTwoThreads) {
 TEST(Reproduction, RefusesOneSceneAndFoldersThatCannotBeMade) {
   Executor executor(1);
   EXPECT_THROW((void)reproduce_m04({.out = ::testing::TempDir(), .scenes = 1}, executor),
+               ContractError);
+  EXPECT_THROW((void)reproduce_m04({.out = ::testing::TempDir(), .missions = 3}, executor),
+               ContractError);
+  EXPECT_THROW((void)reproduce_m04({.out = ::testing::TempDir(), .mission_scenes = 0}, executor),
                ContractError);
   EXPECT_THROW((void)reproduce_m04({.out = "/dev/null/folder"}, executor), FileError);
 }

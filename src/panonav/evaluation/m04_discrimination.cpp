@@ -125,6 +125,7 @@ class Discrimination final : public Experiment {
         add_difference(condition, "fifteen_against_" + text(more),
                        "15 components less that with " + text(more), more,
                        Target{Comparison::at_least, -0.02}, result);
+        if (id == "hidden") result.rows.back().reason = reason_of_disturbance();
       }
       add_difference(condition, "fifteen_against_2", "15 components less that with 2", 0,
                      Target{Comparison::at_least, 0.0}, result);
@@ -196,6 +197,18 @@ class Discrimination final : public Experiment {
          .interval = mean_interval(values, 1),
          .unit = "",
          .target = target});
+  }
+
+  // Why more components help with azimuths hidden, where the measured disturbance says so.
+  [[nodiscard]] std::string reason_of_disturbance() const {
+    if (disturbance_[1].empty()) return "";
+    const double low = mean(disturbance_[1]);
+    const double high = mean(disturbance_[3]);
+    if (low <= high) return "";
+    const auto hundredths = [](double value) { return to_text(std::round(100.0 * value) / 100.0); };
+    return "hiding 10 % changes components 2 to 14 by " + hundredths(low) +
+           " times what a step of 25 cm changes there, 50 to 255 only by " + hundredths(high) +
+           ", so more components help";
   }
 
   // What the hidden azimuths change in a view, against what the way to a reference one spacing

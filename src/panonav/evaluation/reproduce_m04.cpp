@@ -3,18 +3,37 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/evaluation/experiment.hpp"
+#include "panonav/evaluation/navigation_experiments.hpp"
 
 namespace panonav {
+
+namespace {
+
+// Other scenes than those of the offices.
+constexpr std::uint64_t mission_seeds_above = 1000;
+
+// Relative to one experiment in one office, for the progress.
+double cost_of(const MissionGrid& grid) {
+  return grid.scene == "garden" ? 80.0 : 15.0;
+}
+
+}  // namespace
 
 ReproductionOptions quick_run(ReproductionOptions options) {
   options.scenes = 2;
   options.queries = 15;
+  options.mission_grids = {{"office", 0.3}};
+  options.missions = 2;
+  options.mission_scenes = 1;
   return options;
 }
 
 Reproduction reproduce_m04(const ReproductionOptions& options, Executor& executor,
                            const ReproductionProgress& progress) {
   require(options.scenes >= 2, "scenes", options.scenes, ">= 2");
+  require(options.mission_scenes >= 1, "mission_scenes", options.mission_scenes, ">= 1");
+  require(options.missions >= options.mission_scenes, "missions", options.missions,
+          ">= mission_scenes");
   std::error_code error;
   std::filesystem::create_directories(options.out, error);
   if (error) throw FileError(options.out.string(), "cannot be made: " + error.message());
@@ -31,11 +50,12 @@ Reproduction reproduce_m04(const ReproductionOptions& options, Executor& executo
   experiments.push_back(rivals_experiment());
 
   // Each scene is one step for taking its views, one for every experiment and one for the lattice.
-  const double steps = options.scenes * (2.0 + static_cast<double>(experiments.size()));
+  double steps = options.scenes * (2.0 + static_cast<double>(experiments.size()));
+  for (const MissionGrid& grid : options.mission_grids) steps += cost_of(grid);
   double done = 0.0;
-  const auto step = [&](const std::string& stage) {
+  const auto step = [&](const std::string& stage, double cost = 1.0) {
     if (progress) progress(stage, done / steps);
-    done += 1.0;
+    done += cost;
   };
   for (int s = 0; s < options.scenes; ++s) {
     const std::string name =
@@ -56,6 +76,14 @@ Reproduction reproduce_m04(const ReproductionOptions& options, Executor& executo
   reproduce_memory_table(result);
   for (const auto& experiment : experiments) experiment->report(options.out, result);
   reproduce_lattice(options, executor, step, result);
+  for (const MissionGrid& grid : options.mission_grids) {
+    step("missions in " + grid.scene, cost_of(grid));
+    reproduce_grid_missions({.out = options.out,
+                             .scenes = options.mission_scenes,
+                             .runs = options.missions,
+                             .seed = options.seed + mission_seeds_above},
+                            grid.scene, grid.spacing_m, executor, result);
+  }
   if (progress) progress("done", 1.0);
   return result;
 }

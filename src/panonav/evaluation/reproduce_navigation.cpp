@@ -25,15 +25,6 @@ Reproduction reproduce_navigation(const NavigationReproductionOptions& options, 
   if (error) throw FileError(options.out.string(), "cannot be made: " + error.message());
   Reproduction result;
   std::vector<ReproductionStage> stages;
-  const auto add_grid = [&](const std::string& scene, double spacing_m, double cost) {
-    stages.push_back(
-        {"missions in " + scene, cost, [&options, &executor, &result, scene, spacing_m] {
-           reproduce_grid_missions(options, scene, spacing_m, executor, result);
-         }});
-  };
-  add_grid("office", 0.3, 1.0);
-  add_grid("hall", 0.4, 2.0);
-  add_grid("garden", 0.3, 8.0);
   std::vector<std::string> drives{"loop", "corridor"};
   for (const std::string world : {"small_warehouse", "small_house"}) {
     if (!options.data.empty() && std::filesystem::is_directory(options.data / "scenes" / world)) {

@@ -13,15 +13,27 @@
 
 namespace panonav {
 
+/// A built-in scene whose references lie on a grid.
+struct MissionGrid {
+  std::string scene;
+  double spacing_m = 0.0;
+};
+
 struct ReproductionOptions {
   std::filesystem::path out;  ///< folder for pictures; made when it is not there
   int scenes = 20;            ///< variants of the scene, >= 2
   int queries = 50;           ///< in each, >= 1
   int rows = 80;              ///< of the views; 512 columns always
-  std::uint64_t seed = 1;     ///< of the first scene; the others follow it
+  /// Kinds of place to go about in (figure 18), with the spacing of their references.
+  std::vector<MissionGrid> mission_grids{{"office", 0.3}, {"hall", 0.4}, {"garden", 0.3}};
+  int missions = 100;      ///< in each of them, shared by its variants, >= mission_scenes
+  int mission_scenes = 4;  ///< variants of each of them, >= 1
+  /// Of the first scene; the others follow it. Places to go about in have seeds from 1000 above it
+  /// on.
+  std::uint64_t seed = 1;
 };
 
-/// The same as a smoke run: two scenes, few queries.
+/// The same as a smoke run: two scenes, few queries, two missions in one office.
 [[nodiscard]] ReproductionOptions quick_run(ReproductionOptions options);
 
 struct ReproductionPicture {
@@ -39,8 +51,9 @@ using ReproductionProgress = std::function<void(std::string_view stage, double f
 
 /// The experiments of [M04]: localisation (figures 4 to 10, eq. 6) with table 1 of [M03] and the
 /// rivals, over many variants of the office; the spring lattice (figures 12 and 15 to 17) over as
-/// many of the hall. Same options: same rows, but for times (unit ms), and same
-/// pictures on any number of threads. Throws OptionError, FileError.
+/// many of the hall; missions over such lattices (figure 18) in office, hall and garden. Same
+/// options: same rows, but for times (unit ms), and same pictures on any number of threads. Throws
+/// ContractError, FileError.
 [[nodiscard]] Reproduction reproduce_m04(const ReproductionOptions& options, Executor& executor,
                                          const ReproductionProgress& progress = {});
 
@@ -157,11 +170,10 @@ struct NavigationReproductionOptions {
 /// The same as a smoke run: two variants, two runs in each kind of place.
 [[nodiscard]] NavigationReproductionOptions quick_run(NavigationReproductionOptions options);
 
-/// Going somewhere over the memory as in [M04] section 3.5 and figure 18: office, hall and garden
-/// arranged by likeness alone; then what its authors left to later work: drives through corridors
-/// and Gazebo worlds mapped by visual odometry, other light and moved objects, a robot that is
-/// carried away, blocked passages. Same options: same rows and pictures on any number of threads.
-/// Throws ContractError, FileError.
+/// Going somewhere over the memory as in [M04] section 3.5, where its authors left it to later
+/// work: drives through corridors and Gazebo worlds mapped by visual odometry, other light and
+/// moved objects, a robot that is carried away, blocked passages. Same options: same rows and
+/// pictures on any number of threads. Throws ContractError, FileError.
 [[nodiscard]] Reproduction reproduce_navigation(const NavigationReproductionOptions& options,
                                                 Executor& executor,
                                                 const ReproductionProgress& progress = {});

@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "panonav/core/error.hpp"
+
 namespace panonav {
 
 namespace {
@@ -46,6 +48,57 @@ bool ResultRow::holds() const {
   return target->comparison == Comparison::at_most ? ours <= target->value : ours >= target->value;
 }
 
+TargetCount count_targets(std::span<const ResultRow> rows) {
+  TargetCount count;
+  for (const ResultRow& row : rows) {
+    count.judged += row.target ? 1 : 0;
+    count.held += row.target && row.holds() ? 1 : 0;
+  }
+  return count;
+}
+
+std::string shown_figure(const ResultRow& row) {
+  std::string text = shown(row.ours);
+  if (row.interval) text += " (" + shown(*row.interval) + ")";
+  return row.unit.empty() ? text : text + " " + row.unit;
+}
+
+std::string shown_target(const ResultRow& row) {
+  if (!row.target) return "-";
+  return (row.target->comparison == Comparison::at_most ? "at most " : "at least ") +
+         shown(row.target->value);
+}
+
+std::string miss_text(const ResultRow& row) {
+  if (!row.target) return "it has no target";
+  if (!std::isfinite(row.ours)) {
+    return row.reason.empty() ? "nothing could be measured" : row.reason;
+  }
+  const std::string text = "by " + shown(std::abs(row.ours - row.target->value)) + "; ";
+  if (!row.reason.empty()) return text + row.reason;
+  ResultRow reached = row;
+  if (row.interval) {
+    reached.ours =
+        row.target->comparison == Comparison::at_most ? row.interval->first : row.interval->second;
+    if (reached.holds()) return text + "the 95 % interval reaches the target";
+  }
+  return text + "no reason is known";
+}
+
+std::span<const std::string> table_header() {
+  static const std::array<std::string, 6> header{"what", "published", "ours (95 % interval)",
+                                                 "unit", "target",    "holds"};
+  return header;
+}
+
+std::vector<std::string> table_cells(const ResultRow& row) {
+  ResultRow bare = row;
+  bare.unit.clear();
+  return {row.what,           row.published ? shown(*row.published) : "-",
+          shown_figure(bare), row.unit.empty() ? "-" : row.unit,
+          shown_target(row),  !row.target ? "-" : row.holds() ? "yes" : "no"};
+}
+
 std::string to_json(std::span<const ResultRow> rows) {
   auto list = nlohmann::ordered_json::array();
   for (const auto& row : rows) {
@@ -72,24 +125,29 @@ std::string to_json(std::span<const ResultRow> rows) {
       entry["target"] = nullptr;
     }
     entry["holds"] = row.holds();
+    if (row.holds() || row.reason.empty()) {
+      entry["reason"] = nullptr;
+    } else {
+      entry["reason"] = row.reason;
+    }
     list.push_back(std::move(entry));
   }
   return list.dump(1) + "\n";
 }
 
 std::string to_markdown(std::span<const ResultRow> rows) {
-  std::string text = "| what | published | ours | 95 % interval | unit | target | holds |\n";
-  text += "|---|---|---|---|---|---|---|\n";
-  for (const auto& row : rows) {
-    text += "| " + cell(row.what);
-    text += " | " + (row.published ? shown(*row.published) : std::string("-"));
-    text += " | " + shown(row.ours);
-    text += " | " + (row.interval ? shown(*row.interval) : std::string("-"));
-    text += " | " + (row.unit.empty() ? std::string("-") : cell(row.unit));
-    text += " | " + (row.target ? std::string(symbol(row.target->comparison)) + " " +
-                                      shown(row.target->value)
-                                : std::string("reported"));
-    text += row.target ? (row.holds() ? " | yes |\n" : " | **no** |\n") : " | - |\n";
+  const auto line = [](std::span<const std::string> cells) {
+    std::string text = "|";
+    for (const std::string& one : cells) text += " " + cell(one) + " |";
+    return text + "\n";
+  };
+  std::string text = line(table_header()) + "|";
+  for (std::size_t i = 0; i < table_header().size(); ++i) text += "---|";
+  text += "\n";
+  for (const ResultRow& row : rows) {
+    auto cells = table_cells(row);
+    if (row.target && !row.holds()) cells.back() = "**" + cells.back() + "**";
+    text += line(cells);
   }
   return text;
 }
