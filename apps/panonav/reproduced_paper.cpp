@@ -11,17 +11,13 @@ namespace panonav::command {
 
 namespace {
 
-// Where they are to begin and how many variants, as wanted; intervals need two of them.
+// Where they are to begin and how many variants, as wanted.
 template <typename Options>
 void set_scenes(const ReproduceArguments& wanted, Options& options) {
   if (wanted.quick) options = quick_run(options);
   if (wanted.seed) options.seed = *wanted.seed;
-  if (!wanted.scenes) return;
-  options.scenes = *wanted.scenes;
-  if (options.scenes < 2) {
-    throw OptionError("--scenes is '" + std::to_string(options.scenes) + "'; allowed for " +
-                      wanted.paper + ": from 2");
-  }
+  check_scenes(wanted);
+  if (wanted.scenes) options.scenes = *wanted.scenes;
 }
 
 PaperReproduction run_f11(const ReproduceArguments& wanted, const std::filesystem::path& out,
@@ -181,6 +177,13 @@ std::filesystem::path data_folder(const ReproduceArguments& wanted) {
   const char* const folder = std::getenv("PANONAV_DATA");
   return folder == nullptr ? "" : folder;
 }
+void check_scenes(const ReproduceArguments& wanted) {
+  if (wanted.scenes && *wanted.scenes < 2) {
+    throw OptionError("--scenes is '" + std::to_string(*wanted.scenes) + "'; allowed for " +
+                      wanted.paper + ": from 2");
+  }
+}
+
 void refuse_meaningless(const ReproducedPaper& paper, const ReproduceArguments& wanted) {
   const auto refuse = [&](bool given, bool known, const std::string& flag) {
     if (given && !known) {

@@ -53,6 +53,9 @@ struct ReproducedPaper {
 /// none. Throws FileError when there is no such folder.
 [[nodiscard]] std::filesystem::path data_folder(const ReproduceArguments& wanted);
 
+/// Throws OptionError when there are too few variants for `wanted.paper`: intervals need two.
+void check_scenes(const ReproduceArguments& wanted);
+
 /// Throws OptionError when an option is given that means nothing to the paper.
 void refuse_meaningless(const ReproducedPaper& paper, const ReproduceArguments& wanted);
 

@@ -23,6 +23,7 @@ class ReproductionFolder : public ::testing::Test {
                           .scenes = 2,
                           .queries = 3,
                           .rows = 6,
+                          .fine_lattice_every = 0,
                           .mission_grids = {},
                           .seed = 5},
                          executor);
@@ -68,6 +69,9 @@ TEST(Reproduction, RefusesOneSceneAndFoldersThatCannotBeMade) {
   Executor executor(1);
   EXPECT_THROW((void)reproduce_m04({.out = ::testing::TempDir(), .scenes = 1}, executor),
                ContractError);
+  EXPECT_THROW(
+      (void)reproduce_m04({.out = ::testing::TempDir(), .fine_lattice_every = -1}, executor),
+      ContractError);
   EXPECT_THROW((void)reproduce_m04({.out = ::testing::TempDir(), .missions = 3}, executor),
                ContractError);
   EXPECT_THROW((void)reproduce_m04({.out = ::testing::TempDir(), .mission_scenes = 0}, executor),

@@ -25,7 +25,6 @@ constexpr double kDirectionShare = 0.15;
 // Springs of the plain lattice: with more, views on opposite sides of a hall that look alike by
 // their magnitudes fold it. Chosen on other scenes (seeds 201 to 205).
 constexpr int kPlainNeighbours = 4;
-constexpr int kScenesFor30Cm = 4;  // one scene in so many
 
 LatticeOptions plain_options() {
   return {.neighbours = kPlainNeighbours, .phases = false};
@@ -92,7 +91,9 @@ class LatticeExperiment {
     unordered_in_hall(seed, first);
     unordered_in_small_room(seed);
     with_motion(seed, 10, 0.6, coarse_, coarse_without_phases_, first);
-    if (scene % kScenesFor30Cm == 0) with_motion(seed, 19, 0.3, fine_, fine_without_phases_, first);
+    if (options_.fine_lattice_every > 0 && scene % options_.fine_lattice_every == 0) {
+      with_motion(seed, 19, 0.3, fine_, fine_without_phases_, first);
+    }
   }
 
   void report(Reproduction& result) const {
@@ -127,9 +128,12 @@ class LatticeExperiment {
              coarse_without_phases_, false, result);
     add_rows("m04.fig17.plain", "figure 17: the same by dissimilarity alone: it folds", folded_,
              false, result);
-    add_rows("m04.fig17.fine", "figure 17 at 30 cm, coarse motion and phases", fine_, true, result);
-    add_rows("m04.fig17.fine.without_phases", "figure 17 at 30 cm, without phases",
-             fine_without_phases_, false, result);
+    if (options_.fine_lattice_every > 0) {
+      add_rows("m04.fig17.fine", "figure 17 at 30 cm, coarse motion and phases", fine_, true,
+               result);
+      add_rows("m04.fig17.fine.without_phases", "figure 17 at 30 cm, without phases",
+               fine_without_phases_, false, result);
+    }
     add_row("m04.lattice.time", "section 3: time to arrange 80 views, phases", "ms", time_ms_,
             std::nullopt, result);
     result.pictures.insert(result.pictures.end(), pictures_.begin(), pictures_.end());

@@ -22,6 +22,7 @@ double cost_of(const MissionGrid& grid) {
 ReproductionOptions quick_run(ReproductionOptions options) {
   options.scenes = 2;
   options.queries = 15;
+  options.fine_lattice_every = 0;
   options.mission_grids = {{"office", 0.3}};
   options.missions = 2;
   options.mission_scenes = 1;
@@ -31,6 +32,8 @@ ReproductionOptions quick_run(ReproductionOptions options) {
 Reproduction reproduce_m04(const ReproductionOptions& options, Executor& executor,
                            const ReproductionProgress& progress) {
   require(options.scenes >= 2, "scenes", options.scenes, ">= 2");
+  require(options.fine_lattice_every >= 0, "fine_lattice_every", options.fine_lattice_every,
+          ">= 0");
   require(options.mission_scenes >= 1, "mission_scenes", options.mission_scenes, ">= 1");
   require(options.missions >= options.mission_scenes, "missions", options.missions,
           ">= mission_scenes");

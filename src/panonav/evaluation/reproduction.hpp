@@ -24,6 +24,8 @@ struct ReproductionOptions {
   int scenes = 20;            ///< variants of the scene, >= 2
   int queries = 50;           ///< in each, >= 1
   int rows = 80;              ///< of the views; 512 columns always
+  /// Figure 17 with references every 30 cm in one scene of so many, >= 1; 0: in none.
+  int fine_lattice_every = 4;
   /// Kinds of place to go about in (figure 18), with the spacing of their references.
   std::vector<MissionGrid> mission_grids{{"office", 0.3}, {"hall", 0.4}, {"garden", 0.3}};
   int missions = 100;      ///< in each of them, shared by its variants, >= mission_scenes
@@ -33,7 +35,8 @@ struct ReproductionOptions {
   std::uint64_t seed = 1;
 };
 
-/// The same as a smoke run: two scenes, few queries, two missions in one office.
+/// The same as a smoke run: two scenes, few queries, no lattice of 30 cm, two missions in one
+/// office.
 [[nodiscard]] ReproductionOptions quick_run(ReproductionOptions options);
 
 struct ReproductionPicture {

@@ -59,7 +59,9 @@ TargetCount count_targets(std::span<const ResultRow> rows) {
 
 std::string shown_figure(const ResultRow& row) {
   std::string text = shown(row.ours);
-  if (row.interval) text += " (" + shown(*row.interval) + ")";
+  if (row.interval) {
+    text += " (" + shown(row.interval->first) + " .. " + shown(row.interval->second) + ")";
+  }
   return row.unit.empty() ? text : text + " " + row.unit;
 }
 
