@@ -34,9 +34,9 @@ TargetCount count_targets(const ResultsDocument& document) {
 }
 
 std::size_t put_targets_first(std::vector<ResultRow>& rows) {
-  const auto others = std::ranges::stable_partition(
-      rows, [](const ResultRow& row) { return row.target.has_value(); });
-  return static_cast<std::size_t>(others.begin() - rows.begin());
+  const auto others = std::stable_partition(
+      rows.begin(), rows.end(), [](const ResultRow& row) { return row.target.has_value(); });
+  return static_cast<std::size_t>(others - rows.begin());
 }
 
 std::vector<std::string> miss_lines(const ResultsDocument& document) {
