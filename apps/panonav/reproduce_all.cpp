@@ -112,7 +112,7 @@ Reproduction reproduce_paper(const ReproducedPaper& paper, const ReproduceArgume
   auto [lead, result] = paper.run(wanted, out, session.executor(), report);
   progress.clear();
   write_file(out / "results.md", to_markdown(result.rows));
-  write_paper_page(out, paper.title, lead, result);
+  write_paper_page(out, paper, lead, result);
   write_file(out / results_file, to_json(result.rows));
   return std::move(result);
 }

@@ -62,13 +62,17 @@ PaperReproduction run_m04(const ReproduceArguments& wanted, const std::filesyste
   if (wanted.rows) options.rows = *wanted.rows;
   if (wanted.runs) options.missions = *wanted.runs;
   options.mission_scenes = std::min({options.mission_scenes, options.scenes, options.missions});
+  std::string places;
+  for (const MissionGrid& grid : options.mission_grids) {
+    places += (places.empty() ? "" : ", ") + grid.scene;
+  }
   std::string lead =
       "Menegatti, Maeda, Ishiguro 2004, run on " + std::to_string(options.scenes) +
       " simulated offices with a 25 cm grid of reference views, " +
       std::to_string(options.queries) + " questions in each; views that arrange themselves, and " +
-      std::to_string(options.missions) + " missions over such maps in each of " +
-      std::to_string(options.mission_grids.size()) +
-      " kinds of place. Published figures beside "
+      std::to_string(options.missions) + " missions over such maps in each kind of place (" +
+      places +
+      "). Published figures beside "
       "ours. Few offices and questions give wide intervals, and rows may then miss their "
       "target by chance.";
   return {std::move(lead), reproduce_m04(options, executor, progress)};

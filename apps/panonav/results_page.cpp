@@ -35,12 +35,22 @@ void add_counts(ReportPage& page, const TargetCount& count, std::size_t rows) {
        {std::to_string(rows - count.judged), "more figures are reported"}});
 }
 
+void add_misses(ReportPage& page, const ResultsDocument& document) {
+  page.section("Rows that do not hold");
+  const auto misses = miss_lines(document);
+  for (const std::string& line : misses) page.text(line);
+  if (misses.empty()) page.text("None.");
+}
+
 }  // namespace
 
-void write_paper_page(const std::filesystem::path& folder, std::string_view title,
+void write_paper_page(const std::filesystem::path& folder, const ReproducedPaper& paper,
                       const std::string& lead, const Reproduction& reproduction) {
-  ReportPage page{std::string(title), lead};
+  ReportPage page(std::string(paper.title), lead);
   add_counts(page, count_targets(reproduction.rows), reproduction.rows.size());
+  add_misses(
+      page,
+      {.version = {}, .command = {}, .papers = {{std::string(paper.name), {}, reproduction.rows}}});
   page.section("Published and measured");
   add_tables(page, reproduction.rows);
   page.section("Pictures");
@@ -59,10 +69,7 @@ void write_results_page(const std::filesystem::path& folder, const ResultsDocume
   std::size_t rows = 0;
   for (const PaperResults& paper : document.papers) rows += paper.rows.size();
   add_counts(page, count_targets(document), rows);
-  page.section("Rows that do not hold");
-  const auto misses = miss_lines(document);
-  for (const std::string& line : misses) page.text(line);
-  if (misses.empty()) page.text("None.");
+  add_misses(page, document);
   for (const PaperResults& paper : document.papers) {
     page.section(paper.title);
     page.link(paper.paper + "/index.html", "Its own page, with pictures");

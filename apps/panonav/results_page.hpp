@@ -2,15 +2,15 @@
 
 #include <filesystem>
 #include <string>
-#include <string_view>
 
 #include "panonav/evaluation/reproduction.hpp"
 #include "panonav/evaluation/results_document.hpp"
+#include "reproduced_paper.hpp"
 
 namespace panonav::command {
 
 /// Writes index.html of the experiments of one paper. Throws FileError.
-void write_paper_page(const std::filesystem::path& folder, std::string_view title,
+void write_paper_page(const std::filesystem::path& folder, const ReproducedPaper& paper,
                       const std::string& lead, const Reproduction& reproduction);
 
 /// Writes index.html of all papers, whose own pages lie in a folder each of their name. Throws

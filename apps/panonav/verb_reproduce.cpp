@@ -18,7 +18,8 @@ void print_rows(const Reproduction& reproduction, Session& session) {
   for (const ResultRow& row : reproduction.rows) {
     std::string line = "  " + row.what + ": " + session.strong(shown_figure(row));
     if (row.target) {
-      line += "  " + (row.holds() ? session.good("holds") : session.bad("DOES NOT HOLD"));
+      line += "  " + (row.holds() ? session.good("holds")
+                                  : session.bad("DOES NOT HOLD") + ", missed " + miss_text(row));
     }
     session.print(line);
   }
