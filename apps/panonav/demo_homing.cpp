@@ -80,7 +80,8 @@ DemoHoming show_homing(const Scene& office, const FloorPlan& plan, int runs, std
                         shown.vectors.front().length() > 0.0);
   write_png(out / "way_home.png", picture.view());
 
-  page.section("4. Back home");
+  page.part("Back home", {std::to_string(homing.arrived) + " of " + std::to_string(runs),
+                          "robots found home from a metre away, and knew it"});
   page.text(
       "From one view of a place the robot finds its way back to it, without a map and without "
       "knowing which way it faces: the Fourier components of both views tell the direction home. "

@@ -37,9 +37,9 @@ void draw_drive(const PlaceRecording& place, const MappingRecording& recording,
 DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick,
                    const std::filesystem::path& out, Session& session, ReportPage& page) {
   DemoMaps maps;
-  const Lattice lattice = arrange(office, {}, {}, session.executor());
-  maps.lattice = compare_with_truth(lattice, office);
-  write_lattice_picture(out / "arranged.png", lattice, office);
+  maps.arranged = arrange(office, {}, {}, session.executor());
+  maps.lattice = compare_with_truth(maps.arranged, office);
+  write_lattice_picture(out / "arranged.png", maps.arranged, office);
 
   const PlaceRecording place =
       empty_place(make_scene("loop", {.seed = seed}), seed, 256, session.executor());
@@ -53,7 +53,9 @@ DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick,
   maps.closures = mapped.right_closures + mapped.wrong_closures;
   draw_drive(place, recording, mapped, out / "drive.png");
 
-  page.section("5. How places lie");
+  page.part("How places lie",
+            {maps.lattice ? fixed(maps.lattice->shape_difference, 3) : std::string("none"),
+             "from the true shape: 0 is the same, 1 any other; no position was given"});
   page.text(
       "The remembered views of the office, in no order and without any position, arrange "
       "themselves by their likeness alone, like balls held by springs. And from one picture after "

@@ -13,7 +13,8 @@ namespace panonav::command {
 
 /// What the memory's views tell about how they lie.
 struct DemoMaps {
-  std::optional<LatticeComparison> lattice;  ///< the office, its views in no order
+  Lattice arranged;                          ///< the office, its views in no order
+  std::optional<LatticeComparison> lattice;  ///< beside the truth
   double map_error = 1.0;                    ///< shape difference of a map from a drive
   double wheels_error = 1.0;                 ///< of the wheels on the same drive
   std::size_t closures = 0;

@@ -86,7 +86,8 @@ DemoRoute show_route(const Scene& office, const FloorPlan& plan, double length_m
   const auto median_cm = [](const std::vector<double>& values) {
     return values.empty() ? std::string("none") : fixed(100.0 * median(values), 1) + " cm";
   };
-  page.section("6. A route, again and again");
+  page.part("A route, again and again",
+            {median_cm(route.lateral_m), "from the route, when driven again (median)"});
   page.text(
       "Of a route the robot remembers one line of pixels every 10 cm: its horizon, a byte a "
       "degree. "

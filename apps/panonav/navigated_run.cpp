@@ -7,7 +7,6 @@
 #include <memory>
 #include <utility>
 
-#include "memory_pipeline.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/median.hpp"
 #include "panonav/geometry/angles.hpp"
@@ -98,6 +97,19 @@ Remembered remember(const MemoryFile& file, std::optional<GraphOrigin> wanted, E
   return {{std::move(memory), std::move(*graph), std::move(truth), spacing_m}, origin};
 }
 
+std::function<FourierSignature(const Pose2& pose, std::uint64_t seed)> sight_through(
+    std::shared_ptr<const Renderer> renderer, const RecordingCamera& camera,
+    const FrameOptions& frame, const SensorOptions& sensor,
+    std::shared_ptr<const MemoryPipeline> pipeline, Executor* executor) {
+  return [renderer = std::move(renderer), camera, frame, sensor, pipeline = std::move(pipeline),
+          executor](const Pose2& pose, std::uint64_t seed) {
+    Executor here(1);
+    const Image picture = take_picture(*renderer, pose, camera, frame, sensor, seed,
+                                       executor == nullptr ? here : *executor);
+    return pipeline->signature(pipeline->convert(picture.view()));
+  };
+}
+
 MissionPlace place_as_remembered(
     const std::string& scene, SimulationArguments wanted, const MemoryFile& memory,
     const std::function<bool(const std::string&, const std::string&)>& given, Session& session) {
@@ -117,20 +129,15 @@ MissionPlace place_as_remembered(
     wanted.simulation.elevation_low_deg = degrees(header.elevations->bottom_rad);
     wanted.simulation.elevation_high_deg = degrees(header.elevations->top_rad);
   }
-  const auto world =
-      std::make_shared<const SimulatedWorld>(scene, wanted, given, session.executor());
-  for (const auto& warning : world->scene().warnings) session.note("warning: " + warning);
-  const RecordingCamera camera = mirror ? RecordingCamera(*header.source.camera) : world->camera();
+  const SimulatedWorld world(scene, wanted, given, session.executor());
+  for (const auto& warning : world.scene().warnings) session.note("warning: " + warning);
+  const RecordingCamera camera = mirror ? RecordingCamera(*header.source.camera) : world.camera();
   const auto pipeline =
-      std::make_shared<const MemoryPipeline>(header, mirror ? header.source : world->source());
-  MissionPlace place = world->place();
-  place.sight = [world, camera, pipeline, &executor = session.executor()](const Pose2& pose,
-                                                                          std::uint64_t seed) {
-    const SimulationArguments& settled = world->arguments();
-    const Image picture = take_picture(world->renderer(), pose, camera, settled.frame,
-                                       settled.sensor, seed, executor);
-    return pipeline->signature(pipeline->convert(picture.view()));
-  };
+      std::make_shared<const MemoryPipeline>(header, mirror ? header.source : world.source());
+  MissionPlace place = world.place();
+  const SimulationArguments& settled = world.arguments();
+  place.sight = sight_through(place.renderer, camera, settled.frame, settled.sensor, pipeline,
+                              &session.executor());
   return place;
 }
 

@@ -1,9 +1,13 @@
 #pragma once
 
+#include <cstdint>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "arguments.hpp"
+#include "memory_pipeline.hpp"
 #include "panonav/evaluation/mission.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "session.hpp"
@@ -32,6 +36,14 @@ struct Remembered {
 /// when it holds no views, and when what is wanted is not there.
 [[nodiscard]] Remembered remember(const MemoryFile& file, std::optional<GraphOrigin> wanted,
                                   Executor& executor);
+
+/// What a robot sees through a simulated camera, as the memory compares it: to be a
+/// `MissionPlace::sight`. `executor` empty: each picture is made by the thread that asks, so that
+/// any number of them may; else it must outlive the answer and one thread may ask.
+[[nodiscard]] std::function<FourierSignature(const Pose2& pose, std::uint64_t seed)> sight_through(
+    std::shared_ptr<const Renderer> renderer, const RecordingCamera& camera,
+    const FrameOptions& frame, const SensorOptions& sensor,
+    std::shared_ptr<const MemoryPipeline> pipeline, Executor* executor);
 
 /// A robot in a simulated world that sees as the memory's views were seen: by the camera, size and
 /// preprocessing of its header. `wanted.simulation` says what differs in the scene, the rest of it

@@ -22,6 +22,9 @@ p { max-width: 48rem; }
 .figures { display: flex; flex-wrap: wrap; gap: 1rem; margin: 1.2rem 0; }
 .figures div { background: var(--soft); border-radius: .5rem; padding: .7rem 1.1rem; min-width: 8rem; }
 .figures b { display: block; font-size: 1.5rem; color: var(--accent); }
+.figures a { background: var(--soft); border-radius: .5rem; padding: .7rem 1.1rem; flex: 1 1 11rem; color: inherit; text-decoration: none; }
+.figures a:hover { outline: 2px solid var(--accent); }
+.figures small { display: block; font-weight: 600; }
 .pictures { display: flex; flex-wrap: wrap; gap: 1.2rem; }
 figure { margin: .8rem 0; flex: 1 1 22rem; max-width: 100%; }
 figure img { width: 100%; max-width: 60rem; border: 1px solid var(--line); border-radius: .3rem; background: #fff; }
@@ -85,12 +88,20 @@ void prepare_report_folder(const std::filesystem::path& folder, std::string_view
   if (error) throw FileError(folder.string(), "cannot be made: " + error.message());
 }
 
-ReportPage::ReportPage(std::string title, std::string lead) : title_(std::move(title)) {
-  body_ = element("h1", title_) + "\n<p class=\"lead\">" + escaped(lead) + "</p>\n";
-}
+ReportPage::ReportPage(std::string title, std::string lead)
+    : title_(std::move(title)), lead_(std::move(lead)) {}
 
 void ReportPage::section(std::string_view title) {
   body_ += element("h2", title) + "\n";
+}
+
+void ReportPage::part(std::string_view title,
+                      const std::pair<std::string, std::string>& value_and_meaning) {
+  const std::string number = std::to_string(++parts_);
+  const std::string numbered = number + ". " + std::string(title);
+  overview_ += "<a href=\"#part" + number + "\">" + element("small", numbered) +
+               element("b", value_and_meaning.first) + escaped(value_and_meaning.second) + "</a>\n";
+  body_ += "<h2 id=\"part" + number + "\">" + escaped(numbered) + "</h2>\n";
 }
 
 void ReportPage::text(std::string_view paragraph) {
@@ -144,8 +155,10 @@ void ReportPage::write(const std::filesystem::path& folder) const {
   page += element("title", title_) + "\n<style>";
   page.append(style)
       .append("</style>\n</head>\n<body>\n")
-      .append(body_)
-      .append("</body>\n</html>\n");
+      .append(element("h1", title_))
+      .append("\n<p class=\"lead\">" + escaped(lead_) + "</p>\n");
+  if (!overview_.empty()) page += "<nav class=\"figures\">\n" + overview_ + "</nav>\n";
+  page.append(body_).append("</body>\n</html>\n");
   write_file(folder / "index.html", std::string_view(page));
 }
 

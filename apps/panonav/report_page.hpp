@@ -31,6 +31,8 @@ class ReportPage {
   ReportPage(std::string title, std::string lead);
 
   void section(std::string_view title);
+  /// A numbered section. Its main figure stands at the top of the page, too, and leads here.
+  void part(std::string_view title, const std::pair<std::string, std::string>& value_and_meaning);
   void text(std::string_view paragraph);
   /// Numbers that matter most, large: "0.09 m" "median error".
   void figures(const std::vector<std::pair<std::string, std::string>>& value_and_meaning);
@@ -49,7 +51,10 @@ class ReportPage {
 
  private:
   std::string title_;
+  std::string lead_;
+  std::string overview_;  // a link for each part
   std::string body_;
+  int parts_ = 0;
 };
 
 }  // namespace panonav::command

@@ -86,6 +86,11 @@ void Progress::advance(std::size_t steps) {
   draw();
 }
 
+void Progress::relabel(std::string label) {
+  label_ = std::move(label);
+  if (terminal_ && Clock::now() - start_ >= std::chrono::seconds(1)) draw();
+}
+
 void Progress::draw() {
   constexpr std::size_t width = 30;
   const std::size_t filled = total_ == 0 ? 0 : std::min(width, width * done_ / total_);

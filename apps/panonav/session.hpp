@@ -53,6 +53,8 @@ class Progress {
   Progress& operator=(const Progress&) = delete;
 
   void advance(std::size_t steps = 1);
+  /// What runs now; drawn at once.
+  void relabel(std::string label);
   /// Takes the bar away until the next advance, so that a line can be printed.
   void clear();
 

@@ -153,9 +153,16 @@ SimulatedWorld::SimulatedWorld(
   renderer_ = std::make_shared<const Renderer>(scene_, RendererOptions{}, executor);
 }
 
+SimulatedWorld SimulatedWorld::with(const RecordingOptions& recording, int seed) const {
+  SimulatedWorld world = *this;
+  world.wanted_.recording = recording;
+  world.wanted_.simulation.scene.seed = seed;
+  return world;
+}
+
 RecordingCamera SimulatedWorld::camera() const {
   const auto& simulation = wanted_.simulation;
-  if (simulation.kind == 0) return simulated_mirror_camera();
+  if (simulation.kind == 0) return wanted_.mirror.value_or(simulated_mirror_camera());
   return PanoramaRendering{
       .rows = simulation.rows,
       .columns = simulation.columns,

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -46,6 +47,7 @@ struct SimulationArguments {
   FreeSpaceOptions free_space;  ///< robot_height_m likewise is the camera's
   SensorOptions sensor;
   OdometryNoise odometry;
+  std::optional<Camera> mirror;  ///< of mirror pictures; empty: `simulated_mirror_camera`
 };
 void declare_simulation(Arguments& arguments, SimulationArguments& wanted);
 
@@ -59,6 +61,9 @@ class SimulatedWorld {
   SimulatedWorld(const std::string& scene, SimulationArguments wanted,
                  const std::function<bool(const std::string&, const std::string&)>& given,
                  Executor& executor);
+
+  /// The same world for another recording: its poses, noise and odometry.
+  [[nodiscard]] SimulatedWorld with(const RecordingOptions& recording, int seed) const;
 
   [[nodiscard]] const Scene& scene() const noexcept { return scene_; }
   [[nodiscard]] const FreeSpace& free_space() const noexcept { return *free_space_; }

@@ -14,75 +14,14 @@
 #include "report_page.hpp"
 #include "session.hpp"
 #include "track_animation.hpp"
+#include "track_pictures.hpp"
 
 namespace panonav::command {
 
 namespace {
 
 namespace fs = std::filesystem;
-using Lines = std::vector<std::vector<Point2>>;
-
 constexpr const char* animation_file = "track.html";
-constexpr const char* black = "#000000";
-constexpr const char* blue = "#1f5fd0";
-constexpr const char* grey = "#999999";
-constexpr const char* orange = "#d55e00";
-constexpr const char* red = "#e0201b";
-
-MapLayer references(const VisualMemory& memory) {
-  MapLayer layer{.label = "remembered views", .colour = grey};
-  for (const ViewId view : memory.views()) {
-    if (const auto& pose = memory.info(view).pose) layer.circles.push_back(pose->position());
-  }
-  return layer;
-}
-
-MapLayer true_path(const std::vector<TrackedImage>& images, std::size_t count) {
-  std::vector<Point2> path;
-  for (std::size_t i = 0; i < count; ++i) {
-    if (images[i].truth) path.push_back(images[i].truth->position());
-  }
-  MapLayer layer{.label = "true path", .colour = blue};
-  if (path.size() > 1) layer.lines.push_back(std::move(path));
-  return layer;
-}
-
-/// One line for each stretch of localised images.
-MapLayer estimated_path(const std::vector<TrackedImage>& images, std::size_t count) {
-  Lines lines;
-  bool going_on = false;
-  for (std::size_t i = 0; i < count; ++i) {
-    const bool localised = is_localised(images[i]);
-    if (localised && !going_on) lines.emplace_back();
-    if (localised) lines.back().push_back(images[i].estimate.pose->position());
-    going_on = localised;
-  }
-  std::erase_if(lines, [](const auto& line) { return line.size() < 2; });
-  return {.label = "estimated path", .colour = black, .lines = std::move(lines)};
-}
-
-void draw_map(const VisualMemory& memory, const std::vector<TrackedImage>& images,
-              const fs::path& path) {
-  MapLayer localised{.label = "localised here", .colour = black};
-  MapLayer guessed{.label = "ambiguous: likeliest place", .colour = orange};
-  MapLayer lost{.label = "true place where lost", .colour = red};
-  MapLayer start{.label = "start", .colour = "#009e73"};
-  if (images.front().truth) start.squares.push_back(images.front().truth->position());
-  for (const TrackedImage& image : images) {
-    const auto& pose = image.estimate.pose;
-    if (is_localised(image)) {
-      localised.dots.push_back(pose->position());
-    } else if (image.estimate.state == LocalisationState::ambiguous && pose) {
-      guessed.circles.push_back(pose->position());
-    } else if (image.truth) {
-      lost.crosses.push_back(image.truth->position());
-    }
-  }
-  write_plot(path, MapPlot{.title = "The whole run from above: x and y in metres",
-                           .layers = {references(memory), true_path(images, images.size()),
-                                      estimated_path(images, images.size()), localised, guessed,
-                                      lost, start}});
-}
 
 /// The first images, those where the state changes, the last, and evenly between.
 std::set<std::size_t> snapshots(const std::vector<TrackedImage>& images) {
@@ -104,25 +43,6 @@ std::set<std::size_t> snapshots(const std::vector<TrackedImage>& images) {
     shown.insert(middle);
   }
   return shown;
-}
-
-void draw_snapshots(const VisualMemory& memory, const std::vector<TrackedImage>& images,
-                    const fs::path& path) {
-  std::vector<MapPlot> panels;
-  for (const std::size_t shown : snapshots(images)) {
-    const TrackedImage& image = images[shown];
-    const MapLayer particles{.label = "particles", .colour = red, .dots = image.particles};
-    MapLayer estimate{.label = is_localised(image) ? "estimate" : "likeliest place",
-                      .colour = is_localised(image) ? black : orange};
-    if (image.estimate.pose) estimate.squares.push_back(image.estimate.pose->position());
-    MapLayer truth{.label = "true place", .colour = blue};
-    if (image.truth) truth.crosses.push_back(image.truth->position());
-    panels.push_back({.title = "image " + std::to_string(shown + 1) + ": " +
-                               std::string(name_of(image.estimate.state)),
-                      .layers = {references(memory), particles, true_path(images, shown + 1),
-                                 estimated_path(images, shown + 1), estimate, truth}});
-  }
-  write_plot(path, panels, std::min(3, static_cast<int>(panels.size())));
 }
 
 void draw_errors(const std::vector<TrackedImage>& images, double spacing_m, const fs::path& path) {
@@ -234,8 +154,8 @@ std::size_t particles_shown(std::size_t images) {
 void write_track_report(const fs::path& folder, const VisualMemory& memory, double spacing_m,
                         const std::vector<TrackedImage>& images, const TrackSummary& summary) {
   write_track_animation(folder / animation_file, memory, spacing_m, images);
-  draw_snapshots(memory, images, folder / "snapshots.png");
-  draw_map(memory, images, folder / "map.png");
+  draw_track_snapshots(memory, images, snapshots(images), {}, folder / "snapshots.png");
+  draw_track_map(memory, images, {}, folder / "map.png");
   draw_errors(images, spacing_m, folder / "errors.png");
   draw_particles(images, folder / "particles.png");
 

@@ -2,7 +2,6 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <set>
 
 #include "arguments.hpp"
 #include "panonav/core/error.hpp"
@@ -12,6 +11,7 @@
 #include "panonav/mapping/lattice_map.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "session.hpp"
+#include "stored_lattice.hpp"
 #include "verbs.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES
 #include "lattice_picture.hpp"
@@ -22,11 +22,6 @@ namespace panonav::command {
 namespace {
 
 using nlohmann::ordered_json;
-
-/// The name under which a memory file keeps the map of this verb.
-constexpr const char* map_name = "lattice";
-/// Springs that kept less than this of themselves contradict the others and become no links.
-constexpr double least_weight = 0.25;
 
 struct ArrangeArguments {
   std::string memory;
@@ -83,23 +78,9 @@ std::vector<StampedPose> trajectory_of(const Lattice& lattice, const VisualMemor
   return trajectory;
 }
 
-/// The map, and links where views have none yet.
-void store(const Lattice& lattice, const VisualMemory& memory, MemoryFile& file) {
-  std::set<std::pair<ViewId, ViewId>> known;
-  for (const Link& link : memory.links()) known.insert(std::minmax(link.a, link.b));
-  const TopologicalMap map = map_of(lattice);
-  std::vector<Link> links;
-  for (const MapEdge& edge : map.edges) {
-    if (edge.weight < least_weight || known.contains(std::minmax(edge.a, edge.b))) continue;
-    links.push_back({edge.a, edge.b, edge.kind});
-  }
-  file.link(links);
-  file.save_map(map_name, map);
-}
-
 std::size_t number_given_up(const Lattice& lattice) {
   return static_cast<std::size_t>(std::ranges::count_if(
-      lattice.springs, [](const auto& spring) { return spring.weight < least_weight; }));
+      lattice.springs, [](const auto& spring) { return spring.weight < least_spring_weight; }));
 }
 
 #ifdef PANONAV_COMMAND_SIMULATES
@@ -193,7 +174,7 @@ ExitCode arrange_views(const ArrangeArguments& wanted, Session& session) {
   }
   const Lattice lattice =
       arrange(memory, wanted.lattice, motions_of(wanted, memory), session.executor());
-  if (!wanted.no_save) store(lattice, memory, file);
+  if (!wanted.no_save) store_lattice(lattice, memory, file);
   if (wanted.tum) write_trajectory(*wanted.tum, trajectory_of(lattice, memory));
   if (wanted.graph) {
     write_graph(*wanted.graph, map_of(lattice),

@@ -10,9 +10,11 @@
 #include "arguments.hpp"
 #include "demo_homing.hpp"
 #include "demo_maps.hpp"
+#include "demo_navigation.hpp"
 #include "demo_pictures.hpp"
 #include "demo_recordings.hpp"
 #include "demo_route.hpp"
+#include "demo_track.hpp"
 #include "memorising.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/evaluation/statistics.hpp"
@@ -20,6 +22,7 @@
 #include "panonav/io/image_file.hpp"
 #include "report_page.hpp"
 #include "session.hpp"
+#include "stored_lattice.hpp"
 #include "verbs.hpp"
 
 namespace panonav::command {
@@ -47,7 +50,11 @@ void show_camera(const DemoRecordings& recordings, const fs::path& out, Session&
 
   const Camera truth = recordings.true_camera;
   const MirrorCircle& found = recordings.mirror;
-  page.section("1. What the robot sees");
+  page.part("What the robot sees", {fixed(std::hypot(found.centre.u_px - truth.centre.u_px,
+                                                     found.centre.v_px - truth.centre.v_px),
+                                          2) +
+                                        " px",
+                                    "off: the centre of the mirror, found in pictures alone"});
   page.text(
       "A camera looks up into a curved mirror and sees all around at once. The dark disc in the "
       "middle is the camera "
@@ -55,9 +62,10 @@ void show_camera(const DemoRecordings& recordings, const fs::path& out, Session&
       "centre, rim and inner radius. "
       "Everything below uses what it found, not the simulator's own numbers.");
   page.pictures(
-      {{"mirror.png",
-        "Raw picture of the mirror camera, 640 x 480 (in colour for you; the robot "
-        "works on grey)"},
+      {{"mirror.png", "Raw picture of the mirror camera, " +
+                          std::to_string(truth.image_size.width) + " x " +
+                          std::to_string(truth.image_size.height) +
+                          " (in colour for you; the robot works on grey)"},
        {"calibration.png",
         "What calibration found in " + std::to_string(recordings.calibrated_on) +
             " raw pictures: rim green, inner radius orange, centre red. The centre is off by " +
@@ -140,7 +148,8 @@ void show_answers(const VisualMemory& memory, const FloorPlan& plan,
                   double spacing_m, const fs::path& out, ReportPage& page) {
   draw_answers(memory, plan, asked, out / "map.png");
   const std::string spacing = fixed(100.0 * spacing_m, 0) + " cm";
-  page.section("2. Remember and localise");
+  page.part("It remembers and localises itself",
+            {median_text(own.errors_m, 100.0, 1, "cm"), "median error, from one picture"});
   page.text("The robot took a view every " + spacing +
             " and remembered it. Then it was put down at " + std::to_string(asked.size()) +
             " random places between them, facing anywhere, and asked from one new picture each: "
@@ -174,7 +183,9 @@ void show_levels(const VisualMemory& memory, const FloorPlan& plan, const AskedV
                  double spacing_m, const fs::path& out, ReportPage& page) {
   const auto areas_m2 = draw_areas(memory, plan, view, out / "areas.png");
   draw_similarity(memory, spacing_m, view, out / "similarity.png");
-  page.section("3. As accurate as needed");
+  page.part("As accurate as needed",
+            {fixed(areas_m2.front(), 1) + " to " + fixed(areas_m2.back(), 2) + " m²",
+             "where it may be, with 1 to 15 components compared"});
   page.text(
       "With one Fourier component compared, the robot may be anywhere in a large area (" +
       fixed(areas_m2.front(), 1) +
@@ -189,29 +200,155 @@ void show_levels(const VisualMemory& memory, const FloorPlan& plan, const AskedV
                   "distance on all sides."}});
 }
 
-void show_what_next(const DemoRecordings& recordings, const fs::path& out, ReportPage& page) {
-  const auto in_out = [&](const char* name) { return (out / name).string(); };
+void show_what_next(const DemoOptions& wanted, const DemoRecordings& recordings,
+                    const DemoNavigation& navigation, ReportPage& page) {
+  const auto in_out = [&](const char* name) { return (wanted.out / name).string(); };
   page.section("Try it yourself");
   page.text(
       "The recordings and the memory of this run lie beside this page. Each command shows more "
       "with --help.");
   const std::string memory = in_out("office.panonav");
+  const SimulationArguments seen = simulation_of(wanted, 0);
+  std::string mission;
+  for (const std::string& word : navigation.first_mission) mission += " " + word;
   page.commands(
       {"alias panonav=build/release/bin/panonav", "panonav info " + memory,
        "panonav localise " + memory + " " + in_out("query_run"),
        "panonav localise " + memory + " " + in_out("elsewhere_run") + "    # another room: unknown",
        "panonav localise " + memory + " " + recordings.query_run.entries.front().path.string() +
            " --areas",
+       "panonav track " + memory + " " + in_out("walk_run") + " --report " + in_out("track_report"),
        "panonav home view_00000.png " + recordings.query_run.entries.front().path.string() +
            " --memory " + memory + " --report " + in_out("way_home"),
+       "panonav navigate " + memory + " --scene office --scene-seed " +
+           std::to_string(seen.simulation.scene.scene_seed) + " --exposure " +
+           short_number(seen.sensor.exposure) + mission + " --picture " + in_out("way.png"),
        "panonav unwrap " + recordings.query_run.entries.front().path.string() + " --camera " +
            (recordings.query_run.folder / "camera.toml").string() + " -o panorama.png"});
+}
+
+/// What came of all parts.
+struct DemoResults {
+  std::size_t views = 0;
+  std::size_t questions = 0;
+  Outcome own;
+  Outcome foreign;
+  DemoTrack track;
+  DemoMaps maps;
+  DemoHoming homing;
+  DemoRoute route;
+  DemoNavigation navigation;
+  double seconds = 0.0;
+};
+
+nlohmann::ordered_json median_or_null(const std::vector<double>& values) {
+  return values.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(median(values));
+}
+
+template <typename Value>
+nlohmann::ordered_json value_or_null(const std::optional<Value>& value) {
+  return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json();
+}
+
+nlohmann::ordered_json as_json(const MissionRun& run) {
+  return {{"end", name_of(run.end)},
+          {"goal_distance_m", run.end_distance_m},
+          {"looks", run.decisions.size()},
+          {"travelled_m", run.travelled_m},
+          {"shortest_m", run.shortest_m}};
+}
+
+nlohmann::ordered_json as_json(const DemoResults& done, const fs::path& out) {
+  const DemoNavigation& navigation = done.navigation;
+  return {{"report", (out / "index.html").string()},
+          {"views", done.views},
+          {"questions", done.questions},
+          {"position_error_m", median_or_null(done.own.errors_m)},
+          {"heading_error_rad", median_or_null(done.own.heading_errors_rad)},
+          {"known", done.own.known},
+          {"known_elsewhere", done.foreign.known},
+          {"bytes_share", done.own.bytes_share},
+          {"track_images", done.track.images},
+          {"track_until_localised", value_or_null(done.track.until_localised)},
+          {"track_until_found_again", value_or_null(done.track.until_found_again)},
+          {"track_localised", done.track.localised},
+          {"track_wrong", done.track.wrong},
+          {"track_error_m", median_or_null(done.track.errors_m)},
+          {"arranged_shape_difference",
+           done.maps.lattice ? nlohmann::ordered_json(done.maps.lattice->shape_difference)
+                             : nlohmann::ordered_json()},
+          {"drive_shape_difference", done.maps.map_error},
+          {"wheels_shape_difference", done.maps.wheels_error},
+          {"runs_home", done.homing.runs.size()},
+          {"arrived_home", done.homing.arrived},
+          {"home_error_m", median(done.homing.distances_m)},
+          {"route_runs", done.route.runs.size()},
+          {"route_completed", done.route.completed},
+          {"route_distance_m", median_or_null(done.route.lateral_m)},
+          {"missions", navigation.runs.size()},
+          {"missions_arrived", navigation.arrived},
+          {"mission_detour", median_or_null(navigation.detours)},
+          {"mission_looks", median_or_null(navigation.looks)},
+          {"mission_carried", as_json(navigation.carried)},
+          {"mission_screen",
+           navigation.screened ? as_json(*navigation.screened) : nlohmann::ordered_json()},
+          {"seconds", done.seconds}};
+}
+
+std::string images_text(const std::optional<std::size_t>& images) {
+  return images ? "after " + std::to_string(*images) + (*images == 1 ? " image" : " images")
+                : "never";
+}
+
+void print(const DemoResults& done, Session& session) {
+  const auto of = [](std::size_t part, std::size_t all) {
+    return std::to_string(part) + " of " + std::to_string(all);
+  };
+  session.print("panonav demo: " + std::to_string(done.views) + " views of an office remembered, " +
+                std::to_string(done.questions) + " questions asked, " + fixed(done.seconds, 0) +
+                " s");
+  session.print(
+      "  position: median error " + median_text(done.own.errors_m, 100.0, 1, "cm") +
+      "; heading: " + median_text(done.own.heading_errors_rad, degrees(1.0), 2, "degrees"));
+  session.print("  own places recognised: " + percent(done.own.known) +
+                "; views of another room taken for this one: " + percent(done.foreign.known));
+  session.print("  tracked: localised " + images_text(done.track.until_localised) +
+                "; carried away, found again " + images_text(done.track.until_found_again) +
+                "; median error " + median_text(done.track.errors_m, 100.0, 1, "cm") + "; " +
+                of(done.track.wrong, done.track.localised) + " answers wrong");
+  session.print("  arranged without positions: shape difference " +
+                (done.maps.lattice ? fixed(done.maps.lattice->shape_difference, 3) : "none") +
+                "; map from a drive: " + fixed(done.maps.map_error, 3) + ", its wheels alone " +
+                fixed(done.maps.wheels_error, 3));
+  session.print("  home from one metre away: " + of(done.homing.arrived, done.homing.runs.size()) +
+                " runs ended within 10 cm; median " +
+                fixed(100.0 * median(done.homing.distances_m), 1) + " cm");
+  session.print("  a route of " + fixed(done.route.length_m, 0) +
+                " m repeated from 0.3 m off: " + of(done.route.completed, done.route.runs.size()) +
+                " runs reached its end; distance from it: median " +
+                median_text(done.route.lateral_m, 100.0, 1, "cm"));
+  const DemoNavigation& navigation = done.navigation;
+  session.print("  missions by views alone: " + of(navigation.arrived, navigation.runs.size()) +
+                " arrived; way driven over the shortest: median " +
+                (navigation.detours.empty() ? "none" : fixed(median(navigation.detours), 2)) +
+                "; carried away half way: " + std::string(name_of(navigation.carried.end)) +
+                "; a screen in the way: " +
+                (navigation.screened ? std::string(name_of(navigation.screened->end)) : "none"));
 }
 
 ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
   const auto start = std::chrono::steady_clock::now();
   const fs::path& out = wanted.out;
   prepare_demo_folder(out);
+  constexpr int parts = 8;
+  int part = 0;
+  Progress progress("demo", parts);
+  const auto next_part = [&](const std::string& what) {
+    if (part > 0) progress.advance();
+    progress.relabel("part " + std::to_string(++part) + " of " + std::to_string(parts) + ": " +
+                     what);
+  };
+  next_part("simulates what the robot sees");
   const auto recordings = record_demo(wanted, session);
   if (!recordings) {
     session.note("panonav demo: no mirror was found in the simulated pictures");
@@ -219,86 +356,58 @@ ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
   }
   ReportPage page("panonav: a robot that remembers what places look like",
                   "A simulated robot with one mirror camera drives through an office and remembers "
-                  "what it looks like. Put down "
-                  "somewhere else, it says where it is and which way it faces, from one picture. "
-                  "No laser, no GPU, no training.");
+                  "what it looks like. From that memory alone it says where it is, is found again "
+                  "when it was carried away, arranges what it remembers, finds home, repeats a "
+                  "route and goes where it is told. No laser, no GPU, no training. Each figure "
+                  "leads to its part below.");
   show_camera(*recordings, out, session, page);
 
-  const fs::path memory_path = out / "office.panonav";
+  next_part("remembers and localises itself");
   MemoryFile file = MemoryFile::create(
-      memory_path, header_from_first_views(recordings->memory_run, SignatureOptions{},
-                                           PreprocessingOptions{}, session.executor()));
-  const MemoryPipeline pipeline(file.header(), recordings->memory_run.source);
-  (void)append_views(recordings->memory_run, pipeline, true, file, session);
+      out / "office.panonav", header_from_first_views(recordings->memory_run, SignatureOptions{},
+                                                      PreprocessingOptions{}, session.executor()));
+  const auto pipeline =
+      std::make_shared<const MemoryPipeline>(file.header(), recordings->memory_run.source);
+  (void)append_views(recordings->memory_run, *pipeline, true, file, session);
   const VisualMemory memory = file.load();
   const Localiser localiser(memory);
-  const auto asked = ask(localiser, pipeline, recordings->query_run, session.executor());
-  const auto elsewhere = ask(localiser, pipeline, recordings->elsewhere_run, session.executor());
-  const Outcome own = outcome_of(asked, memory);
-  const Outcome foreign = outcome_of(elsewhere, memory);
+  const auto asked = ask(localiser, *pipeline, recordings->query_run, session.executor());
+  const auto elsewhere = ask(localiser, *pipeline, recordings->elsewhere_run, session.executor());
+  DemoResults done{.views = memory.size(), .questions = asked.size()};
+  done.own = outcome_of(asked, memory);
+  done.foreign = outcome_of(elsewhere, memory);
   constexpr double margin_m = 1.2;  // furniture stands around the free floor
   const FloorPlan plan = floor_plan(
       *recordings->office, {recordings->low.x_m - margin_m, recordings->low.y_m - margin_m},
       {recordings->high.x_m + margin_m, recordings->high.y_m + margin_m});
-  show_answers(memory, plan, asked, own, foreign, wanted.spacing_m(), out, page);
+  show_answers(memory, plan, asked, done.own, done.foreign, wanted.spacing_m(), out, page);
+  next_part("as accurate as needed");
   show_levels(memory, plan, shown_view(asked), wanted.spacing_m(), out, page);
-  const DemoHoming homing = show_homing(recordings->office_scene, plan, wanted.runs_home(),
-                                        wanted.seed, out, session, page);
-  const DemoMaps maps = show_maps(memory, wanted.seed, wanted.quick, out, session, page);
-  const DemoRoute route =
+  next_part("tracks itself");
+  done.track = show_track(wanted, *recordings, memory, *pipeline, plan, session, page);
+  next_part("arranges what it remembers");
+  done.maps = show_maps(memory, wanted.seed, wanted.quick, out, session, page);
+  store_lattice(done.maps.arranged, memory, file);
+  next_part("goes home");
+  done.homing = show_homing(recordings->office_scene, plan, wanted.runs_home(), wanted.seed, out,
+                            session, page);
+  next_part("repeats a route");
+  done.route =
       show_route(recordings->office_scene, plan, wanted.route_m(), wanted.seed, out, session, page);
-  show_what_next(*recordings, out, page);
+  next_part("goes where it is told");
+  done.navigation = show_navigation(wanted, *recordings, memory, done.maps.arranged, pipeline, plan,
+                                    session, page);
+  show_what_next(wanted, *recordings, done.navigation, page);
   page.write(out);
+  progress.clear();
 
-  const double seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  const auto median_or_null = [](const std::vector<double>& values) {
-    return values.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(median(values));
-  };
+  done.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (session.json()) {
-    session.print(nlohmann::ordered_json{
-        {"report", (out / "index.html").string()},
-        {"views", memory.size()},
-        {"questions", asked.size()},
-        {"position_error_m", median_or_null(own.errors_m)},
-        {"heading_error_rad", median_or_null(own.heading_errors_rad)},
-        {"known", own.known},
-        {"known_elsewhere", foreign.known},
-        {"bytes_share", own.bytes_share},
-        {"runs_home", homing.runs.size()},
-        {"arrived_home", homing.arrived},
-        {"home_error_m", median(homing.distances_m)},
-        {"arranged_shape_difference", maps.lattice
-                                          ? nlohmann::ordered_json(maps.lattice->shape_difference)
-                                          : nlohmann::ordered_json()},
-        {"drive_shape_difference", maps.map_error},
-        {"wheels_shape_difference", maps.wheels_error},
-        {"route_runs", route.runs.size()},
-        {"route_completed", route.completed},
-        {"route_distance_m", median_or_null(route.lateral_m)},
-        {"seconds",
-         seconds}}.dump());
-    return ExitCode::done;
+    session.print(as_json(done, out).dump());
+  } else {
+    print(done, session);
+    tell_report(out, session);
   }
-  session.print("panonav demo: " + std::to_string(memory.size()) +
-                " views of an office remembered, " + std::to_string(asked.size()) +
-                " questions asked, " + fixed(seconds, 0) + " s");
-  session.print("  position: median error " + median_text(own.errors_m, 100.0, 1, "cm") +
-                "; heading: " + median_text(own.heading_errors_rad, degrees(1.0), 2, "degrees"));
-  session.print("  own places recognised: " + percent(own.known) +
-                "; views of another room taken for this one: " + percent(foreign.known));
-  session.print("  home from one metre away: " + std::to_string(homing.arrived) + " of " +
-                std::to_string(homing.runs.size()) + " runs ended within 10 cm; median " +
-                fixed(100.0 * median(homing.distances_m), 1) + " cm");
-  session.print("  arranged without positions: shape difference " +
-                (maps.lattice ? fixed(maps.lattice->shape_difference, 3) : std::string("none")) +
-                "; map from a drive: " + fixed(maps.map_error, 3) + ", its wheels alone " +
-                fixed(maps.wheels_error, 3));
-  session.print("  a route of " + fixed(route.length_m, 0) + " m repeated from 0.3 m off: " +
-                std::to_string(route.completed) + " of " + std::to_string(route.runs.size()) +
-                " runs reached its end; distance from it: median " +
-                median_text(route.lateral_m, 100.0, 1, "cm"));
-  tell_report(out, session);
   return ExitCode::done;
 }
 

@@ -19,6 +19,7 @@
 #include "panonav/simulation/load_gazebo.hpp"
 #include "panonav/simulation/recording.hpp"
 #include "panonav/simulation/scenes.hpp"
+#include "panonav/simulation/screen.hpp"
 
 namespace panonav {
 
@@ -134,20 +135,7 @@ std::vector<Pose2> exploring_drive(const MissionPlace& place, std::uint64_t seed
 
 // A screen as high as a robot across the way at `at`.
 void put_screen(Scene& scene, const Pose2& at) {
-  constexpr double half_width_m = 1.5;
-  constexpr double height_m = 1.0;
-  const auto material = static_cast<int>(scene.materials.size());
-  scene.materials.push_back({.colour = {0.8F, 0.3F, 0.2F}});
-  const Point2 left = at * Point2{0.0, half_width_m};
-  const Point2 right = at * Point2{0.0, -half_width_m};
-  scene.meshes.push_back({.object = "screen",
-                          .material = material,
-                          .vertices = {{left.x_m, left.y_m, 0.0},
-                                       {right.x_m, right.y_m, 0.0},
-                                       {right.x_m, right.y_m, height_m},
-                                       {left.x_m, left.y_m, height_m}},
-                          .texture_coordinates = {},
-                          .triangles = {{0, 1, 2}, {0, 2, 3}}});
+  add_screen(scene, at, 3.0, 1.0);
 }
 
 }  // namespace
