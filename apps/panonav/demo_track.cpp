@@ -82,8 +82,8 @@ void add_part(const DemoTrack& track, double spacing_m, std::size_t carried_afte
         "end. Blue cross: where it is; black square: where it says that it is, orange while it is "
         "not sure. Grey circles are remembered views, grey areas furniture."},
        {"tracked.png",
-        "The whole run: true way in blue, estimated one in black; both begin anew where the robot "
-        "was put down."}});
+        "The whole run: true way in blue, which begins anew where the robot was put down, and the "
+        "estimated one in black."}});
   page.link("track.html", "Play the run, image by image");
 }
 
