@@ -160,6 +160,8 @@ TEST(ResultRow, TellsByHowMuchAndWhyItIsMissed) {
   EXPECT_EQ(miss_text(one), "by 0.25; the 95 % interval reaches the target");
   one.interval = std::pair{0.9, 2.2};
   EXPECT_EQ(miss_text(one), "by 0.25; no reason is known");
+  one.unit = "ms";
+  EXPECT_EQ(miss_text(one), "by 0.25; a time on this machine, with whatever else it did");
   one.ours = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(miss_text(one), "nothing could be measured");
 }

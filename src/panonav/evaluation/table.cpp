@@ -84,6 +84,9 @@ std::string miss_text(const ResultRow& row) {
         row.target->comparison == Comparison::at_most ? row.interval->first : row.interval->second;
     if (reached.holds()) return text + "the 95 % interval reaches the target";
   }
+  if (row.unit == "ms" || row.unit == "us") {
+    return text + "a time on this machine, with whatever else it did";
+  }
   return text + "no reason is known";
 }
 

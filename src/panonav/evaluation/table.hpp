@@ -49,8 +49,8 @@ struct TargetCount {
 [[nodiscard]] std::string shown_figure(const ResultRow& row);
 /// "at most 0.02", or "-" for none.
 [[nodiscard]] std::string shown_target(const ResultRow& row);
-/// By how much a row with a target misses it, and why: the known reason, else what the figures
-/// themselves tell, else that none is known.
+/// By how much a row misses its target, and why: the known reason, else what the figures tell, else
+/// that none is known; of a time (ms, us) that it is this machine's.
 [[nodiscard]] std::string miss_text(const ResultRow& row);
 
 /// Titles of the columns that `table_cells` fills: what, published, ours, unit, target, holds.
