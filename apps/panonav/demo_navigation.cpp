@@ -122,17 +122,19 @@ void draw_runs(const DemoNavigation& navigation, const RememberedPlace& remember
                                       views, good, bad, starts, goals}});
 }
 
-/// A heading, and a line for each look of a run.
-std::string log_of(const std::string& title, const std::string& goal, const MissionRun& run) {
-  std::string text = title + ", to " + goal + ":\n";
-  for (const NavigationDecision& decision : run.decisions) text += describe(decision) + "\n";
-  return text + "\n";
-}
-
 std::string end_text(const MissionRun& run, double within_m) {
   const std::string name(name_of(run.end));
   if (run.end != NavigationState::arrived) return name;
-  return run.arrives(within_m) ? "arrived" : "arrived at another place";
+  return run.arrives(within_m) ? "arrived" : "arrived, but too far off";
+}
+
+/// A heading with what came of a run, and a line for each look.
+std::string log_of(const std::string& title, const std::string& goal, const MissionRun& run,
+                   double within_m) {
+  std::string text = title + ", to " + goal + ": " + end_text(run, within_m) + ", " +
+                     fixed(100.0 * run.end_distance_m, 0) + " cm from it\n";
+  for (const NavigationDecision& decision : run.decisions) text += describe(decision) + "\n";
+  return text + "\n";
 }
 
 /// What one mission more came to, as a sentence.
@@ -184,7 +186,7 @@ void add_part(const DemoNavigation& navigation, ReportPage& page) {
                             sentence_on(*navigation.screened, navigation.within_m)});
   }
   page.pictures(pictures);
-  page.link("mission.log", "Read each decision of the missions drawn");
+  page.link("mission.log", "Read each decision of all missions");
 }
 
 }  // namespace
@@ -224,10 +226,16 @@ DemoNavigation show_navigation(const DemoOptions& options, const DemoRecordings&
   draw("mission.png", "To a remembered view", place, first, navigation.runs.front());
   draw("mission_carried.png", "Carried away half way", place, missions.back(), navigation.carried);
   draw_runs(navigation, remembered, missions, plan, options.out / "missions.png");
-  const auto goal_of = [&](const Mission& mission) { return memory.info(mission.goal).name; };
-  std::string log = log_of("The first mission", goal_of(first), navigation.runs.front()) +
-                    log_of("Carried away half way", goal_of(missions.back()), navigation.carried);
-  navigation.first_mission = {"--goal", goal_of(first), "--start",
+  std::string log;
+  const auto add_log = [&](const std::string& title, const Mission& mission,
+                           const MissionRun& run) {
+    log += log_of(title, memory.info(mission.goal).name, run, navigation.within_m);
+  };
+  for (std::size_t i = 0; i < navigation.runs.size(); ++i) {
+    add_log("Mission " + std::to_string(i + 1), missions[i], navigation.runs[i]);
+  }
+  add_log("Carried away half way", missions.back(), navigation.carried);
+  navigation.first_mission = {"--goal", memory.info(first.goal).name, "--start",
                               fixed(first.start.x_m, 3) + "," + fixed(first.start.y_m, 3) + "," +
                                   fixed(degrees(first.start.heading_rad), 1)};
   constexpr int candidates = 30;
@@ -239,7 +247,7 @@ DemoNavigation show_navigation(const DemoOptions& options, const DemoRecordings&
             .front();
     draw("mission_screen.png", "A screen in the way", screened->place, screened->mission,
          *navigation.screened);
-    log += log_of("A screen in the way", goal_of(screened->mission), *navigation.screened);
+    add_log("A screen in the way", screened->mission, *navigation.screened);
   }
   write_file(options.out / "mission.log", std::string_view(log));
   add_part(navigation, page);
