@@ -158,6 +158,9 @@ TEST(ResultRow, TellsByHowMuchAndWhyItIsMissed) {
   EXPECT_EQ(miss_text(one), "by 1; the 95 % interval reaches the target");
   one.target = Target{Comparison::at_least, 2.25};
   EXPECT_EQ(miss_text(one), "by 0.25; the 95 % interval reaches the target");
+  one.reason = "it rains";
+  EXPECT_EQ(miss_text(one), "by 0.25; the 95 % interval reaches the target; it rains");
+  one.reason = "";
   one.interval = std::pair{0.9, 2.2};
   EXPECT_EQ(miss_text(one), "by 0.25; no reason is known");
   one.unit = "ms";

@@ -76,18 +76,23 @@ std::string miss_text(const ResultRow& row) {
   if (!std::isfinite(row.ours)) {
     return row.reason.empty() ? "nothing could be measured" : row.reason;
   }
-  const std::string text = "by " + shown(std::abs(row.ours - row.target->value)) + "; ";
-  if (!row.reason.empty()) return text + row.reason;
+  std::vector<std::string> parts{"by " + shown(std::abs(row.ours - row.target->value))};
   ResultRow reached = row;
   if (row.interval) {
     reached.ours =
         row.target->comparison == Comparison::at_most ? row.interval->first : row.interval->second;
-    if (reached.holds()) return text + "the 95 % interval reaches the target";
+    if (reached.holds()) parts.emplace_back("the 95 % interval reaches the target");
   }
-  if (row.unit == "ms" || row.unit == "us") {
-    return text + "a time on this machine, with whatever else it did";
+  if (!row.reason.empty()) {
+    parts.push_back(row.reason);
+  } else if (row.unit == "ms" || row.unit == "us") {
+    parts.emplace_back("a time on this machine, with whatever else it did");
+  } else if (parts.size() == 1) {
+    parts.emplace_back("no reason is known");
   }
-  return text + "no reason is known";
+  std::string text = parts.front();
+  for (std::size_t i = 1; i < parts.size(); ++i) text += "; " + parts[i];
+  return text;
 }
 
 std::span<const std::string> table_header() {
