@@ -353,28 +353,129 @@ NavigationGraph navigation_graph(const TopologicalMap& map, const VisualMemory& 
 
 namespace {
 
-// Passages that are much farther than from a view to its nearest one are left out where nearer ones
-// lead there, too. `far`: by passage.
-void leave_out_far_ones(const std::vector<ViewId>& views, const std::vector<double>& far,
-                        std::vector<Passage>& passages) {
-  // Views of a square grid have others at 1.41 and 2 spacings.
-  constexpr double most_spacings = 2.0;
-  const auto node_of = [&](ViewId view) {
-    return static_cast<std::size_t>(std::ranges::lower_bound(views, view) - views.begin());
+// A spring as navigation sees it.
+struct Spring {
+  NodePair ends;
+  std::optional<Pose2> motion;  // a_from_b by the phases; unit R
+  double length = 0.0;          // in the arrangement
+  double weight = 0.0;
+  bool one_part = false;
+  int support = 0;  // third views that confirm it
+};
+
+double length_of(const Pose2& motion) {
+  return std::hypot(motion.x_m, motion.y_m);
+}
+
+// Counts for each spring the third views that tell the same motion. Those of one place confirm the
+// turn alone.
+void count_support(std::size_t views, std::vector<Spring>& springs) {
+  // A third view joins two readings, each with the error of one.
+  constexpr double most_turn_rad = 0.35;
+  constexpr double most_off = 0.4;  // of the motion's length
+  struct Way {
+    std::size_t to;
+    Pose2 motion;
   };
-  std::vector<double> nearest(views.size(), std::numeric_limits<double>::infinity());
-  for (std::size_t i = 0; i < passages.size(); ++i) {
-    for (const ViewId end : {passages[i].a, passages[i].b}) {
-      nearest[node_of(end)] = std::min(nearest[node_of(end)], far[i]);
+  std::vector<std::vector<Way>> ways(views);
+  for (const Spring& spring : springs) {
+    if (!spring.motion) continue;
+    ways[spring.ends.a].push_back({spring.ends.b, *spring.motion});
+    ways[spring.ends.b].push_back({spring.ends.a, inverse(*spring.motion)});
+  }
+  for (auto& list : ways) std::ranges::sort(list, {}, &Way::to);
+  for (Spring& spring : springs) {
+    if (!spring.motion) continue;
+    for (const Way& first : ways[spring.ends.a]) {
+      const auto& onward = ways[first.to];
+      const auto second = std::ranges::lower_bound(onward, spring.ends.b, {}, &Way::to);
+      if (second == onward.end() || second->to != spring.ends.b) continue;
+      const Pose2 around = first.motion * second->motion;
+      const double off = distance(around.position(), spring.motion->position());
+      const double turned = angle_difference(around.heading_rad, spring.motion->heading_rad);
+      spring.support += static_cast<int>(std::abs(turned) <= most_turn_rad &&
+                                         off <= most_off * length_of(*spring.motion));
     }
   }
-  std::erase_if(nearest, [](double length) { return !std::isfinite(length); });
-  if (nearest.empty()) return;
-  const double most = most_spacings * upper_median_in_place(std::span(nearest));
-  // The nearest first, so that far ones come when all near ones have joined what they can.
-  std::vector<std::size_t> order(passages.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return far[i]; });
+}
+
+// By view: how far apart references are around it, in the unit of `lengths`, which are by spring:
+// the median distance to the nearest one, of the view and those that springs join to it. Infinite
+// where nothing is told.
+std::vector<double> spacings_around(std::size_t views, const std::vector<Spring>& springs,
+                                    const std::vector<double>& lengths) {
+  constexpr double unknown = std::numeric_limits<double>::infinity();
+  std::vector<double> nearest(views, unknown);
+  for (std::size_t i = 0; i < springs.size(); ++i) {
+    for (const std::size_t node : {springs[i].ends.a, springs[i].ends.b}) {
+      if (lengths[i] > 0.0) nearest[node] = std::min(nearest[node], lengths[i]);
+    }
+  }
+  std::vector<std::vector<double>> around(views);
+  for (std::size_t node = 0; node < views; ++node) around[node].push_back(nearest[node]);
+  for (const Spring& spring : springs) {
+    around[spring.ends.a].push_back(nearest[spring.ends.b]);
+    around[spring.ends.b].push_back(nearest[spring.ends.a]);
+  }
+  std::vector<double> spacings;
+  for (auto& list : around) {
+    std::erase_if(list, [](double length) { return !std::isfinite(length); });
+    spacings.push_back(list.empty() ? unknown : upper_median(std::move(list)));
+  }
+  return spacings;
+}
+
+// Whether springs may be kept, and how long their passages are, in spacings of the references
+// around: likeness falls faster with distance where things are near, so that the unit of phases and
+// of the arrangement changes from place to place.
+std::vector<Passage> passages_of(const std::vector<ViewId>& views, std::vector<Spring> springs,
+                                 double least_weight) {
+  // Views of a square grid have others at 1.41 and 2 spacings.
+  constexpr double most_spacings = 2.0;
+  // An arrangement that is torn gives right springs up; so many third views speak for one then,
+  // and it must be as short as those to nearest views are.
+  constexpr int enough_support = 3;
+  constexpr double most_spacings_of_given_up = 1.5;
+  count_support(views.size(), springs);
+  std::erase_if(springs, [&](const Spring& spring) {
+    return (spring.weight < least_weight || !spring.one_part) && spring.support == 0;
+  });
+  const bool by_phases =
+      std::ranges::any_of(springs, [](const Spring& spring) { return spring.motion.has_value(); });
+  std::vector<double> lengths;
+  for (const Spring& spring : springs) {
+    lengths.push_back(!by_phases ? spring.length : spring.motion ? length_of(*spring.motion) : 0.0);
+  }
+  const std::vector<double> spacings = spacings_around(views.size(), springs, lengths);
+  struct Candidate {
+    Passage passage;
+    NodePair ends;
+    double far;
+    bool joins_only;
+  };
+  std::vector<Candidate> candidates;
+  for (std::size_t i = 0; i < springs.size(); ++i) {
+    const Spring& spring = springs[i];
+    const double spacing = 0.5 * (spacings[spring.ends.a] + spacings[spring.ends.b]);
+    const bool given_up = spring.weight < least_weight || !spring.one_part;
+    Candidate candidate{{views[spring.ends.a], views[spring.ends.b], 0.0, spring.motion},
+                        spring.ends,
+                        unknown_length_share,
+                        false};
+    if (std::isfinite(spacing) && (lengths[i] > 0.0 || spring.motion)) {
+      candidate.far = candidate.passage.length = lengths[i] / spacing;
+    }
+    candidate.joins_only = candidate.far > (given_up ? most_spacings_of_given_up : most_spacings) ||
+                           (given_up && spring.support < enough_support);
+    if (spring.motion) {
+      candidate.passage.a_from_b->x_m /= spacing;
+      candidate.passage.a_from_b->y_m /= spacing;
+    }
+    candidates.push_back(candidate);
+  }
+  // The nearest first, so that far ones come when all near ones have joined what they can: these
+  // are left out where nearer ones lead there, too.
+  std::ranges::stable_sort(candidates, {}, &Candidate::far);
   std::vector<std::size_t> group(views.size());
   std::iota(group.begin(), group.end(), std::size_t{0});
   const auto group_of = [&](std::size_t node) {
@@ -382,13 +483,14 @@ void leave_out_far_ones(const std::vector<ViewId>& views, const std::vector<doub
     return node;
   };
   std::vector<Passage> kept;
-  for (const std::size_t i : order) {
-    const std::size_t a = group_of(node_of(passages[i].a));
-    const std::size_t b = group_of(node_of(passages[i].b));
+  for (const Candidate& candidate : candidates) {
+    const std::size_t a = group_of(candidate.ends.a);
+    const std::size_t b = group_of(candidate.ends.b);
     group[std::max(a, b)] = std::min(a, b);
-    if (far[i] <= most || a != b) kept.push_back(passages[i]);
+    if (!candidate.joins_only || a != b) kept.push_back(candidate.passage);
   }
-  passages = std::move(kept);
+  complete_lengths(kept);
+  return kept;
 }
 
 }  // namespace
@@ -396,28 +498,18 @@ void leave_out_far_ones(const std::vector<ViewId>& views, const std::vector<doub
 NavigationGraph navigation_graph(const Lattice& lattice, double least_weight) {
   std::vector<ViewId> views;
   for (const LatticeNode& node : lattice.nodes) views.push_back(node.view);
-  std::vector<Passage> passages;
-  std::vector<double> far;
+  std::vector<Spring> springs;
   for (const LatticeSpring& spring : lattice.springs) {
     const LatticeNode& a = lattice.nodes.at(spring.a);
     const LatticeNode& b = lattice.nodes.at(spring.b);
-    if (spring.weight < least_weight || a.part != b.part) continue;
-    const Pose2 arranged = inverse(a.pose) * b.pose;
-    const double length = std::hypot(arranged.x_m, arranged.y_m);
     // Without phases the arrangement knows no headings, and so no direction in the frame of a view.
-    std::optional<Pose2> a_from_b;
-    if (spring.phases) a_from_b = motion_of(*spring.phases);
-    if (a_from_b && spring.phases->length > 0.0) {
-      // Lengths of one unit within the graph: that of the arrangement.
-      a_from_b->x_m *= length / spring.phases->length;
-      a_from_b->y_m *= length / spring.phases->length;
-    }
-    passages.push_back({a.view, b.view, length, a_from_b});
-    // As the two views say, or as all others do, whichever is more.
-    far.push_back(std::max(length, spring.length));
+    springs.push_back({{spring.a, spring.b},
+                       spring.phases ? motion_of(*spring.phases) : std::nullopt,
+                       distance(a.pose.position(), b.pose.position()),
+                       spring.weight,
+                       a.part == b.part});
   }
-  complete_lengths(passages);
-  leave_out_far_ones(views, far, passages);
+  std::vector<Passage> passages = passages_of(views, std::move(springs), least_weight);
   return {std::move(views), std::move(passages)};
 }
 
@@ -426,31 +518,22 @@ NavigationGraph stored_lattice_graph(const TopologicalMap& arrangement, const Vi
   validate(arrangement);
   std::vector<ViewId> views;
   for (const MapNode& node : arrangement.nodes) views.push_back(node.view);
+  const auto number_of = [&](ViewId view) {
+    return static_cast<std::size_t>(std::ranges::lower_bound(views, view) - views.begin());
+  };
   std::vector<Link> links;
-  std::vector<double> lengths;
+  std::vector<Spring> springs;
   for (const MapEdge& edge : arrangement.edges) {
-    if (edge.weight < least_weight) continue;
-    const MapNode& a = *std::ranges::lower_bound(arrangement.nodes, edge.a, {}, &MapNode::view);
-    const MapNode& b = *std::ranges::lower_bound(arrangement.nodes, edge.b, {}, &MapNode::view);
-    if (a.part != b.part) continue;
+    const NodePair ends{number_of(edge.a), number_of(edge.b)};
+    const MapNode& a = arrangement.nodes[ends.a];
+    const MapNode& b = arrangement.nodes[ends.b];
     links.push_back({edge.a, edge.b, edge.kind});
-    lengths.push_back(distance(a.pose.position(), b.pose.position()));
+    springs.push_back({ends, std::nullopt, distance(a.pose.position(), b.pose.position()),
+                       edge.weight, a.part == b.part});
   }
-  std::vector<Passage> passages = read_passages(source, links, executor);
-  std::vector<Passage> read = passages;
-  complete_lengths(read);
-  const NavigationGraph graph(views, std::move(read));
-  for (std::size_t i = 0; i < passages.size(); ++i) {
-    Passage& passage = passages[i];
-    if (passage.a_from_b && !is_supported(graph, passage)) passage.a_from_b.reset();
-    if (passage.a_from_b && passage.length > 0.0) {
-      passage.a_from_b->x_m *= lengths[i] / passage.length;
-      passage.a_from_b->y_m *= lengths[i] / passage.length;
-    }
-    passage.length = lengths[i];
-  }
-  complete_lengths(passages);
-  leave_out_far_ones(views, lengths, passages);
+  const std::vector<Passage> read = read_passages(source, links, executor);
+  for (std::size_t i = 0; i < springs.size(); ++i) springs[i].motion = read[i].a_from_b;
+  std::vector<Passage> passages = passages_of(views, std::move(springs), least_weight);
   return {std::move(views), std::move(passages)};
 }
 
