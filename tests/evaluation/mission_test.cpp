@@ -93,6 +93,47 @@ TEST(Missions, ARobotThatIsCarriedAwayFindsItsGoalAllTheSame) {
   EXPECT_GE(arrived, carried - 1);
 }
 
+TEST(Missions, ATourGoesOnFromGoalToGoalAmongPeople) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  Executor executor(2);
+  const MissionPlace place = make_mission_place(make_scene("loop", {.seed = 73}), executor);
+  std::vector<Pose2> way;
+  const auto& tour = place.scene.tour;
+  for (std::size_t i = 0; i < tour.size(); ++i) {
+    const Point2 from = tour[i];
+    const Point2 to = tour[(i + 1) % tour.size()];
+    const int steps = static_cast<int>(std::ceil(distance(from, to) / 0.25));
+    for (int k = 0; k < steps; ++k) {
+      const double share = static_cast<double>(k) / steps;
+      way.push_back({from.x_m + share * (to.x_m - from.x_m), from.y_m + share * (to.y_m - from.y_m),
+                     std::atan2(to.y_m - from.y_m, to.x_m - from.x_m)});
+    }
+  }
+  const RememberedPlace remembered = remember_drive(place, way, {}, 5, executor);
+  // Monte-Carlo localisation asks for poses.
+  ASSERT_TRUE(remembered.memory.info(remembered.graph.view(0)).pose.has_value());
+  const MemoryViewSource source(remembered.memory);
+  for (const bool monte_carlo : {false, true}) {
+    Navigator navigator(source, AreaPlanner(remembered.graph));
+    const std::vector<ViewId> goals{remembered.graph.view(20), remembered.graph.view(40),
+                                    remembered.graph.view(5)};
+    MissionOptions options;
+    options.people = monte_carlo ? 0 : 2;
+    options.monte_carlo = monte_carlo;
+    const auto runs = run_tour(place, remembered, navigator, way[0], goals, options, 4);
+    ASSERT_EQ(runs.size(), goals.size());
+    int arrived = 0;
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+      if (i > 0) {
+        EXPECT_EQ(runs[i].path.front(), runs[i - 1].path.back());
+      }
+      EXPECT_GT(runs[i].shortest_m, 0.5);
+      arrived += static_cast<int>(runs[i].arrives(0.15));
+    }
+    EXPECT_GE(arrived, 2) << monte_carlo;
+  }
+}
+
 TEST(Missions, RefuseWhatMakesNoSense) {
   Executor executor(2);
   const MissionPlace place = make_mission_place(make_scene("office", {.seed = 71}), executor);

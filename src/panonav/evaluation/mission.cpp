@@ -9,10 +9,10 @@
 #include "panonav/core/error.hpp"
 #include "panonav/evaluation/mapping_run.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/localisation/monte_carlo.hpp"
 #include "panonav/mapping/lattice.hpp"
 #include "panonav/panorama/preprocessing.hpp"
 #include "panonav/signature/fourier_signature.hpp"
-#include "panonav/simulation/recording.hpp"
 
 namespace panonav {
 
@@ -83,13 +83,15 @@ MissionPlace make_mission_place(Scene scene, Executor& executor, std::optional<P
   return place;
 }
 
-FourierSignature see(const MissionPlace& place, const Pose2& pose, std::uint64_t seed) {
+FourierSignature see(const MissionPlace& place, const Pose2& pose, std::uint64_t seed,
+                     const People* people) {
   if (place.sight) return place.sight(pose, seed);
   Executor here(1);
-  const FrameOptions frame{.camera_height_m = place.scene.camera_height_m};
-  return compute_signature(preprocess(take_panorama(*place.renderer, pose, place.rendering, frame,
-                                                    place.sensor, seed, here),
-                                      {}),
+  const double height_m = place.scene.camera_height_m;
+  Panorama view =
+      place.renderer->render_panorama({.pose = pose, .height_m = height_m}, place.rendering, here);
+  if (people != nullptr) people->paint(view, pose, height_m);
+  return compute_signature(preprocess(apply_sensor(std::move(view), place.sensor, seed), {}),
                            place.components);
 }
 
@@ -126,6 +128,10 @@ RememberedPlace remember_drive(const MissionPlace& place, const std::vector<Pose
   }
   mapper.finish();
   const TopologicalMap map = mapper.map();
+  for (const MapNode& node : map.nodes) {
+    if (node.part != 0) continue;
+    memory.set_pose(node.view, ReferencePose{node.pose.x_m, node.pose.y_m, node.pose.heading_rad});
+  }
   double way_m = 0.0;
   for (std::size_t i = 1; i < poses.size(); ++i) {
     way_m += distance(poses[i - 1].position(), poses[i].position());
@@ -136,9 +142,11 @@ RememberedPlace remember_drive(const MissionPlace& place, const std::vector<Pose
 }
 
 MissionRobot::MissionRobot(const MissionPlace& place, const BaseOptions& base,
-                           const OdometryNoise& motion, const Pose2& start, std::uint64_t seed)
+                           const OdometryNoise& motion, const Pose2& start, std::uint64_t seed,
+                           int people)
     : space_(place.free_space.get()),
       robot_radius_m_(place.scene.robot_radius_m),
+      people_(place.free_space, people, seed),
       base_(base),
       motion_(motion),
       pose_(start),
@@ -148,24 +156,42 @@ MissionRobot::MissionRobot(const MissionPlace& place, const BaseOptions& base,
   validate(motion_);
 }
 
+bool MissionRobot::is_clear(Point2 from, Point2 to) const {
+  // Who stands too near already must not keep it from going away.
+  const bool somebody = people_.touch(to, robot_radius_m_) && !people_.touch(from, robot_radius_m_);
+  return !somebody && has_room(*space_, robot_radius_m_, from, to);
+}
+
+void MissionRobot::wait(double seconds) {
+  people_.pass(seconds, pose_.position(), robot_radius_m_);
+}
+
+Pose2 MissionRobot::take_odometry() noexcept {
+  return std::exchange(told_, Pose2{});
+}
+
 void MissionRobot::command(const Velocity& velocity) {
-  const Pose2 step = sample_step(motion_after(velocity, base_.period_s), motion_, random_);
+  wait(base_.period_s);
+  const Pose2 told = motion_after(velocity, base_.period_s);
+  const Pose2 step = sample_step(told, motion_, random_);
   const Pose2 there = pose_ * step;
-  if (!has_room(*space_, robot_radius_m_, pose_.position(), there.position())) {
+  if (!is_clear(pose_.position(), there.position())) {
     // It touches something: it turns, but does not move.
     obstacle_ = true;
     pose_.heading_rad = there.heading_rad;
+    told_ = told_ * Pose2{0.0, 0.0, told.heading_rad};
     return;
   }
+  told_ = told_ * told;
   travelled_m_ += std::hypot(step.x_m, step.y_m);
   pose_ = there;
 }
 
 std::optional<double> MissionRobot::free_direction(double wanted_rad, double distance_m) {
   const auto is_open = [&](double direction_rad, double way_m) {
-    return has_room(
-        *space_, robot_radius_m_, pose_.position(),
-        pose_ * Point2{way_m * std::cos(direction_rad), way_m * std::sin(direction_rad)});
+    const Point2 there =
+        pose_ * Point2{way_m * std::cos(direction_rad), way_m * std::sin(direction_rad)};
+    return is_clear(pose_.position(), there);
   };
   if (is_open(wanted_rad, distance_m)) {
     side_ = 0;
@@ -211,51 +237,152 @@ bool drive(MissionRobot& robot, const BaseOptions& base, double direction_rad, d
   return false;
 }
 
+/// Tells the reference where Monte-Carlo localisation has the robot, if it is certain.
+class Estimator {
+ public:
+  Estimator(const VisualMemory& memory, const OdometryNoise& odometry)
+      : memory_(&memory), filter_(memory, {}, odometry) {}
+
+  std::optional<ViewId> observe(const Pose2& moved, const FourierSignature& view) {
+    filter_.move(moved);
+    const auto estimate = filter_.observe(pack(view, memory_->full_scale()));
+    if (estimate.state != LocalisationState::localised || !estimate.pose) return std::nullopt;
+    std::optional<ViewId> nearest;
+    double least_m = std::numeric_limits<double>::infinity();
+    for (const ViewId id : memory_->views()) {
+      const auto& pose = memory_->info(id).pose;
+      if (!pose) continue;
+      const double far_m = distance(pose->position(), estimate.pose->position());
+      if (far_m < least_m) {
+        least_m = far_m;
+        nearest = id;
+      }
+    }
+    return nearest;
+  }
+
+ private:
+  const VisualMemory* memory_;
+  MonteCarloLocaliser filter_;
+};
+
+/// A robot on its missions, one after the other.
+class Voyage {
+ public:
+  Voyage(const MissionPlace& place, const RememberedPlace& remembered, const Pose2& start,
+         const MissionOptions& options, std::uint64_t seed)
+      : place_(place),
+        remembered_(remembered),
+        options_(options),
+        robot_(place, options.base, options.motion, start, seed, options.people),
+        noise_of_views_(seed, 2) {
+    if (options.monte_carlo) estimator_.emplace(remembered.memory, options.motion);
+  }
+
+  MissionRun run(Navigator& navigator, ViewId goal_view, const std::optional<Pose2>& carried_to,
+                 const LookReport& report_look) {
+    const Point2 goal = remembered_.truth.at(*remembered_.graph.node_of(goal_view)).position();
+    const FreeSpace& space = *place_.free_space;
+    MissionRun run;
+    run.shortest_m = shortest_way_m(space, robot_.pose().position(), goal);
+    const double begins_at_m = robot_.travelled_m();
+    const double carried_at_m = begins_at_m + 0.5 * run.shortest_m;
+    navigator.set_goal(goal_view);
+    for (;;) {
+      run.path.push_back(robot_.pose());
+      const NavigationDecision decision = look(navigator);
+      run.decisions.push_back(decision);
+      if (report_look) report_look(decision, robot_.pose());
+      if (decision.state != NavigationState::moving) {
+        run.end = decision.state;
+        break;
+      }
+      move(decision);
+      if (carried_to && !run.carried_at && robot_.travelled_m() >= carried_at_m) {
+        run.carried_at = run.path.size() - 1;
+        run.shortest_m += shortest_way_m(space, carried_to->position(), goal) -
+                          shortest_way_m(space, robot_.pose().position(), goal);
+        robot_.carry_to(*carried_to);
+        obstacle_ = false;
+      }
+    }
+    run.travelled_m = robot_.travelled_m() - begins_at_m;
+    run.end_distance_m = distance(robot_.pose().position(), goal);
+    return run;
+  }
+
+ private:
+  NavigationDecision look(Navigator& navigator) {
+    const FourierSignature view =
+        see(place_, robot_.pose(), noise_of_views_.next(), &robot_.people());
+    RobotReport report{.obstacle = std::exchange(obstacle_, false)};
+    const Pose2 moved = robot_.take_odometry();
+    if (estimator_) {
+      // Views that tell the place by themselves tell it better.
+      const auto estimate = estimator_->observe(moved, view);
+      if (in_doubt_) report.estimate = estimate;
+    }
+    const NavigationDecision decision = navigator.look(view, report);
+    in_doubt_ = std::ranges::any_of(decision.events, [](NavigationEvent event) {
+      return event == NavigationEvent::unknown_place || event == NavigationEvent::relocalised ||
+             event == NavigationEvent::kidnapped;
+    });
+    return decision;
+  }
+
+  void move(const NavigationDecision& decision) {
+    const auto free_rad = robot_.free_direction(decision.direction_rad, decision.advance_m);
+    obstacle_ = !free_rad;
+    if (free_rad) {
+      const bool wanted = *free_rad == decision.direction_rad;
+      obstacle_ =
+          drive(robot_, options_.base, *free_rad, (wanted ? 1.0 : 0.5) * decision.advance_m);
+    }
+    // Who is in the way may go.
+    constexpr double pause_s = 1.0;
+    if (obstacle_ || decision.advance_m == 0.0) robot_.wait(pause_s);
+  }
+
+  const MissionPlace& place_;
+  const RememberedPlace& remembered_;
+  const MissionOptions& options_;
+  MissionRobot robot_;
+  Random noise_of_views_;
+  std::optional<Estimator> estimator_;
+  bool in_doubt_ = true;  // where it is, after the last look
+  bool obstacle_ = false;
+};
+
+void require_goal(const RememberedPlace& remembered, ViewId goal) {
+  if (remembered.graph.node_of(goal)) return;
+  throw ContractError("goal", std::to_string(goal.value), "a view of the graph");
+}
+
 }  // namespace
 
 MissionRun run_mission(const MissionPlace& place, const RememberedPlace& remembered,
                        Navigator& navigator, const Mission& mission, const MissionOptions& options,
                        std::uint64_t seed, const LookReport& report_look) {
-  const auto node = remembered.graph.node_of(mission.goal);
-  if (!node) throw ContractError("goal", std::to_string(mission.goal.value), "a view of the graph");
-  const Point2 goal = remembered.truth.at(*node).position();
-  const FreeSpace& space = *place.free_space;
-  MissionRobot robot(place, options.base, options.motion, mission.start, seed);
-  Random noise_of_views(seed, 2);
-  MissionRun run;
-  run.shortest_m = shortest_way_m(space, mission.start.position(), goal);
-  const double carried_after_m = 0.5 * run.shortest_m;
+  require_goal(remembered, mission.goal);
   navigator.forget_place();
-  navigator.set_goal(mission.goal);
-  RobotReport report;
-  for (;;) {
-    run.path.push_back(robot.pose());
-    const NavigationDecision decision =
-        navigator.look(see(place, robot.pose(), noise_of_views.next()), report);
-    run.decisions.push_back(decision);
-    if (report_look) report_look(decision, robot.pose());
-    if (decision.state != NavigationState::moving) {
-      run.end = decision.state;
-      break;
-    }
-    const auto free_rad = robot.free_direction(decision.direction_rad, decision.advance_m);
-    report.obstacle = !free_rad;
-    if (free_rad) {
-      const bool wanted = *free_rad == decision.direction_rad;
-      report.obstacle =
-          drive(robot, options.base, *free_rad, (wanted ? 1.0 : 0.5) * decision.advance_m);
-    }
-    if (mission.carried_to && !run.carried_at && robot.travelled_m() >= carried_after_m) {
-      run.carried_at = run.path.size() - 1;
-      run.shortest_m += shortest_way_m(space, mission.carried_to->position(), goal) -
-                        shortest_way_m(space, robot.pose().position(), goal);
-      robot.carry_to(*mission.carried_to);
-      report.obstacle = false;
-    }
+  return Voyage(place, remembered, mission.start, options, seed)
+      .run(navigator, mission.goal, mission.carried_to, report_look);
+}
+
+std::vector<MissionRun> run_tour(const MissionPlace& place, const RememberedPlace& remembered,
+                                 Navigator& navigator, const Pose2& start,
+                                 std::span<const ViewId> goals, const MissionOptions& options,
+                                 std::uint64_t seed) {
+  for (const ViewId goal : goals) require_goal(remembered, goal);
+  navigator.forget_place();
+  Voyage voyage(place, remembered, start, options, seed);
+  std::vector<MissionRun> runs;
+  for (const ViewId goal : goals) {
+    runs.push_back(voyage.run(navigator, goal, std::nullopt, {}));
+    // A robot that ended lost must not begin from a place in which it did not believe itself.
+    if (runs.back().end == NavigationState::lost) navigator.forget_place();
   }
-  run.travelled_m = robot.travelled_m();
-  run.end_distance_m = distance(robot.pose().position(), goal);
-  return run;
+  return runs;
 }
 
 std::vector<MissionRun> run_missions(const MissionPlace& place, const RememberedPlace& remembered,

@@ -5,11 +5,13 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "panonav/core/executor.hpp"
 #include "panonav/core/options.hpp"
+#include "panonav/evaluation/people.hpp"
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav/motion/odometry.hpp"
 #include "panonav/motion/velocity.hpp"
@@ -40,10 +42,11 @@ struct MissionPlace {
 [[nodiscard]] MissionPlace make_mission_place(Scene scene, Executor& executor,
                                               std::optional<Point2> inside = std::nullopt);
 
-/// What a robot there sees: the place's `sight`, or a panorama rendered directly and preprocessed
-/// as the command's defaults have it. The same pose and seed give the same bits.
-[[nodiscard]] FourierSignature see(const MissionPlace& place, const Pose2& pose,
-                                   std::uint64_t seed);
+/// What a robot there sees: the place's `sight`, or a panorama rendered directly, with the people
+/// that are there, and preprocessed as the command's defaults have it. The same pose, seed and
+/// people give the same bits.
+[[nodiscard]] FourierSignature see(const MissionPlace& place, const Pose2& pose, std::uint64_t seed,
+                                   const People* people = nullptr);
 
 /// What a robot remembers of a place, and, for the record, where its views were taken.
 struct RememberedPlace {
@@ -59,19 +62,20 @@ struct RememberedPlace {
                                             std::uint64_t seed, Executor& executor);
 
 /// Views along a drive, mapped by visual odometry and closure of loops, lengths by `wheels`
-/// [F11 section 4].
+/// [F11 section 4]. The memory gets the poses of the map's largest part.
 [[nodiscard]] RememberedPlace remember_drive(const MissionPlace& place,
                                              const std::vector<Pose2>& poses,
                                              const OdometryNoise& wheels, std::uint64_t seed,
                                              Executor& executor);
 
 /// The robot of a mission: drives as it is told, with the errors of its drive, and stops where
-/// something stands in its way. It feels what is near. Holds the true pose.
+/// something or somebody stands in its way. It feels what is near. Holds the true pose, and the
+/// people around, for whom time passes as it drives.
 class MissionRobot final : public RobotBase {
  public:
-  /// `place` must outlive the robot. Throws OptionError.
+  /// `place` must outlive the robot. Throws OptionError; ContractError as `People`.
   MissionRobot(const MissionPlace& place, const BaseOptions& base, const OdometryNoise& motion,
-               const Pose2& start, std::uint64_t seed);
+               const Pose2& start, std::uint64_t seed, int people = 0);
 
   void command(const Velocity& velocity) override;
 
@@ -83,12 +87,20 @@ class MissionRobot final : public RobotBase {
   [[nodiscard]] std::optional<double> free_direction(double wanted_rad, double distance_m);
   /// Since the last time: whether something stopped it.
   [[nodiscard]] bool take_obstacle() noexcept;
-  /// Somebody carries it away.
+  /// Stands still.
+  void wait(double seconds);
+  /// Somebody carries it away; its wheels do not tell.
   void carry_to(const Pose2& pose) noexcept { pose_ = pose; }
+  /// Since the last time: the motion that its wheels tell, robot_old_from_robot_new.
+  [[nodiscard]] Pose2 take_odometry() noexcept;
+  [[nodiscard]] const People& people() const noexcept { return people_; }
 
  private:
+  [[nodiscard]] bool is_clear(Point2 from, Point2 to) const;
+
   const FreeSpace* space_;
   double robot_radius_m_;
+  People people_;
   BaseOptions base_;
   OdometryNoise motion_;
   Pose2 pose_;
@@ -96,6 +108,7 @@ class MissionRobot final : public RobotBase {
   int side_ = 0;  // on which it goes past something: 1 left, -1 right
   bool obstacle_ = false;
   double travelled_m_ = 0.0;
+  Pose2 told_;
 };
 
 struct MissionOptions {
@@ -103,6 +116,10 @@ struct MissionOptions {
   PlannerOptions planner;
   BaseOptions base;
   OdometryNoise motion;  ///< its drive is that of `base`
+  int people = 0;        ///< who walk about
+  /// Beside the navigator runs Monte-Carlo localisation over the references whose poses the memory
+  /// knows. Where it is certain of the place and the navigator is not, the latter goes by it.
+  bool monte_carlo = false;
 };
 
 /// A goal to reach, and what happens on the way.
@@ -154,6 +171,15 @@ using LookReport = std::function<void(const NavigationDecision& decision, const 
                                      Navigator& navigator, const Mission& mission,
                                      const MissionOptions& options, std::uint64_t seed,
                                      const LookReport& report_look = {});
+
+/// One goal after the other: each run begins where the one before ended, with the place known that
+/// the robot then believes in. A goal that was not reached does not end the tour. Otherwise as
+/// `run_mission`.
+[[nodiscard]] std::vector<MissionRun> run_tour(const MissionPlace& place,
+                                               const RememberedPlace& remembered,
+                                               Navigator& navigator, const Pose2& start,
+                                               std::span<const ViewId> goals,
+                                               const MissionOptions& options, std::uint64_t seed);
 
 /// All runs, mission by mission, each by a navigator of its own; run i has the stream (seed, i).
 [[nodiscard]] std::vector<MissionRun> run_missions(const MissionPlace& place,

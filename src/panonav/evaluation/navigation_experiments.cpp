@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -42,6 +43,7 @@ struct Measures {
   std::map<NavigationState, std::size_t> ends;
   std::vector<double> lengths;  // of those that arrived, over the shortest
   std::vector<double> looks;
+  double bytes_read = 0.0;  // by all looks
 
   void add(const std::vector<MissionRun>& missions, double radius_m) {
     for (const MissionRun& run : missions) {
@@ -51,8 +53,15 @@ struct Measures {
       wrongly += static_cast<std::size_t>(!arrives && run.end == NavigationState::arrived);
       ++ends[run.end];
       looks.push_back(static_cast<double>(run.decisions.size()));
+      for (const NavigationDecision& look : run.decisions) {
+        bytes_read += static_cast<double>(look.bytes_read);
+      }
       if (arrives && run.shortest_m > 0.0) lengths.push_back(run.travelled_m / run.shortest_m);
     }
+  }
+
+  [[nodiscard]] double bytes_a_look() const {
+    return bytes_read / std::accumulate(looks.begin(), looks.end(), 0.0);
   }
 };
 
@@ -185,6 +194,7 @@ void reproduce_drive_missions(const NavigationReproductionOptions& options,
   Measures same;
   Measures changed;
   Measures carried;
+  Measures believed;
   for (int i = 0; i < options.scenes; ++i) {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
     SceneVariation variation{.seed = seed};
@@ -214,6 +224,11 @@ void reproduce_drive_missions(const NavigationReproductionOptions& options,
     run(place, false, 5, same);
     run(other, false, 7, changed);
     run(place, true, 9, carried);
+    if (scene == "corridor") {
+      // The missions of before, so that both can be compared.
+      mission.monte_carlo = true;
+      run(place, true, 9, believed);
+    }
   }
   const std::string what = scene + ", map of a drive of 60 m";
   report("navigation." + scene, what, same, at_least(0.95), std::nullopt, result);
@@ -224,6 +239,64 @@ void reproduce_drive_missions(const NavigationReproductionOptions& options,
          changed, at_least(0.9), std::nullopt, result);
   report("navigation." + scene + ".carried", what + ", carried away half way", carried,
          at_least(0.9), std::nullopt, result);
+  if (believed.runs > 0) {
+    report("navigation." + scene + ".monte_carlo",
+           what + ", the same missions with Monte-Carlo localisation where the place is in doubt",
+           believed, std::nullopt, std::nullopt, result);
+  }
+}
+
+void reproduce_tours(const NavigationReproductionOptions& options, Executor& executor,
+                     Reproduction& result) {
+  constexpr int goals_a_tour = 5;
+  constexpr int people = 3;
+  struct Kind {
+    std::string id;
+    std::string what;
+    MissionOptions options;
+    Measures measures;
+  };
+  std::vector<Kind> kinds{
+      {"tour", "one goal after the other", {}, {}},
+      {"people", "the same with three people who walk about", {}, {}},
+      {"accurate", "the same with all components compared at each look", {}, {}}};
+  kinds[1].options.people = people;
+  kinds[2].options.navigator.coarse_components = 0;
+  for (int i = 0; i < options.scenes; ++i) {
+    const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
+    const MissionPlace place = make_mission_place(make_scene("loop", {.seed = seed}), executor);
+    const RememberedPlace remembered = remember_drive(
+        place, exploring_drive(place, seed), cheap_wheels(), Random(seed, 1).next(), executor);
+    const AreaPlanner planner(remembered.graph);
+    const MemoryViewSource source(remembered.memory);
+    const int tours = (runs_of(options, i) + goals_a_tour - 1) / goals_a_tour;
+    const auto missions = random_missions(
+        place, remembered, {.count = tours * goals_a_tour, .beside_m = beside_drive_m},
+        Random(seed, 12).next());
+    for (Kind& kind : kinds) {
+      std::vector<std::vector<MissionRun>> runs(static_cast<std::size_t>(tours));
+      executor.for_chunks(runs.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
+        for (std::size_t t = begin; t < end; ++t) {
+          std::vector<ViewId> goals;
+          for (std::size_t k = 0; k < goals_a_tour; ++k) {
+            goals.push_back(missions[t * goals_a_tour + k].goal);
+          }
+          Navigator navigator(source, planner, kind.options.navigator);
+          runs[t] = run_tour(place, remembered, navigator, missions[t * goals_a_tour].start, goals,
+                             kind.options, Random(seed, 200 + t).next());
+        }
+      });
+      for (const auto& tour : runs) kind.measures.add(tour, 0.5 * remembered.spacing_m);
+    }
+  }
+  for (const Kind& kind : kinds) {
+    report("navigation." + kind.id, "loop, tours of five goals, " + kind.what, kind.measures,
+           std::nullopt, std::nullopt, result);
+    report_figure(result, "navigation." + kind.id + ".read",
+                  "loop, tours of five goals, " + kind.what +
+                      ": read of signatures and index by a look, mean",
+                  1e-3 * kind.measures.bytes_a_look(), "kB");
+  }
 }
 
 void reproduce_blocked_missions(const NavigationReproductionOptions& options, Executor& executor,

@@ -17,6 +17,10 @@ void reproduce_grid_missions(const NavigationReproductionOptions& options, const
 /// remembered, in other light and with objects moved, and with a robot that is carried away.
 void reproduce_drive_missions(const NavigationReproductionOptions& options,
                               const std::string& scene, Executor& executor, Reproduction& result);
+/// Variants of `loop`: tours of five goals, among people too, and with all components of signatures
+/// compared at each look instead of the first few in the open.
+void reproduce_tours(const NavigationReproductionOptions& options, Executor& executor,
+                     Reproduction& result);
 /// Variants of `loop` with a passage blocked that has a detour, and with two blocked so that there
 /// is none.
 void reproduce_blocked_missions(const NavigationReproductionOptions& options, Executor& executor,

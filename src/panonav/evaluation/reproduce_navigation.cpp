@@ -35,6 +35,7 @@ Reproduction reproduce_navigation(const NavigationReproductionOptions& options, 
     stages.push_back({"missions in " + scene, 6.0,
                       [&, scene] { reproduce_drive_missions(options, scene, executor, result); }});
   }
+  stages.push_back({"tours", 4.0, [&] { reproduce_tours(options, executor, result); }});
   stages.push_back(
       {"blocked passages", 2.0, [&] { reproduce_blocked_missions(options, executor, result); }});
   run_stages(stages, progress);
