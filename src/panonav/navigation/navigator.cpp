@@ -25,8 +25,8 @@ constexpr double most_correction_rad = std::numbers::pi / 3.0;
 constexpr std::array<double, 5> detours_rad{0.0, 0.7, -0.7, 1.3, -1.3};
 // A search step that is turned aside by more says nothing about the passage ahead.
 constexpr double most_aside_rad = 1.0;
-// So often the bar of what is closed is made twice as wide at most.
-constexpr int most_widenings = 6;
+// Passages that cross a bar lie within so many of its place.
+constexpr int links_across = 3;
 
 // A passage so much longer than usual is held to until its end. `step_m` is half a usual passage.
 constexpr double least_long = 2.0;
@@ -96,7 +96,8 @@ void Navigator::set_goal(ViewId goal) {
   tries_.clear();
   suspects_.clear();
   obstructed_ = false;
-  looks_in_vain_ = closings_in_vain_ = 0;
+  looks_in_vain_ = 0;
+  closed_here_ = false;
   state_ = NavigationState::moving;
   looks_ = unknown_looks_ = elsewhere_looks_ = obstruction_ = attempts_ = 0;
   plan_fields();
@@ -108,6 +109,7 @@ void Navigator::forget_place() {
   homing_.reset();
   last_view_.reset();
   commanded_rad_.reset();
+  known_at_.reset();
   under_way_.reset();
 }
 
@@ -251,21 +253,20 @@ void Navigator::load_ahead() {
 }
 
 // Closes a passage that was tried in vain, and all that cross a bar half way along it where
-// something stood in the way. The bar is twice as wide each time that closing brought the robot
-// no farther away: so a wide thing is soon closed as a whole, and a narrow one leaves its sides
-// open.
+// something stood in the way. The bar is two usual passages wide, whatever was closed before: wider
+// ones shut the sides of things and rooms as a whole.
 void Navigator::close_way(std::size_t passage, NavigationDecision& decision) {
   const NavigationGraph& graph = planner_.graph();
   const Tries tried = tries_.at(passage);
   std::vector<std::size_t> shut{passage};
   const auto motion = graph.motion_from(tried.node, passage);
-  const bool is_wide = tried.obstructed > 1 || closings_in_vain_ > 0 || !suspects_.empty();
+  const bool is_wide = tried.obstructed > 1 || closed_here_ || !suspects_.empty();
   if (is_wide && motion && (motion->x_m != 0.0 || motion->y_m != 0.0)) {
     const double half = 0.5 * std::hypot(motion->x_m, motion->y_m);
-    const auto across = passages_across(graph,
-                                        {tried.node, std::atan2(motion->y_m, motion->x_m), half,
-                                         std::ldexp(half, closings_in_vain_)},
-                                        2 + closings_in_vain_);
+    const auto across = passages_across(
+        graph,
+        {tried.node, std::atan2(motion->y_m, motion->x_m), half, std::max(half, typical_length_)},
+        links_across);
     shut.insert(shut.end(), across.begin(), across.end());
   }
   // What was closed before and is no better now is closed as a whole.
@@ -275,7 +276,7 @@ void Navigator::close_way(std::size_t passage, NavigationDecision& decision) {
   planner_.close(shut);
   decision.events.push_back(NavigationEvent::closed);
   obstruction_ = looks_in_vain_ = 0;
-  closings_in_vain_ = std::min(closings_in_vain_ + 1, most_widenings);
+  closed_here_ = true;
   around_closed_ = nodes_around(graph, {&tried.node, 1}, 2 * options_.near_links);
   tries_.clear();
   plan_fields();
@@ -295,14 +296,15 @@ void Navigator::try_again(NavigationDecision& decision, NavigationState otherwis
   }
   planner_.open_all();
   tries_.clear();
-  looks_in_vain_ = closings_in_vain_ = 0;
+  looks_in_vain_ = 0;
+  closed_here_ = false;
   decision.events.push_back(NavigationEvent::reopened);
   plan_fields();
 }
 
 // What became of the step before, and whether the robot comes nearer to the goal.
 void Navigator::count_try() {
-  if (!std::ranges::binary_search(around_closed_, *node_)) closings_in_vain_ = 0;
+  if (!std::ranges::binary_search(around_closed_, *node_)) closed_here_ = false;
   const auto tried = aimed_for_ ? tries_.find(*aimed_for_) : tries_.end();
   if (tried != tries_.end()) tried->second.obstructed += static_cast<int>(obstructed_);
   ++looks_in_vain_;
@@ -327,7 +329,16 @@ void Navigator::notice_obstacles(const Seen& seen, const RobotReport& report,
                    image_difference(*last_view_, seen.view.view) <
                        0.5 * std::min(scale_.neighbours, coarse_scale_.neighbours);
     heading_for_rad_ = wrap_angle(*commanded_rad_ + back.heading_rad);
+    if (known_at_) {
+      const double way_m = obstructed_ ? 0.0 : options_.step_m;
+      const Pose2 step{way_m * std::cos(*commanded_rad_), way_m * std::sin(*commanded_rad_),
+                       -back.heading_rad};
+      known_at_ = inverse(step) * *known_at_;
+    }
   }
+  // Where the place is hardly known, a step aside may be an unknown one.
+  const bool well_known = unknown_looks_ == 0 && decision.difference <= 0.5 * limit(seen.view);
+  if (well_known || (unknown_looks_ == 0 && !known_at_)) known_at_ = Point2{};
   if (obstructed_) {
     obstruction_ += 2;
     under_way_.reset();
@@ -422,13 +433,25 @@ void Navigator::go_home(const Seen& seen, NavigationDecision& decision) {
   try_again(decision, obstructed ? NavigationState::blocked : NavigationState::lost);
 }
 
-// From an unknown place to where the robot still knew its own, if that can be seen from here.
+// The direction of where the robot still knew its place: the way back of its own steps, as
+// something near may hide what the reference there shows; else as the reference is seen from here.
+std::optional<double> Navigator::way_back_rad(const SeenView& view) {
+  if (known_at_ && std::hypot(known_at_->x_m, known_at_->y_m) >= 0.5 * options_.step_m) {
+    return std::atan2(known_at_->y_m, known_at_->x_m);
+  }
+  const HomeVector back =
+      home_vector(views_.view(planner_.graph().view(*known_node_), view.components), view.view);
+  if (back.confidence <= least_confidence) return std::nullopt;
+  return back.direction_rad();
+}
+
+// From an unknown place to where the robot still knew its own, if something tells where that is.
 bool Navigator::go_back(const Seen& seen, NavigationDecision& decision) {
   if (!known_node_ || obstructed_) return false;
   const ViewId known = planner_.graph().view(*known_node_);
   if (!views_.holds(known)) return false;
-  const HomeVector back = home_vector(views_.view(known, seen.view.components), seen.view.view);
-  if (back.confidence <= least_confidence) return false;
+  const auto direction_rad = way_back_rad(seen.view);
+  if (!direction_rad) return false;
   const SubAreas& areas = planner_.areas();
   if (unknown_looks_ == options_.agreeing_looks && areas.area_of[*known_node_] == views_.area()) {
     // Something hides the place that should come next, as what stands in the way does.
@@ -440,7 +463,7 @@ bool Navigator::go_back(const Seen& seen, NavigationDecision& decision) {
     }
   }
   decision.next = known;
-  decision.direction_rad = back.direction_rad();
+  decision.direction_rad = *direction_rad;
   decision.advance_m = options_.step_m;
   commanded_rad_ = decision.direction_rad;
   return true;

@@ -158,6 +158,7 @@ class Navigator {
   void try_again(NavigationDecision& decision, NavigationState otherwise);
   [[nodiscard]] const Guide& guide() const;
   void go_home(const Seen& seen, NavigationDecision& decision);
+  [[nodiscard]] std::optional<double> way_back_rad(const SeenView& view);
   [[nodiscard]] bool go_back(const Seen& seen, NavigationDecision& decision);
   [[nodiscard]] bool is_at_goal() const;
   void follow(const Seen& seen, NavigationDecision& decision);
@@ -185,6 +186,7 @@ class Navigator {
   std::optional<HomingPursuit> homing_;
   std::optional<std::size_t> node_;        // where the robot is
   std::optional<std::size_t> known_node_;  // where its place last looked right
+  std::optional<Point2> known_at_;         // in the current frame, as far as steps tell; metres
   std::optional<HomingView> last_view_;
   std::optional<double>
       commanded_rad_;  // direction of the step before, in the frame of `last_view_`
@@ -198,9 +200,9 @@ class Navigator {
   bool obstructed_ = false;  // in the step before this look
   int obstruction_ = 0;  // grows by 2 with each step that fails, falls by 1 with each that does not
   int attempts_ = 0;
-  double least_way_ = 0.0;    // since the last plan
-  int looks_in_vain_ = 0;     // since the way became shorter or a passage was closed
-  int closings_in_vain_ = 0;  // since the robot was far from the last passage that was closed
+  double least_way_ = 0.0;                  // since the last plan
+  int looks_in_vain_ = 0;                   // since the way became shorter or a passage was closed
+  bool closed_here_ = false;                // a passage, and the robot was not far from there since
   std::map<std::size_t, Tries> tries_;      // of passages, since the way became shorter
   std::vector<std::size_t> around_closed_;  // nodes around that passage, ascending
   std::set<std::size_t> suspects_;          // passages that were closed in earlier attempts
