@@ -56,7 +56,13 @@ std::vector<MapLayer> things_layers(const MissionPlace& place) {
     std::erase_if(layer.filled_polygons, [&](const std::vector<Point2>& corners) {
       const Point2 middle{0.5 * (corners[0].x_m + corners[2].x_m),
                           0.5 * (corners[0].y_m + corners[2].y_m)};
-      return place.free_space->is_free(middle);
+      const FreeSpace& space = *place.free_space;
+      // Far trees of a garden would make its floor a spot.
+      constexpr double around_m = 3.0;
+      const bool is_far =
+          middle.x_m < space.low().x_m - around_m || middle.y_m < space.low().y_m - around_m ||
+          middle.x_m > space.high().x_m + around_m || middle.y_m > space.high().y_m + around_m;
+      return is_far || space.is_free(middle);
     });
   }
   return layers;
