@@ -330,6 +330,34 @@ TEST(Navigator, GoesNowhereWithoutAWay) {
   EXPECT_EQ(run.end.advance_m, 0.0);
 }
 
+// The memory lacks the passages of some views: a robot that stands at one goes on by another.
+TEST(Navigator, GoesOnFromAPlaceWithoutAWay) {
+  const WalledWorld world = two_rooms(1, false);
+  RememberedWorld remembered(world, high, spacing_m, 1);
+  Random random(5);
+  const ViewId goal = remembered.memory.views().back();
+  constexpr int trials = 6;
+  std::vector<ViewId> apart;
+  while (apart.size() < trials) {
+    const ViewId view = remembered.memory.views()[random.index(remembered.memory.size())];
+    if (view == goal || std::ranges::find(apart, view) != apart.end()) continue;
+    apart.push_back(view);
+    for (const ViewId neighbour : remembered.memory.neighbours(view)) {
+      remembered.memory.unlink(view, neighbour);
+    }
+  }
+  const MemoryViewSource source(remembered.memory);
+  Navigator navigator(source, phase_planner(remembered.memory));
+  int arrived = 0;
+  for (const ViewId view : apart) {
+    const Drive run = drive(world, remembered, navigator, goal, remembered.pose_of(view),
+                            DriveKind::holonomic, random.next());
+    arrived += static_cast<int>(run.end.state == NavigationState::arrived &&
+                                run.error_m <= 0.5 * spacing_m);
+  }
+  EXPECT_GE(arrived, trials - 1);
+}
+
 TEST(Navigator, SameCallsGiveTheSameDecisions) {
   const WalledWorld world = two_rooms(2, true);
   const RememberedWorld remembered(world, high, spacing_m, 2);

@@ -153,6 +153,101 @@ TEST(NavigationGraph, AStoredLatticeSaysTheSameAsTheLattice) {
   EXPECT_GE(same, graph.passages().size() * 9 / 10);
 }
 
+// A square grid of views, all with heading 0, laid out and seen without error.
+Lattice exact_grid(std::size_t columns, std::size_t rows) {
+  Lattice lattice;
+  for (std::size_t i = 0; i < columns * rows; ++i) {
+    lattice.nodes.push_back(
+        {.view = ViewId{i},
+         .pose = {static_cast<double>(i % columns), static_cast<double>(i / columns), 0.0}});
+  }
+  return lattice;
+}
+
+// `b` is seen in the direction in which a view at `seen_b` would be, `a` from there.
+void add_spring(Lattice& lattice, std::size_t a, std::size_t b, Point2 seen_b) {
+  const Point2 from = lattice.nodes[a].pose.position();
+  const double length = distance(from, seen_b);
+  const double direction_rad = std::atan2(seen_b.y_m - from.y_m, seen_b.x_m - from.x_m);
+  lattice.springs.push_back(
+      {.a = a,
+       .b = b,
+       .length = length,
+       .phases = PhaseReading{.direction_a_rad = direction_rad,
+                              .direction_b_rad = wrap_angle(direction_rad + pi),
+                              .length = 0.2 * length,
+                              .points = true}});
+}
+
+void add_springs_to_neighbours(Lattice& lattice, std::size_t first, std::size_t end) {
+  for (std::size_t a = first; a < end; ++a) {
+    for (std::size_t b = a + 1; b < end; ++b) {
+      const Point2 there = lattice.nodes[b].pose.position();
+      if (distance(lattice.nodes[a].pose.position(), there) < 2.1) add_spring(lattice, a, b, there);
+    }
+  }
+}
+
+bool has_passage(const NavigationGraph& graph, std::size_t a, std::size_t b) {
+  return std::ranges::any_of(graph.exits(a), [&](const auto& exit) { return exit.node == b; });
+}
+
+TEST(NavigationGraph, LengthsAreInSpacingsOfTheReferences) {
+  Lattice lattice = exact_grid(9, 5);
+  add_springs_to_neighbours(lattice, 0, lattice.nodes.size());
+  const NavigationGraph graph = navigation_graph(lattice);
+  ASSERT_EQ(graph.passages().size(), lattice.springs.size());
+  for (const Passage& passage : graph.passages()) {
+    const Pose2 truth =
+        inverse(lattice.nodes[passage.a.value].pose) * lattice.nodes[passage.b.value].pose;
+    EXPECT_NEAR(passage.length, std::hypot(truth.x_m, truth.y_m), 1e-9);
+    ASSERT_TRUE(passage.a_from_b.has_value());
+    EXPECT_NEAR(passage.a_from_b->x_m, truth.x_m, 1e-9);
+    EXPECT_NEAR(passage.a_from_b->y_m, truth.y_m, 1e-9);
+  }
+}
+
+// Two places far apart that look alike: the arrangement holds springs between them.
+TEST(NavigationGraph, LeavesOutPassagesToPlacesThatLookAlike) {
+  constexpr std::size_t columns = 14;
+  Lattice lattice = exact_grid(columns, 6);
+  add_springs_to_neighbours(lattice, 0, lattice.nodes.size());
+  const std::size_t here = 2 * columns + 2;
+  const std::size_t alike = 2 * columns + 11;
+  const Pose2 beside = lattice.nodes[here + 1].pose;
+  add_spring(lattice, here, alike, beside.position());
+  add_spring(lattice, here + columns, alike + columns, {beside.x_m, beside.y_m + 1.0});
+  // They came to lie as near to each other as these springs say.
+  for (LatticeNode& node : lattice.nodes) {
+    const auto column = static_cast<double>(node.view.value % columns);
+    if (column >= 7.0) node.pose = {14.0 - column, node.pose.y_m, node.pose.heading_rad};
+  }
+  const NavigationGraph graph = navigation_graph(lattice);
+  EXPECT_FALSE(has_passage(graph, here, alike));
+  EXPECT_FALSE(has_passage(graph, here + columns, alike + columns));
+  // All others, but those that the fold has bent.
+  EXPECT_TRUE(has_passage(graph, here, here + 1));
+  EXPECT_TRUE(has_passage(graph, alike, alike + columns));
+}
+
+// What is left out for that comes back where nothing else joins two parts.
+TEST(NavigationGraph, KeepsTheOnlyPassageBetweenTwoParts) {
+  constexpr std::size_t side = 6;
+  Lattice lattice = exact_grid(side, 2 * side);
+  const std::size_t half = side * side;
+  add_springs_to_neighbours(lattice, 0, half);
+  add_springs_to_neighbours(lattice, half, 2 * half);
+  const std::size_t door = half - 3;
+  for (const std::size_t beyond : {door + side, door + side + 1}) {
+    add_spring(lattice, door, beyond, lattice.nodes[beyond].pose.position());
+  }
+  const NavigationGraph graph = navigation_graph(lattice);
+  EXPECT_TRUE(has_passage(graph, door, door + side));
+  EXPECT_FALSE(has_passage(graph, door, door + side + 1));
+  const auto guides = direction_field(graph, ViewId{0});
+  EXPECT_TRUE(std::ranges::all_of(guides, [](const Guide& guide) { return guide.reachable(); }));
+}
+
 TEST(PlaceScale, TellsNeighboursFromStrangers) {
   const Grid grid;
   const MemoryViewSource source(grid.memory);

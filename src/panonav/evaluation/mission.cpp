@@ -176,8 +176,9 @@ void MissionRobot::command(const Velocity& velocity) {
   const Pose2 step = sample_step(told, motion_, random_);
   const Pose2 there = pose_ * step;
   if (!is_clear(pose_.position(), there.position())) {
-    // It touches something: it turns, but does not move.
-    obstacle_ = true;
+    // It touches something: it turns, but does not move. Wheels that slip as it turns on the spot
+    // say nothing of what stands ahead.
+    obstacle_ |= told.x_m != 0.0 || told.y_m != 0.0;
     pose_.heading_rad = there.heading_rad;
     told_ = told_ * Pose2{0.0, 0.0, told.heading_rad};
     return;

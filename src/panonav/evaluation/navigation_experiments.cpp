@@ -1,11 +1,13 @@
 #include "panonav/evaluation/navigation_experiments.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <map>
 #include <numeric>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -159,9 +161,21 @@ std::vector<Pose2> exploring_drive(const MissionPlace& place, std::uint64_t seed
   return poses;
 }
 
-// A screen as high as a robot across the way at `at`.
-void put_screen(Scene& scene, const Pose2& at) {
-  add_screen(scene, at, 3.0, 1.0);
+// The scene with screens as high as a robot across the way.
+Scene with_screens(Scene scene, std::span<const Pose2> across, double width_m) {
+  for (const Pose2& at : across) add_screen(scene, at, width_m, 1.0);
+  return scene;
+}
+
+// How wide screens must be so that no way leads past them; empty: none of these widths does it. At
+// a corner a way leads past screens that shut a straight passage.
+std::optional<double> shutting_width_m(const Scene& scene, std::span<const Pose2> across,
+                                       Point2 from, Point2 to) {
+  for (const double width_m : {2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0}) {
+    const Scene shut = with_screens(scene, across, width_m);
+    if (!FreeSpace(shut, free_space_options(shut), from).is_free(to)) return width_m;
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -316,20 +330,21 @@ void reproduce_blocked_missions(const NavigationReproductionOptions& options, Ex
     }
     const auto round = static_cast<std::size_t>(tour_m / drive_spacing_m);
     Random random(seed, 11);
-    for (int k = 0; k < runs_of(options, i); ++k) {
+    for (int k = 0; k < runs_of(options, i);) {
       // A quarter of the round trip apart, the screen half way between; the other one on the
       // opposite side.
       const std::size_t start = random.index(round);
       const std::size_t goal = (start + round / 4) % round;
-      const Pose2 middle = way[(start + round / 8) % round];
-      const Pose2 opposite = way[(start + round / 8 + round / 2) % round];
+      const std::array<Pose2, 2> screens{way[(start + round / 8) % round],
+                                         way[(start + round / 8 + round / 2) % round]};
       const Mission mission{remembered.graph.view(goal), way[start], {}};
+      const auto width_m =
+          shutting_width_m(scene, screens, mission.start.position(), way[goal].position());
+      if (!width_m) continue;
       for (const bool both : {false, true}) {
-        Scene blocked = scene;
-        put_screen(blocked, middle);
-        if (both) put_screen(blocked, opposite);
-        const MissionPlace now =
-            make_mission_place(std::move(blocked), executor, mission.start.position());
+        const MissionPlace now = make_mission_place(
+            with_screens(scene, std::span(screens).first(both ? 2 : 1), *width_m), executor,
+            mission.start.position());
         const auto runs =
             run_missions(now, remembered, {mission}, {},
                          Random(seed, 100 + static_cast<std::uint64_t>(k)).next(), executor);
@@ -338,6 +353,7 @@ void reproduce_blocked_missions(const NavigationReproductionOptions& options, Ex
           draw(options, "loop_blocked", now, remembered, mission, runs.front(), result);
         }
       }
+      ++k;
     }
   }
   const std::string what = "loop, a screen across the passage";

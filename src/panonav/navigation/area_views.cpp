@@ -128,12 +128,16 @@ std::optional<FoundView> AreaViews::nearest(const NavigationGraph& graph, const 
 }
 
 std::optional<FoundView> search_everywhere(const ViewSource& source, const NavigationGraph& graph,
-                                           const SubAreas& areas, const FourierSignature& view) {
+                                           const SubAreas& areas, const FourierSignature& view,
+                                           const std::function<bool(std::size_t)>& is_wanted) {
   const HomingView seen = homing_view(view);
   std::optional<FoundView> best;
   for (const auto& nodes : areas.nodes) {
     std::vector<ViewId> views;
-    for (const std::size_t node : nodes) views.push_back(graph.view(node));
+    for (const std::size_t node : nodes) {
+      if (!is_wanted || is_wanted(node)) views.push_back(graph.view(node));
+    }
+    if (views.empty()) continue;
     const VisualMemory memory = source.load(views);
     const SearchResult found =
         memory.search(pack(view, memory.full_scale()), {.top = compared_per_area});

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -90,11 +91,11 @@ class AreaViews {
 };
 
 /// Relocalisation over the whole memory, one area after the other, so that no more than one is
-/// held: of the least dissimilar views of each area the one whose difference is least. Empty when
-/// there is no view. Cost: loads all.
-[[nodiscard]] std::optional<FoundView> search_everywhere(const ViewSource& source,
-                                                         const NavigationGraph& graph,
-                                                         const SubAreas& areas,
-                                                         const FourierSignature& view);
+/// held: of the least dissimilar views of each area the one whose difference is least. `is_wanted`:
+/// asked for each node whether it counts; empty: all do. Empty when there is no view. Cost: loads
+/// all that count.
+[[nodiscard]] std::optional<FoundView> search_everywhere(
+    const ViewSource& source, const NavigationGraph& graph, const SubAreas& areas,
+    const FourierSignature& view, const std::function<bool(std::size_t node)>& is_wanted = {});
 
 }  // namespace panonav

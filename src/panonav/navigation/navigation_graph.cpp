@@ -425,57 +425,99 @@ std::vector<double> spacings_around(std::size_t views, const std::vector<Spring>
   return spacings;
 }
 
-// Whether springs may be kept, and how long their passages are, in spacings of the references
-// around: likeness falls faster with distance where things are near, so that the unit of phases and
-// of the arrangement changes from place to place.
-std::vector<Passage> passages_of(const std::vector<ViewId>& views, std::vector<Spring> springs,
-                                 double least_weight) {
-  // Views of a square grid have others at 1.41 and 2 spacings.
-  constexpr double most_spacings = 2.0;
+// A passage that may be kept.
+struct Candidate {
+  Passage passage;
+  NodePair ends;
+  double far = 0.0;         // in spacings of the references around
+  bool joins_only = false;  // kept only where without it two parts would not be joined
+};
+
+// How long the passages of springs are, in spacings of the references around: likeness falls faster
+// with distance where things are near, so that the unit of phases and of the arrangement changes
+// from place to place. What the arrangement kept it laid out by the directions of all springs
+// around; of what it gave up the phases alone tell how far it leads.
+std::vector<Candidate> candidates_of(const std::vector<ViewId>& views,
+                                     const std::vector<Spring>& springs, double least_weight) {
+  // The distance to the nearest of several views, each with an error, is a tenth below the spacing,
+  // so this means two spacings: views of a square grid have others at 1.41 and 2.
+  constexpr double most_spacings = 2.3;
   // An arrangement that is torn gives right springs up; so many third views speak for one then,
   // and it must be as short as those to nearest views are.
   constexpr int enough_support = 3;
   constexpr double most_spacings_of_given_up = 1.5;
+  const auto is_given_up = [&](const Spring& spring) {
+    return spring.weight < least_weight || !spring.one_part;
+  };
+  std::vector<double> laid_out;
+  std::vector<double> seen;
+  for (const Spring& spring : springs) {
+    laid_out.push_back(is_given_up(spring) ? 0.0 : spring.length);
+    seen.push_back(spring.motion ? length_of(*spring.motion) : 0.0);
+  }
+  const std::vector<double> spacings_laid_out = spacings_around(views.size(), springs, laid_out);
+  const std::vector<double> spacings_seen = spacings_around(views.size(), springs, seen);
+  std::vector<Candidate> candidates;
+  for (std::size_t i = 0; i < springs.size(); ++i) {
+    const Spring& spring = springs[i];
+    const auto [a, b] = spring.ends;
+    const bool given_up = is_given_up(spring);
+    const std::vector<double>& spacings = given_up ? spacings_seen : spacings_laid_out;
+    const double spacing = 0.5 * (spacings[a] + spacings[b]);
+    const double length = given_up ? seen[i] : laid_out[i];
+    Candidate candidate{
+        {views[a], views[b], 0.0, spring.motion}, spring.ends, unknown_length_share};
+    if (std::isfinite(spacing) && (length > 0.0 || spring.motion)) {
+      candidate.far = candidate.passage.length = length / spacing;
+    }
+    if (seen[i] > 0.0) {
+      candidate.passage.a_from_b->x_m *= candidate.far / seen[i];
+      candidate.passage.a_from_b->y_m *= candidate.far / seen[i];
+    }
+    candidate.joins_only = candidate.far > (given_up ? most_spacings_of_given_up : most_spacings) ||
+                           (given_up && spring.support < enough_support);
+    candidates.push_back(candidate);
+  }
+  return candidates;
+}
+
+// A passage whose ends have hardly any neighbour in common leads to another place that looks alike:
+// ways would be planned through it as through a hole in the wall.
+void doubt_lonely_passages(std::size_t views, std::vector<Candidate>& candidates) {
+  // On an open square grid with passages up to two spacings nearest neighbours have half of theirs
+  // in common, views two spacings apart a quarter.
+  constexpr double least_common = 0.2;
+  std::vector<std::vector<std::size_t>> around(views);
+  for (const Candidate& candidate : candidates) {
+    if (candidate.joins_only) continue;
+    around[candidate.ends.a].push_back(candidate.ends.b);
+    around[candidate.ends.b].push_back(candidate.ends.a);
+  }
+  for (auto& list : around) std::ranges::sort(list);
+  for (Candidate& candidate : candidates) {
+    if (candidate.joins_only) continue;
+    const auto& a = around[candidate.ends.a];
+    const auto& b = around[candidate.ends.b];
+    const auto common = std::ranges::count_if(
+        a, [&](std::size_t node) { return std::ranges::binary_search(b, node); });
+    const auto others = static_cast<double>(std::max(a.size(), b.size()) - 1);
+    candidate.joins_only = static_cast<double>(common) < least_common * others;
+  }
+}
+
+// The passages of the springs that may be kept.
+std::vector<Passage> passages_of(const std::vector<ViewId>& views, std::vector<Spring> springs,
+                                 double least_weight) {
   count_support(views.size(), springs);
   std::erase_if(springs, [&](const Spring& spring) {
     return (spring.weight < least_weight || !spring.one_part) && spring.support == 0;
   });
-  const bool by_phases =
-      std::ranges::any_of(springs, [](const Spring& spring) { return spring.motion.has_value(); });
-  std::vector<double> lengths;
-  for (const Spring& spring : springs) {
-    lengths.push_back(!by_phases ? spring.length : spring.motion ? length_of(*spring.motion) : 0.0);
-  }
-  const std::vector<double> spacings = spacings_around(views.size(), springs, lengths);
-  struct Candidate {
-    Passage passage;
-    NodePair ends;
-    double far;
-    bool joins_only;
-  };
-  std::vector<Candidate> candidates;
-  for (std::size_t i = 0; i < springs.size(); ++i) {
-    const Spring& spring = springs[i];
-    const double spacing = 0.5 * (spacings[spring.ends.a] + spacings[spring.ends.b]);
-    const bool given_up = spring.weight < least_weight || !spring.one_part;
-    Candidate candidate{{views[spring.ends.a], views[spring.ends.b], 0.0, spring.motion},
-                        spring.ends,
-                        unknown_length_share,
-                        false};
-    if (std::isfinite(spacing) && (lengths[i] > 0.0 || spring.motion)) {
-      candidate.far = candidate.passage.length = lengths[i] / spacing;
-    }
-    candidate.joins_only = candidate.far > (given_up ? most_spacings_of_given_up : most_spacings) ||
-                           (given_up && spring.support < enough_support);
-    if (spring.motion) {
-      candidate.passage.a_from_b->x_m /= spacing;
-      candidate.passage.a_from_b->y_m /= spacing;
-    }
-    candidates.push_back(candidate);
-  }
-  // The nearest first, so that far ones come when all near ones have joined what they can: these
-  // are left out where nearer ones lead there, too.
-  std::ranges::stable_sort(candidates, {}, &Candidate::far);
+  std::vector<Candidate> candidates = candidates_of(views, springs, least_weight);
+  doubt_lonely_passages(views.size(), candidates);
+  // Those in doubt last, and the nearest first: so they are left out where others lead there, too.
+  std::ranges::stable_sort(candidates, {}, [](const Candidate& candidate) {
+    return std::pair(candidate.joins_only, candidate.far);
+  });
   std::vector<std::size_t> group(views.size());
   std::iota(group.begin(), group.end(), std::size_t{0});
   const auto group_of = [&](std::size_t node) {

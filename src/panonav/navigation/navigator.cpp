@@ -99,7 +99,7 @@ void Navigator::set_goal(ViewId goal) {
   looks_in_vain_ = 0;
   closed_here_ = false;
   state_ = NavigationState::moving;
-  looks_ = unknown_looks_ = elsewhere_looks_ = obstruction_ = attempts_ = 0;
+  looks_ = unknown_looks_ = elsewhere_looks_ = obstruction_ = attempts_ = ways_sought_ = 0;
   plan_fields();
 }
 
@@ -296,10 +296,33 @@ void Navigator::try_again(NavigationDecision& decision, NavigationState otherwis
   }
   planner_.open_all();
   tries_.clear();
-  looks_in_vain_ = 0;
+  looks_in_vain_ = ways_sought_ = 0;
   closed_here_ = false;
   decision.events.push_back(NavigationEvent::reopened);
   plan_fields();
+}
+
+// From a place without a way the robot goes on as if it were at the most alike one that has a way:
+// the memory does not hold every way between neighbours. Not for ever, as there may be none.
+bool Navigator::find_way_from_here(const Seen& seen, NavigationDecision& decision) {
+  if (ways_sought_ >= options_.agreeing_looks) return false;
+  ++ways_sought_;
+  const SubAreas& areas = planner_.areas();
+  std::vector<std::uint8_t> has_way(planner_.graph().size());
+  for (std::size_t area = 0; area < areas.nodes.size(); ++area) {
+    const std::vector<Guide> field = planner_.field(area);
+    for (std::size_t place = 0; place < field.size(); ++place) {
+      has_way[areas.nodes[area][place]] = static_cast<std::uint8_t>(field[place].reachable());
+    }
+  }
+  const auto found = search_everywhere(*source_, planner_.graph(), areas, seen.signature,
+                                       [&](std::size_t node) { return has_way[node] != 0; });
+  decision.events.push_back(NavigationEvent::relocalised);
+  if (!found || found->difference > scale_.limit()) return false;
+  decision.difference = found->difference;
+  under_way_.reset();
+  enter(found->node, decision);
+  return true;
 }
 
 // What became of the step before, and whether the robot comes nearer to the goal.
@@ -531,7 +554,8 @@ NavigationDecision Navigator::look(const FourierSignature& view, const RobotRepo
   Seen seen{view, SeenView(view, full_scale_, needs_all_components() ? 0 : coarse_components_)};
   locate(seen, report, decision);
   if (state_ == NavigationState::moving) notice_obstacles(seen, report, decision);
-  if (state_ == NavigationState::moving && !guide().reachable()) {
+  if (state_ == NavigationState::moving && !guide().reachable() &&
+      !find_way_from_here(seen, decision)) {
     try_again(decision, NavigationState::unreachable);
     // Nothing was closed that could be opened.
     if (!guide().reachable()) state_ = NavigationState::unreachable;

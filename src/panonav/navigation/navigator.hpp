@@ -156,6 +156,7 @@ class Navigator {
   void count_try();
   void close_way(std::size_t passage, NavigationDecision& decision);
   void try_again(NavigationDecision& decision, NavigationState otherwise);
+  [[nodiscard]] bool find_way_from_here(const Seen& seen, NavigationDecision& decision);
   [[nodiscard]] const Guide& guide() const;
   void go_home(const Seen& seen, NavigationDecision& decision);
   [[nodiscard]] std::optional<double> way_back_rad(const SeenView& view);
@@ -200,6 +201,7 @@ class Navigator {
   bool obstructed_ = false;  // in the step before this look
   int obstruction_ = 0;  // grows by 2 with each step that fails, falls by 1 with each that does not
   int attempts_ = 0;
+  int ways_sought_ = 0;                     // from places without one, in this attempt
   double least_way_ = 0.0;                  // since the last plan
   int looks_in_vain_ = 0;                   // since the way became shorter or a passage was closed
   bool closed_here_ = false;                // a passage, and the robot was not far from there since
