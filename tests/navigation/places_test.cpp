@@ -158,7 +158,7 @@ Lattice exact_grid(std::size_t columns, std::size_t rows) {
   Lattice lattice;
   for (std::size_t i = 0; i < columns * rows; ++i) {
     lattice.nodes.push_back(
-        {.view = ViewId{i},
+        {.view = ViewId{static_cast<std::uint32_t>(i)},
          .pose = {static_cast<double>(i % columns), static_cast<double>(i / columns), 0.0}});
   }
   return lattice;
