@@ -485,8 +485,8 @@ std::vector<Candidate> candidates_of(const std::vector<ViewId>& views,
 // ways would be planned through it as through a hole in the wall.
 void doubt_lonely_passages(std::size_t views, std::vector<Candidate>& candidates) {
   // On an open square grid with passages up to two spacings nearest neighbours have half of theirs
-  // in common, views two spacings apart a quarter.
-  constexpr double least_common = 0.2;
+  // in common, views two spacings apart a quarter. One of these may be missing.
+  constexpr double least_common = 0.25;
   std::vector<std::vector<std::size_t>> around(views);
   for (const Candidate& candidate : candidates) {
     if (candidate.joins_only) continue;
@@ -501,7 +501,7 @@ void doubt_lonely_passages(std::size_t views, std::vector<Candidate>& candidates
     const auto common = std::ranges::count_if(
         a, [&](std::size_t node) { return std::ranges::binary_search(b, node); });
     const auto others = static_cast<double>(std::max(a.size(), b.size()) - 1);
-    candidate.joins_only = static_cast<double>(common) < least_common * others;
+    candidate.joins_only = static_cast<double>(common + 1) < least_common * others;
   }
 }
 

@@ -103,12 +103,12 @@ inline constexpr double most_disagreement_rad = 0.78539816339744831;
 
 /// A passage for each spring that kept `least_weight` of itself and is no longer than two spacings
 /// of the references around, or that three third views confirm though the arrangement gave it up
-/// (one and a half spacings), if its ends have a fifth of their passages' ends in common: others
-/// lead to places that look alike. Of those that are left out thereby, the ones without which parts
-/// of the lattice would not be joined. Directions and turns follow from the phases of the two
-/// views, so that the distortion of the arrangement bends none of them. Lengths, in spacings of the
-/// references around, are those of the arrangement, and of the phases where it gave the spring up.
-/// Cost: the springs times those of a view.
+/// (one and a half spacings), if its ends have about a quarter of their neighbours in common:
+/// others lead to places that look alike. Of those that are left out thereby, the ones without
+/// which parts of the lattice would not be joined. Directions and turns follow from the phases of
+/// the two views, so that the distortion of the arrangement bends none of them. Lengths, in
+/// spacings of the references around, are those of the arrangement, and of the phases where it gave
+/// the spring up. Cost: the springs times those of a view.
 [[nodiscard]] NavigationGraph navigation_graph(const Lattice& lattice, double least_weight = 0.1);
 
 /// The same of a lattice that was stored as a map (`map_of`): the phases are read anew from the
