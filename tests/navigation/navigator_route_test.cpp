@@ -23,7 +23,7 @@ using test::SimulatedRobot;
 using test::two_rooms;
 using test::WalledWorld;
 constexpr double spacing_m = 0.4;
-constexpr double reach_m = 0.4;
+constexpr double beside_m = 0.4;
 
 // Two rooms, a grid of views in them, and a route from one into the other.
 struct World {
@@ -42,7 +42,7 @@ struct World {
     for (const ViewId view : remembered.memory.views()) {
       views.push_back({view, remembered.pose_of(view)});
     }
-    routes.push_back(known_route(route, views, {.reach_m = reach_m}));
+    routes.push_back(known_route(route, views, {.beside_m = beside_m}));
   }
   [[nodiscard]] Navigator navigator() const {
     Executor executor(1);
@@ -138,7 +138,7 @@ TEST(NavigatorOnARoute, RepeatsItTowardsGoalsAtBothEndsAndArrives) {
       EXPECT_NE(describe(decision).find("along a route"), std::string::npos);
       // From the first half metre on it is on the way that was driven.
       const double off_m = world().off_m(run.path[i].position());
-      EXPECT_LT(off_m, looks > 3 ? 0.1 : reach_m) << "look " << i + 1;
+      EXPECT_LT(off_m, looks > 3 ? 0.1 : beside_m) << "look " << i + 1;
     }
   }
 }
@@ -165,7 +165,7 @@ TEST(NavigatorOnARoute, ARobotThatIsCarriedAwayLeavesItAndArrives) {
   navigator.set_routes(world().routes);
   const ViewId goal = world().view_at(world().path.back().position());
   const Pose2 carried{1.0, 3.4, 0.5};
-  ASSERT_GT(world().off_m(carried.position()), 2.0 * reach_m);
+  ASSERT_GT(world().off_m(carried.position()), 2.0 * beside_m);
   const Drive run = drive(navigator, goal, world().path.front(), 5, {.carried_to = carried});
   const auto left = run.look_of(NavigationEvent::route_left);
   ASSERT_TRUE(left.has_value());

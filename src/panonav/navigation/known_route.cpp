@@ -39,12 +39,12 @@ std::optional<RouteStretch> follow_way(const KnownRoute& route, double start_m, 
 }  // namespace
 
 void visit_options(KnownRouteOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "reach_m",
+  visitor.visit({.name = "beside_m",
                  .help = "references and robots lie no farther beside a route",
                  .low = 0,
                  .high = 100,
                  .low_open = true},
-                options.reach_m);
+                options.beside_m);
   visit_options(options.tracker, visitor);
   visit_options(options.fit, visitor);
 }
@@ -58,7 +58,7 @@ std::span<const double> KnownRoute::along_m(ViewId view) const {
 KnownRoute known_route(const RoutePanorama& route, std::span<const RouteView> views,
                        const KnownRouteOptions& options) {
   validate(options);
-  KnownRoute known{RouteTracker(route, options.tracker, options.fit), {}, options.reach_m};
+  KnownRoute known{RouteTracker(route, options.tracker, options.fit), {}, options.beside_m};
   for (const RouteView& placed : views) {
     if (!std::isfinite(placed.pose.x_m) || !std::isfinite(placed.pose.y_m)) {
       throw ContractError("place of view " + std::to_string(placed.view.value), "not finite",
@@ -66,7 +66,7 @@ KnownRoute known_route(const RoutePanorama& route, std::span<const RouteView> vi
     }
     KnownRoute::Reference reference{placed.view, {}};
     for (const RoutePlace& place :
-         places_on_route(route.poses(), placed.pose.position(), options.reach_m)) {
+         places_on_route(route.poses(), placed.pose.position(), options.beside_m)) {
       reference.along_m.push_back(place.along_m);
     }
     if (!reference.along_m.empty()) known.references.push_back(std::move(reference));

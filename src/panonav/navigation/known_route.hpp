@@ -15,7 +15,7 @@ namespace panonav {
 struct KnownRouteOptions {
   /// References and robots lie no farther beside the route. A search tries places up to 0.5 m
   /// beside it; a robot at a reference may be a little farther off than that.
-  double reach_m = 0.4;
+  double beside_m = 0.4;
   RouteTrackerOptions tracker;
   RouteFitOptions fit;
 };
@@ -38,7 +38,7 @@ struct KnownRoute {
   };
   RouteTracker tracker;
   std::vector<Reference> references;  ///< on the route, ascending by view
-  double reach_m = 0.0;
+  double beside_m = 0.0;
 
   /// Where the view lies along the route; empty when it does not.
   [[nodiscard]] std::span<const double> along_m(ViewId view) const;

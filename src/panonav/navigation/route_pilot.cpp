@@ -31,7 +31,7 @@ bool RoutePilot::begin(std::span<const ViewId> way, std::span<const float> line,
   // Line and view must agree on the place, which the route may pass several times.
   const auto path = route.tracker.lines().poses();
   std::vector<double> starts_m;
-  for (const RoutePlace& place : places_on_route(path, fix->fix.pose.position(), route.reach_m)) {
+  for (const RoutePlace& place : places_on_route(path, fix->fix.pose.position(), route.beside_m)) {
     const auto agrees = [&](double along_m) {
       return std::abs(along_m - place.along_m) <= shortest_m;
     };
@@ -62,7 +62,7 @@ void RoutePilot::track(std::span<const float> line, const Pose2& moved) {
   take_aim();
   // A place of the route that is not on the leg is of no use.
   known &=
-      distance(tracker.pose()->position(), leg_->follower.place()) <= routes_[leg_->route].reach_m;
+      distance(tracker.pose()->position(), leg_->follower.place()) <= routes_[leg_->route].beside_m;
   leg_->unknown_looks = known ? 0 : leg_->unknown_looks + 1;
 }
 
