@@ -209,9 +209,11 @@ void Navigator::accept(const Located& located, NavigationDecision& decision) {
 }
 
 void Navigator::locate(Seen& seen, const RobotReport& report, NavigationDecision& decision) {
-  if (report.estimate) {
-    const auto estimated = planner_.graph().node_of(*report.estimate);
-    if (estimated) enter(*estimated, decision);
+  std::optional<ViewId> told = report.estimate;
+  if (!told && pilot_.drives() && pilot_.unknown_looks() == 0) told = pilot_.place();
+  if (told) {
+    const auto node = planner_.graph().node_of(*told);
+    if (node) enter(*node, decision);
   }
   if (!node_) {
     relocalise(seen, decision);
@@ -547,16 +549,13 @@ void Navigator::begin_leg(const RobotReport& report, NavigationDecision& decisio
 bool Navigator::go_along_route(const RobotReport& report, NavigationDecision& decision) {
   if (!pilot_.drives()) {
     begin_leg(report, decision);
-  } else {
-    pilot_.track(report.line, report.moved);
-    if (pilot_.unknown_looks() >= options_.agreeing_looks ||
-        obstruction_ >= 2 * options_.agreeing_looks || looks_in_vain_ > patience()) {
-      pilot_.give_up();
-      decision.events.push_back(NavigationEvent::route_left);
-      // The way by views has not been tried here.
-      tries_.clear();
-      obstruction_ = looks_in_vain_ = 0;
-    }
+  } else if (pilot_.unknown_looks() >= options_.agreeing_looks ||
+             obstruction_ >= 2 * options_.agreeing_looks || looks_in_vain_ > patience()) {
+    pilot_.give_up();
+    decision.events.push_back(NavigationEvent::route_left);
+    // The way by views has not been tried here.
+    tries_.clear();
+    obstruction_ = looks_in_vain_ = 0;
   }
   if (!pilot_.drives()) return false;
   const auto aim = pilot_.aim();
@@ -583,6 +582,7 @@ NavigationDecision Navigator::look(const FourierSignature& view, const RobotRepo
     return decision;
   }
   const std::uint64_t bytes_before = views_.bytes_read();
+  if (pilot_.drives()) pilot_.track(report.line, report.moved);
   Seen seen{view, SeenView(view, full_scale_, needs_all_components() ? 0 : coarse_components_)};
   locate(seen, report, decision);
   if (state_ == NavigationState::moving) notice_obstacles(seen, report, decision);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -40,6 +41,7 @@ bool RoutePilot::begin(std::span<const ViewId> way, std::span<const float> line,
   const auto stretch = stretch_along(route, starts_m, way);
   if (!stretch || stretch->length_m() < shortest_m) return false;
   leg_.emplace(Leg{chosen,
+                   *stretch,
                    route.tracker,
                    PathFollower(stretch_of_route(path, stretch->from_m, stretch->to_m)),
                    way[stretch->last],
@@ -64,6 +66,20 @@ void RoutePilot::track(std::span<const float> line, const Pose2& moved) {
   known &=
       distance(tracker.pose()->position(), leg_->follower.place()) <= routes_[leg_->route].beside_m;
   leg_->unknown_looks = known ? 0 : leg_->unknown_looks + 1;
+}
+
+ViewId RoutePilot::place() const {
+  const RouteStretch& stretch = leg_->stretch;
+  const double driven_m = leg_->follower.along_m();
+  const double along_m = stretch.from_m + (stretch.to_m < stretch.from_m ? -driven_m : driven_m);
+  const auto off_m = [&](const KnownRoute::Reference& reference) {
+    double least_m = std::numeric_limits<double>::infinity();
+    for (const double there_m : reference.along_m) {
+      least_m = std::min(least_m, std::abs(there_m - along_m));
+    }
+    return least_m;
+  };
+  return std::ranges::min_element(routes_[leg_->route].references, {}, off_m)->view;
 }
 
 void RoutePilot::take_aim() {

@@ -41,6 +41,8 @@ class RoutePilot {
   [[nodiscard]] const std::optional<Point2>& aim() const { return leg_->aim; }
   /// The reference to which it leads.
   [[nodiscard]] ViewId end() const { return leg_->end; }
+  /// The reference beside which the robot is, as far as line and motion tell.
+  [[nodiscard]] ViewId place() const;
   /// Looks one after the other that did not tell a place on the leg.
   [[nodiscard]] int unknown_looks() const { return leg_->unknown_looks; }
 
@@ -53,6 +55,7 @@ class RoutePilot {
  private:
   struct Leg {
     std::size_t route;
+    RouteStretch stretch;
     RouteTracker tracker;
     PathFollower follower;
     ViewId end;
