@@ -122,10 +122,10 @@ KnownRoute route_among_views(const MemoryFile& file, const std::string& name,
   }
   KnownRoute known = known_route(*route, views, options);
   if (known.references.empty()) {
-    throw FileError(path, "none of the " + std::to_string(views.size()) +
-                              " views with a pose lies within " + short_number(options.beside_m) +
-                              " m of the route '" + name +
-                              "'; allowed: views and a route in one frame, or a larger --route-beside-m");
+    throw FileError(
+        path, "none of the " + std::to_string(views.size()) + " views with a pose lies within " +
+                  short_number(options.beside_m) + " m of the route '" + name +
+                  "'; allowed: views and a route in one frame, or a larger --route-beside-m");
   }
   return known;
 }

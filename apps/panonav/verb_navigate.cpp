@@ -331,13 +331,16 @@ Verb navigate_verb() {
   return {"navigate", "Send a simulated robot to a remembered view, by what it sees alone",
           "The robot sees as the memory's views were seen. Poses in the memory only say how far "
           "from the\n"
-          "goal it ended. Ends with 1 unless it arrives: blocked, lost or unreachable.",
+          "goal it ended, and which views lie beside a --route. Ends with 1 unless it arrives: "
+          "blocked, lost or\n"
+          "unreachable.",
           "  panonav simulate office memory_run --grid 0.5 && panonav memorise memory_run "
           "office.panonav\n"
           "  panonav navigate office.panonav --goal view_00012.png --scene office --picture "
           "way.png\n"
           "  panonav navigate office.panonav --goal 3 --scene office --light 0.7 --moved-objects "
-          "0.1 --json",
+          "0.1 --json\n"
+          "  panonav navigate drive.panonav --goal 60 --scene loop --route route",
           declare};
 }
 

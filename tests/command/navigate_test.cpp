@@ -30,6 +30,10 @@ class Navigate : public ::testing::Test {
     bare = *folder / "bare.panonav";
     std::filesystem::copy_file(memory, bare);
     run_well({"arrange", memory});
+    // Row by row of the grid.
+    with_route = *folder / "with_route.panonav";
+    std::filesystem::copy_file(memory, with_route);
+    run_well({"route", "record", *folder / "run", with_route, "--name", "rows"});
   }
   static void TearDownTestSuite() { folder.reset(); }
   static void run_well(const std::vector<std::string>& arguments) {
@@ -70,6 +74,7 @@ class Navigate : public ::testing::Test {
   inline static std::unique_ptr<TemporaryFolder> folder;
   inline static std::string memory;
   inline static std::string bare;
+  inline static std::string with_route;
 };
 
 TEST_F(Navigate, ArrivesAndTellsEachLook) {
@@ -103,11 +108,31 @@ TEST_F(Navigate, ArrivesAndTellsEachLook) {
 }
 
 TEST_F(Navigate, SameSeedSameRunOnAnyNumberOfThreads) {
-  const auto once = run_panonav(there(memory, {"--json", "--threads", "1"}));
-  const auto again = run_panonav(there(memory, {"--json", "--threads", "2"}));
+  const auto once = run_panonav(there(with_route, {"--json", "--threads", "1", "--route", "rows"}));
+  const auto again =
+      run_panonav(there(with_route, {"--json", "--threads", "2", "--route", "rows"}));
   ASSERT_FALSE(once.out.empty()) << once.err;
   EXPECT_EQ(once.out, again.out);
   EXPECT_GT(lines(once.out).size(), 5U);
+  EXPECT_NE(once.out.find("\"on_route\":true"), std::string::npos);
+  EXPECT_EQ(objects(once.out).back()["route"], "rows");
+}
+
+TEST_F(Navigate, RefusesARouteOnWhichItKnowsNoView) {
+  {
+    auto file = MemoryFile::open(with_route, Access::read_write);
+    RoutePanorama far;
+    const std::vector<float> line(360, 0.5F);
+    for (const double x_m : {500.0, 501.0}) far.append({x_m, 500.0, 0.0}, line);
+    ASSERT_EQ(file.append_route("far", far), 2U);
+    ASSERT_EQ(file.append_route("adrift", far), 2U);
+    file.set_parameter("route.adrift", "half_band_rad 0.0131 odometry");
+  }
+  EXPECT_NE(refusal(there(with_route, {"--route", "far"})).find("within 0.4 m of the route 'far'"),
+            std::string::npos);
+  EXPECT_NE(refusal(there(with_route, {"--route", "adrift"})).find("odometry"), std::string::npos);
+  EXPECT_NE(refusal(there(with_route, {"--route", "none"})).find("adrift, far, rows"),
+            std::string::npos);
 }
 
 TEST_F(Navigate, ArrangesViewsThatNothingConnects) {

@@ -209,8 +209,9 @@ void Navigator::accept(const Located& located, NavigationDecision& decision) {
 }
 
 void Navigator::locate(Seen& seen, const RobotReport& report, NavigationDecision& decision) {
+  const bool line_tells = pilot_.drives() && pilot_.unknown_looks() == 0;
   std::optional<ViewId> told = report.estimate;
-  if (!told && pilot_.drives() && pilot_.unknown_looks() == 0) told = pilot_.place();
+  if (!told && line_tells) told = pilot_.place();
   if (told) {
     const auto node = planner_.graph().node_of(*told);
     if (node) enter(*node, decision);
@@ -232,9 +233,9 @@ void Navigator::locate(Seen& seen, const RobotReport& report, NavigationDecision
         decision.difference <= limit(seen.view) && guide().way < under_way_->guide.way;
     if (beyond || --under_way_->looks_left < 0) under_way_.reset();
   }
-  // Between references that stand far apart no place looks right; along a route the lines tell.
+  // Between references that stand far apart no place looks right.
   const bool looks_right = decision.difference <= limit(seen.view);
-  if (looks_right || under_way_ || pilot_.drives()) {
+  if (looks_right || under_way_ || line_tells) {
     unknown_looks_ = 0;
     if (looks_right && !under_way_) known_node_ = node_;
     return;
