@@ -97,6 +97,39 @@ Remembered remember(const MemoryFile& file, std::optional<GraphOrigin> wanted, E
   return {{std::move(memory), std::move(*graph), std::move(truth), spacing_m}, origin};
 }
 
+KnownRoute route_among_views(const MemoryFile& file, const std::string& name,
+                             const VisualMemory& memory, const KnownRouteOptions& options) {
+  const std::string path = file.path().string();
+  const auto route = file.route(name);
+  if (!route) {
+    std::string all;
+    for (const auto& known : file.route_names()) all += (all.empty() ? "" : ", ") + known;
+    throw FileError(path, "holds no route '" + name + "'; allowed for --route: " +
+                              (all.empty() ? "none, as panonav route record made none" : all));
+  }
+  if (route->size() < 2) {
+    throw FileError(path, "route '" + name + "' has 1 line; allowed: 2 or more");
+  }
+  if (route_source(file, name, route->columns()).from_odometry) {
+    throw FileError(path, "route '" + name +
+                              "' is in the frame of its odometry, where no view is known to lie; "
+                              "allowed: one recorded with the poses of a data set");
+  }
+  std::vector<RouteView> views;
+  for (const ViewId view : memory.views()) {
+    const auto& pose = memory.info(view).pose;
+    if (pose) views.push_back({view, {pose->x_m, pose->y_m, pose->heading_rad.value_or(0.0)}});
+  }
+  KnownRoute known = known_route(*route, views, options);
+  if (known.references.empty()) {
+    throw FileError(
+        path, "none of the " + std::to_string(views.size()) + " views with a pose lies within " +
+                  short_number(options.beside_m) + " m of the route '" + name +
+                  "'; allowed: views and a route in one frame, or a larger --route-beside-m");
+  }
+  return known;
+}
+
 std::function<FourierSignature(const Pose2& pose, std::uint64_t seed)> sight_through(
     std::shared_ptr<const Renderer> renderer, const RecordingCamera& camera,
     const FrameOptions& frame, const SensorOptions& sensor,
@@ -112,6 +145,7 @@ std::function<FourierSignature(const Pose2& pose, std::uint64_t seed)> sight_thr
 
 MissionPlace place_as_remembered(
     const std::string& scene, SimulationArguments wanted, const MemoryFile& memory,
+    const std::optional<RouteSource>& route,
     const std::function<bool(const std::string&, const std::string&)>& given, Session& session) {
   const MemoryHeader& header = memory.header();
   const bool mirror = header.source.kind == PictureKind::mirror;
@@ -132,12 +166,21 @@ MissionPlace place_as_remembered(
   const SimulatedWorld world(scene, wanted, given, session.executor());
   for (const auto& warning : world.scene().warnings) session.note("warning: " + warning);
   const RecordingCamera camera = mirror ? RecordingCamera(*header.source.camera) : world.camera();
-  const auto pipeline =
-      std::make_shared<const MemoryPipeline>(header, mirror ? header.source : world.source());
+  const PictureSource source = mirror ? header.source : world.source();
+  const auto pipeline = std::make_shared<const MemoryPipeline>(header, source);
   MissionPlace place = world.place();
   const SimulationArguments& settled = world.arguments();
   place.sight = sight_through(place.renderer, camera, settled.frame, settled.sensor, pipeline,
                               &session.executor());
+  if (route) {
+    place.line = [renderer = place.renderer, camera, frame = settled.frame, sensor = settled.sensor,
+                  reader = std::make_shared<LineReader>(source, *route),
+                  &session](const Pose2& pose, std::uint64_t seed) {
+      const Image picture =
+          take_picture(*renderer, pose, camera, frame, sensor, seed, session.executor());
+      return reader->convert(picture.view());
+    };
+  }
   return place;
 }
 

@@ -10,6 +10,7 @@
 #include "memory_pipeline.hpp"
 #include "panonav/evaluation/mission.hpp"
 #include "panonav/storage/memory_file.hpp"
+#include "route_reading.hpp"
 #include "session.hpp"
 #include "simulated_recording.hpp"
 
@@ -37,6 +38,13 @@ struct Remembered {
 [[nodiscard]] Remembered remember(const MemoryFile& file, std::optional<GraphOrigin> wanted,
                                   Executor& executor);
 
+/// The route `name` of a memory file with those of the views that lie beside it, by their poses:
+/// both must have been recorded with the poses of one data set. Throws FileError when there is no
+/// such route, it is in the frame of odometry, or none of the views lies beside it.
+[[nodiscard]] KnownRoute route_among_views(const MemoryFile& file, const std::string& name,
+                                           const VisualMemory& memory,
+                                           const KnownRouteOptions& options);
+
 /// What a robot sees through a simulated camera, as the memory compares it: to be a
 /// `MissionPlace::sight`. `executor` empty: each picture is made by the thread that asks, so that
 /// any number of them may; else it must outlive the answer and one thread may ask.
@@ -47,10 +55,12 @@ struct Remembered {
 
 /// A robot in a simulated world that sees as the memory's views were seen: by the camera, size and
 /// preprocessing of its header. `wanted.simulation` says what differs in the scene, the rest of it
-/// is the header's. Throws FileError when the memory does not know which elevations its rows show;
-/// else as `SimulatedWorld`. `executor` must outlive the place.
+/// is the header's. `route`: it takes lines from these pictures, too, as that route's were taken.
+/// Throws FileError when the memory does not know which elevations its rows show; else as
+/// `SimulatedWorld`. `session` must outlive the place.
 [[nodiscard]] MissionPlace place_as_remembered(
     const std::string& scene, SimulationArguments wanted, const MemoryFile& memory,
+    const std::optional<RouteSource>& route,
     const std::function<bool(const std::string&, const std::string&)>& given, Session& session);
 
 }  // namespace panonav::command

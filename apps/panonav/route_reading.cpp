@@ -82,22 +82,26 @@ LineReader::LineReader(const PictureSource& pictures, const RouteSource& route)
 std::vector<float> LineReader::read(const std::filesystem::path& picture) const {
   const Panorama panorama = reader_.read(picture);
   try {
-    if (!route_.horizon_rows) return horizon_line(panorama, route_.line);
-    const auto [first, last] = *route_.horizon_rows;
-    if (last >= panorama.rows()) {
-      throw ContractError("last of --horizon-rows", last,
-                          "0 to " + std::to_string(panorama.rows() - 1));
-    }
-    const auto columns = static_cast<std::size_t>(panorama.columns());
-    const auto values =
-        panorama.values().subspan(static_cast<std::size_t>(first) * columns,
-                                  static_cast<std::size_t>(last - first + 1) * columns);
-    return horizon_line({last - first + 1, panorama.columns(), std::nullopt,
-                         std::vector<float>(values.begin(), values.end())},
-                        route_.line);
+    return line_of(panorama);
   } catch (const ContractError& error) {
     throw FileError(picture.string(), error.what());
   }
+}
+
+std::vector<float> LineReader::line_of(const Panorama& panorama) const {
+  if (!route_.horizon_rows) return horizon_line(panorama, route_.line);
+  const auto [first, last] = *route_.horizon_rows;
+  if (last >= panorama.rows()) {
+    throw ContractError("last of --horizon-rows", last,
+                        "0 to " + std::to_string(panorama.rows() - 1));
+  }
+  const auto columns = static_cast<std::size_t>(panorama.columns());
+  const auto values =
+      panorama.values().subspan(static_cast<std::size_t>(first) * columns,
+                                static_cast<std::size_t>(last - first + 1) * columns);
+  return horizon_line({last - first + 1, panorama.columns(), std::nullopt,
+                       std::vector<float>(values.begin(), values.end())},
+                      route_.line);
 }
 
 std::string route_named(const MemoryFile& memory, const std::optional<std::string>& name) {

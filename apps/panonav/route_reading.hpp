@@ -38,8 +38,14 @@ class LineReader {
   LineReader(const PictureSource& pictures, const RouteSource& route);
   /// Throws FileError on a picture that cannot be read or does not show the horizon.
   [[nodiscard]] std::vector<float> read(const std::filesystem::path& picture) const;
+  /// The same of a picture that is not in a file. Throws ContractError.
+  [[nodiscard]] std::vector<float> convert(ImageView picture) const {
+    return line_of(reader_.convert(picture));
+  }
 
  private:
+  [[nodiscard]] std::vector<float> line_of(const Panorama& panorama) const;
+
   RouteSource route_;
   PanoramaReader reader_;
 };

@@ -29,10 +29,12 @@ struct NavigateArguments {
   std::optional<std::string> start;
   std::optional<std::string> kidnap;
   std::optional<std::string> passages;
+  std::optional<std::string> route;
   std::optional<std::string> log;
   std::optional<std::string> picture;
   SimulationArguments simulation;
   MissionOptions mission;
+  KnownRouteOptions known_route;
 };
 
 /// "X,Y,HEADING_DEG".
@@ -86,6 +88,7 @@ ordered_json as_json(const NavigationDecision& decision, const Pose2& pose,
           {"direction_rad", decision.direction_rad},
           {"advance_m", decision.advance_m},
           {"homing", decision.homing},
+          {"on_route", decision.on_route},
           {"nearest", file_or_null(decision.nearest, memory)},
           {"next", file_or_null(decision.next, memory)},
           {"area", decision.area},
@@ -117,6 +120,10 @@ std::string in_words(NavigationEvent event) {
       return "goes home to the goal's view";
     case NavigationEvent::homing_failed:
       return "came home to another place";
+    case NavigationEvent::route:
+      return "follows the recorded route";
+    case NavigationEvent::route_left:
+      return "leaves the recorded route before the end of its leg";
   }
   return std::string(name_of(event));
 }
@@ -158,6 +165,7 @@ ordered_json summary_json(const NavigateArguments& wanted, const Remembered& rem
       {"goal", goal},
       {"scene", wanted.scene},
       {"passages_from", name_of(remembered.origin)},
+      {"route", wanted.route ? ordered_json(*wanted.route) : ordered_json()},
       {"views", graph.size()},
       {"passages", graph.passages().size()},
       {"areas", planner.areas().nodes.size()},
@@ -233,13 +241,20 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
   const MemoryFileViews source(wanted.memory);
   std::optional<GraphOrigin> origin;
   if (wanted.passages) origin = graph_origin(*wanted.passages);
-  const Remembered remembered = remember(source.file(), origin, session.executor());
+  Remembered remembered = remember(source.file(), origin, session.executor());
   const VisualMemory& memory = remembered.place.memory;
   const ViewId goal = named_view(memory, wanted.goal, wanted.memory);
   const std::string goal_file = file_of(goal, memory);
   check_goal(wanted, remembered.place, goal, goal_file);
+  std::optional<RouteSource> route;
+  if (wanted.route) {
+    remembered.place.routes.push_back(
+        route_among_views(source.file(), *wanted.route, memory, wanted.known_route));
+    const int columns = remembered.place.routes.front().tracker.lines().columns();
+    route = route_source(source.file(), *wanted.route, columns);
+  }
   const MissionPlace place =
-      place_as_remembered(wanted.scene, wanted.simulation, source.file(), given, session);
+      place_as_remembered(wanted.scene, wanted.simulation, source.file(), route, given, session);
   const auto seed = static_cast<std::uint64_t>(wanted.simulation.simulation.scene.seed);
   const Mission mission = mission_of(wanted, goal, place, seed);
   if (!session.json()) {
@@ -251,6 +266,7 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
   }
   Navigator navigator(source, AreaPlanner(remembered.place.graph, wanted.mission.planner),
                       wanted.mission.navigator);
+  navigator.set_routes(remembered.place.routes);
   const MissionRun run =
       run_mission(place, remembered.place, navigator, mission, wanted.mission, seed,
                   [&](const NavigationDecision& decision, const Pose2& pose) {
@@ -290,6 +306,9 @@ Run declare(Arguments& arguments) {
   arguments.choice("--passages", wanted->passages, {"map", "lattice", "links", "arrangement"},
                    "What to plan over: a stored map, the memory's links, or an arrangement made "
                    "now (default: the first that is there)");
+  arguments.option("--route", wanted->route,
+                   "Go along this recorded route of the memory where the way leads along it; views "
+                   "and route have the poses of one data set");
   arguments.option("--log", wanted->log, "Write each decision as a line of text into this file");
   arguments.option("--picture", wanted->picture,
                    "Draw the directions to the goal, the way planned and the way driven into this "
@@ -297,6 +316,7 @@ Run declare(Arguments& arguments) {
   arguments.options("simulation", wanted->simulation.simulation.scene);
   arguments.options("navigator", wanted->mission.navigator);
   arguments.options("planner", wanted->mission.planner);
+  arguments.options("known_route", wanted->known_route, "route");
   arguments.options("base", wanted->mission.base);
   arguments.options("odometry", wanted->mission.motion, "odometry");
   arguments.options("frame", wanted->simulation.frame);
@@ -311,13 +331,16 @@ Verb navigate_verb() {
   return {"navigate", "Send a simulated robot to a remembered view, by what it sees alone",
           "The robot sees as the memory's views were seen. Poses in the memory only say how far "
           "from the\n"
-          "goal it ended. Ends with 1 unless it arrives: blocked, lost or unreachable.",
+          "goal it ended, and which views lie beside a --route. Ends with 1 unless it arrives: "
+          "blocked, lost or\n"
+          "unreachable.",
           "  panonav simulate office memory_run --grid 0.5 && panonav memorise memory_run "
           "office.panonav\n"
           "  panonav navigate office.panonav --goal view_00012.png --scene office --picture "
           "way.png\n"
           "  panonav navigate office.panonav --goal 3 --scene office --light 0.7 --moved-objects "
-          "0.1 --json",
+          "0.1 --json\n"
+          "  panonav navigate drive.panonav --goal 60 --scene loop --route route",
           declare};
 }
 

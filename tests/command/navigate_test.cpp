@@ -30,6 +30,10 @@ class Navigate : public ::testing::Test {
     bare = *folder / "bare.panonav";
     std::filesystem::copy_file(memory, bare);
     run_well({"arrange", memory});
+    // Row by row of the grid.
+    with_route = *folder / "with_route.panonav";
+    std::filesystem::copy_file(memory, with_route);
+    run_well({"route", "record", *folder / "run", with_route, "--name", "rows"});
   }
   static void TearDownTestSuite() { folder.reset(); }
   static void run_well(const std::vector<std::string>& arguments) {
@@ -70,22 +74,28 @@ class Navigate : public ::testing::Test {
   inline static std::unique_ptr<TemporaryFolder> folder;
   inline static std::string memory;
   inline static std::string bare;
+  inline static std::string with_route;
 };
 
 TEST_F(Navigate, ArrivesAndTellsEachLook) {
-  const auto result = run_panonav(
-      there(memory, {"--json", "--log", *folder / "run.log", "--picture", *folder / "run.png"}));
+  const auto result =
+      run_panonav(there(with_route, {"--json", "--log", *folder / "run.log", "--picture",
+                                     *folder / "run.png", "--route", "rows"}));
   ASSERT_EQ(result.exit_code, 0) << result.err << result.out;
   const auto told = objects(result.out);
   ASSERT_GT(told.size(), 5U);
+  int on_route = 0;
   for (std::size_t i = 0; i + 1 < told.size(); ++i) {
     EXPECT_EQ(told[i]["look"], i + 1);
     EXPECT_EQ(told[i]["state"], i + 2 < told.size() ? "moving" : "arrived");
     EXPECT_TRUE(told[i]["nearest"].is_string());
+    on_route += told[i]["on_route"].get<bool>() ? 1 : 0;
   }
+  EXPECT_GT(on_route, 0);
   const json& summary = told.back();
   EXPECT_EQ(summary["end"], "arrived");
   EXPECT_EQ(summary["passages_from"], "lattice");
+  EXPECT_EQ(summary["route"], "rows");
   EXPECT_EQ(summary["looks"], told.size() - 1);
   EXPECT_LT(summary["goal_distance_m"], 0.5 * spacing_m);
   EXPECT_GT(summary["shortest_m"], 4.0 * spacing_m);
@@ -175,6 +185,22 @@ TEST_F(Navigate, RefusesInOneLine) {
   wrong = ask(bare, view_near({0.0, 0.0}));
   wrong.insert(wrong.end(), {"--passages", "links"});
   EXPECT_NE(refusal(wrong).find("links"), std::string::npos);
+
+  // Routes beside which no view is known to lie, and none.
+  {
+    auto file = MemoryFile::open(with_route, Access::read_write);
+    RoutePanorama far;
+    const std::vector<float> line(360, 0.5F);
+    for (const double x_m : {500.0, 501.0}) far.append({x_m, 500.0, 0.0}, line);
+    ASSERT_EQ(file.append_route("far", far), 2U);
+    ASSERT_EQ(file.append_route("adrift", far), 2U);
+    file.set_parameter("route.adrift", "half_band_rad 0.0131 odometry");
+  }
+  EXPECT_NE(refusal(there(with_route, {"--route", "far"})).find("within 0.4 m of the route 'far'"),
+            std::string::npos);
+  EXPECT_NE(refusal(there(with_route, {"--route", "adrift"})).find("odometry"), std::string::npos);
+  EXPECT_NE(refusal(there(with_route, {"--route", "none"})).find("adrift, far, rows"),
+            std::string::npos);
 
   const std::string empty = *folder / "empty.panonav";
   static_cast<void>(

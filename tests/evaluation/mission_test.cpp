@@ -110,6 +110,8 @@ TEST(Missions, ATourGoesOnFromGoalToGoalAmongPeople) {
     }
   }
   const RememberedPlace remembered = remember_drive(place, way, {}, 5, executor);
+  // Without a camera for lines there is no route.
+  EXPECT_TRUE(remembered.routes.empty());
   // Monte-Carlo localisation asks for poses.
   ASSERT_TRUE(remembered.memory.info(remembered.graph.view(0)).pose.has_value());
   const MemoryViewSource source(remembered.memory);
@@ -132,6 +134,40 @@ TEST(Missions, ATourGoesOnFromGoalToGoalAmongPeople) {
     }
     EXPECT_GE(arrived, 2) << monte_carlo;
   }
+}
+
+TEST(Missions, ADriveWithLinesRecordsARouteThatIsRepeated) {
+  Executor executor(2);
+  MissionPlace place = make_mission_place(make_scene("loop", {.seed = 74}), executor);
+  const Point2 from = place.scene.tour[0];
+  const Point2 to = place.scene.tour[1];
+  std::vector<Pose2> way;
+  for (double along_m = 0.0; along_m < 3.0; along_m += 0.25) {
+    const double share = along_m / distance(from, to);
+    way.push_back({from.x_m + share * (to.x_m - from.x_m), from.y_m + share * (to.y_m - from.y_m),
+                   std::atan2(to.y_m - from.y_m, to.x_m - from.x_m)});
+  }
+  place.line = mirror_lines(place);
+  const RememberedPlace remembered = remember_drive(place, way, {}, 5, executor);
+  ASSERT_EQ(remembered.routes.size(), 1U);
+  const KnownRoute& route = remembered.routes.front();
+  // Each view lies on the route where the drive had come to then.
+  ASSERT_EQ(route.references.size(), way.size());
+  double along_m = 0.0;
+  for (std::size_t i = 0; i < way.size(); ++i) {
+    const auto& here = remembered.memory.info(remembered.graph.view(i)).pose;
+    ASSERT_TRUE(here.has_value());
+    if (i > 0) {
+      const auto& before = remembered.memory.info(remembered.graph.view(i - 1)).pose;
+      along_m += distance(before->position(), here->position());
+    }
+    EXPECT_NEAR(route.along_m(remembered.graph.view(i)).front(), along_m, 1e-6);
+  }
+  const Mission mission{remembered.graph.view(way.size() - 1), way.front(), {}};
+  const auto run = run_missions(place, remembered, {mission}, {}, 3, executor).front();
+  EXPECT_TRUE(run.arrives(0.125));
+  const auto on_route = std::ranges::count(run.decisions, true, &NavigationDecision::on_route);
+  EXPECT_GT(2 * static_cast<std::size_t>(on_route), run.decisions.size());
 }
 
 TEST(Missions, RefuseWhatMakesNoSense) {

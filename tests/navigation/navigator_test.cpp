@@ -403,6 +403,8 @@ TEST(Navigator, RefusesWhatItCannotDo) {
   EXPECT_THROW((void)navigator.look(world.seen_from({1, 1, 0}, noise)), ContractError);
   EXPECT_THROW(navigator.set_goal(ViewId{99999}), ContractError);
   EXPECT_THROW(Navigator(source, phase_planner(remembered.memory), {.step_m = 0.0}), OptionError);
+  EXPECT_THROW(Navigator(source, phase_planner(remembered.memory), {.shortest_leg_m = 0.0}),
+               OptionError);
   EXPECT_THROW(Navigator(source, phase_planner(remembered.memory), {.coarse_components = 2}),
                ContractError);
   EXPECT_THROW(Navigator(source, AreaPlanner(NavigationGraph({}, {}))), ContractError);

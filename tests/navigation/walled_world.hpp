@@ -89,6 +89,25 @@ class WalledWorld {
     return compute_signature(preprocess(std::move(panorama), {}));
   }
 
+  /// The horizon line, each value the mean over its width and four degrees of height.
+  [[nodiscard]] std::vector<float> line_from(const Pose2& pose) const {
+    constexpr int columns = 360;
+    constexpr int rays = 3;
+    std::vector<float> values(columns);
+    for (int c = 0; c < columns; ++c) {
+      double sum = 0.0;
+      for (int i = 0; i < rays; ++i) {
+        const double at = c + (i + 0.5) / rays - 0.5;
+        const double azimuth = pose.heading_rad + 2.0 * std::numbers::pi * at / columns;
+        for (int j = 0; j < rays; ++j) {
+          sum += colour(pose.position(), azimuth, std::tan(radians(1.5 * (j - 1))));
+        }
+      }
+      values[static_cast<std::size_t>(c)] = static_cast<float>(sum / (rays * rays));
+    }
+    return values;
+  }
+
  private:
   struct Wall {
     Point2 from, to;
@@ -193,14 +212,17 @@ class SimulatedRobot final : public RobotBase {
   }
 
   void command(const Velocity& velocity) override {
-    const Pose2 step = sample_step(motion_after(velocity, base_.period_s), noise_, random_);
+    const Pose2 told = motion_after(velocity, base_.period_s);
+    const Pose2 step = sample_step(told, noise_, random_);
     const Pose2 there = pose_ * step;
     if (!world_->is_free(there.position())) {
       // A round robot that turns on the spot hits nothing.
       obstacle_ |= velocity.forward_m_s != 0.0 || velocity.left_m_s != 0.0;
       pose_.heading_rad = there.heading_rad;
+      told_ = told_ * Pose2{0.0, 0.0, told.heading_rad};
       return;
     }
+    told_ = told_ * told;
     travelled_m_ += std::hypot(step.x_m, step.y_m);
     pose_ = there;
   }
@@ -219,12 +241,16 @@ class SimulatedRobot final : public RobotBase {
   }
 
   [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }
+  /// Its wheels do not tell.
   void carry_to(const Pose2& pose) { pose_ = pose; }
+  /// The motion that its wheels tell since the last time.
+  [[nodiscard]] Pose2 take_odometry() { return std::exchange(told_, Pose2{}); }
   [[nodiscard]] double travelled_m() const noexcept { return travelled_m_; }
 
  private:
   const WalledWorld* world_;
   Pose2 pose_;
+  Pose2 told_;
   Random random_;
   BaseOptions base_;
   OdometryNoise noise_;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/evaluation/line_camera.hpp"
 #include "panonav/evaluation/mapping_run.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/localisation/monte_carlo.hpp"
@@ -21,6 +22,8 @@ namespace {
 constexpr double pi = std::numbers::pi;
 // Between robot and things where references are taken.
 constexpr double room_m = 0.2;
+// Between the lines of a route at most.
+constexpr double line_spacing_m = 0.1;
 
 std::vector<FourierSignature> see_all(const MissionPlace& place, const std::vector<Pose2>& poses,
                                       std::uint64_t seed, Executor& executor) {
@@ -45,6 +48,53 @@ VisualMemory empty_memory(const std::vector<FourierSignature>& views) {
   return {{views.front().rows(), views.front().components()},
           largest > 0.0F ? largest : 1.0F,
           views.front().elevations()};
+}
+
+Pose2 between(const Pose2& from, const Pose2& to, double share) {
+  return {
+      from.x_m + share * (to.x_m - from.x_m), from.y_m + share * (to.y_m - from.y_m),
+      wrap_angle(from.heading_rad + share * angle_difference(to.heading_rad, from.heading_rad))};
+}
+
+// Of a drive whose poses the map has placed, from the first one in its largest part until one is
+// not.
+RoutePanorama record_route(const MissionPlace& place, const std::vector<Pose2>& poses,
+                           const TopologicalMap& map, std::uint64_t seed, Executor& executor) {
+  struct Stop {
+    Pose2 truth;
+    Pose2 mapped;
+  };
+  std::vector<Stop> stops;
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+    if (map.nodes[i].part != 0) {
+      if (stops.empty()) continue;
+      break;
+    }
+    const Stop next{poses[i], map.nodes[i].pose};
+    if (stops.empty()) {
+      stops.push_back(next);
+      continue;
+    }
+    const Stop last = stops.back();
+    const double far_m = distance(last.mapped.position(), next.mapped.position());
+    const int steps = std::max(1, static_cast<int>(std::ceil(far_m / line_spacing_m)));
+    for (int k = 1; k <= steps; ++k) {
+      const double share = static_cast<double>(k) / steps;
+      stops.push_back(
+          {between(last.truth, next.truth, share), between(last.mapped, next.mapped, share)});
+    }
+  }
+  std::vector<std::vector<float>> lines(stops.size());
+  executor.for_chunks(lines.size(), 8, [&](std::size_t begin, std::size_t end, std::size_t) {
+    for (std::size_t i = begin; i < end; ++i) {
+      lines[i] = place.line(stops[i].truth, Random(seed, i).next());
+    }
+  });
+  RoutePanorama route(static_cast<int>(lines.front().size()));
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    static_cast<void>(route.append(stops[i].mapped, std::span<const float>(lines[i])));
+  }
+  return route;
 }
 
 // Whether the robot touches nothing on the straight way. Scenes name areas to drive in, too, whose
@@ -81,6 +131,15 @@ MissionPlace make_mission_place(Scene scene, Executor& executor, std::optional<P
       std::make_shared<const FreeSpace>(place.scene, free_space_options(place.scene), inside);
   place.renderer = std::make_shared<const Renderer>(place.scene, RendererOptions{}, executor);
   return place;
+}
+
+std::function<std::vector<float>(const Pose2& pose, std::uint64_t seed)> mirror_lines(
+    const MissionPlace& place) {
+  const auto camera =
+      std::make_shared<const LineCamera>(make_line_camera(place.scene.camera_height_m));
+  return [camera, renderer = place.renderer](const Pose2& pose, std::uint64_t seed) {
+    return take_line(*renderer, pose, *camera, seed);
+  };
 }
 
 FourierSignature see(const MissionPlace& place, const Pose2& pose, std::uint64_t seed,
@@ -137,8 +196,18 @@ RememberedPlace remember_drive(const MissionPlace& place, const std::vector<Pose
     way_m += distance(poses[i - 1].position(), poses[i].position());
   }
   NavigationGraph graph = navigation_graph(map, memory, executor);
+  std::vector<KnownRoute> routes;
+  if (place.line) {
+    std::vector<RouteView> placed;
+    for (const MapNode& node : map.nodes) {
+      if (node.part == 0) placed.push_back({node.view, node.pose});
+    }
+    const std::uint64_t seed_of_lines = Random(seed, 1).next();
+    routes.push_back(known_route(record_route(place, poses, map, seed_of_lines, executor), placed));
+  }
   return {std::move(memory), std::move(graph), poses,
-          way_m / static_cast<double>(std::max<std::size_t>(1, poses.size() - 1))};
+          way_m / static_cast<double>(std::max<std::size_t>(1, poses.size() - 1)),
+          std::move(routes)};
 }
 
 MissionRobot::MissionRobot(const MissionPlace& place, const BaseOptions& base,
@@ -276,7 +345,8 @@ class Voyage {
         remembered_(remembered),
         options_(options),
         robot_(place, options.base, options.motion, start, seed, options.people),
-        noise_of_views_(seed, 2) {
+        noise_of_views_(seed, 2),
+        noise_of_lines_(seed, 4) {
     if (options.monte_carlo) estimator_.emplace(remembered.memory, options.motion);
   }
 
@@ -323,6 +393,12 @@ class Voyage {
       const auto estimate = estimator_->observe(moved, view);
       if (in_doubt_) report.estimate = estimate;
     }
+    std::vector<float> line;
+    if (place_.line && !navigator.routes().empty()) {
+      line = place_.line(robot_.pose(), noise_of_lines_.next());
+      report.line = line;
+      report.moved = moved;
+    }
     const NavigationDecision decision = navigator.look(view, report);
     in_doubt_ = std::ranges::any_of(decision.events, [](NavigationEvent event) {
       return event == NavigationEvent::unknown_place || event == NavigationEvent::relocalised ||
@@ -349,6 +425,7 @@ class Voyage {
   const MissionOptions& options_;
   MissionRobot robot_;
   Random noise_of_views_;
+  Random noise_of_lines_;
   std::optional<Estimator> estimator_;
   bool in_doubt_ = true;  // where it is, after the last look
   bool obstacle_ = false;
@@ -396,6 +473,7 @@ std::vector<MissionRun> run_missions(const MissionPlace& place, const Remembered
   executor.for_chunks(missions.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
     for (std::size_t i = begin; i < end; ++i) {
       Navigator navigator(source, planner, options.navigator);
+      navigator.set_routes(remembered.routes);
       runs[i] =
           run_mission(place, remembered, navigator, missions[i], options, Random(seed, i).next());
     }

@@ -15,6 +15,7 @@
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav/motion/odometry.hpp"
 #include "panonav/motion/velocity.hpp"
+#include "panonav/navigation/known_route.hpp"
 #include "panonav/navigation/navigation_graph.hpp"
 #include "panonav/navigation/navigator.hpp"
 #include "panonav/simulation/free_space.hpp"
@@ -35,12 +36,20 @@ struct MissionPlace {
   /// What a robot sees through another camera or preprocessing than that of `see`, which then asks
   /// this instead; any number of threads may ask. Empty: as `see` says.
   std::function<FourierSignature(const Pose2& pose, std::uint64_t seed)> sight;
+  /// The horizon line that a robot takes at a pose, to record and to follow routes; any number of
+  /// threads may ask. Empty: it takes none.
+  std::function<std::vector<float>(const Pose2& pose, std::uint64_t seed)> line;
 };
 
 /// `inside`: of a place in several parts, a position in the part that is meant; empty: the largest.
 /// Throws ContractError as the parts.
 [[nodiscard]] MissionPlace make_mission_place(Scene scene, Executor& executor,
                                               std::optional<Point2> inside = std::nullopt);
+
+/// Lines through the simulated mirror camera (line_camera.hpp), as the experiments of [Y03] have
+/// them: for `MissionPlace::line`. People who walk about are not in them.
+[[nodiscard]] std::function<std::vector<float>(const Pose2& pose, std::uint64_t seed)> mirror_lines(
+    const MissionPlace& place);
 
 /// What a robot there sees: the place's `sight`, or a panorama rendered directly, with the people
 /// that are there, and preprocessed as the command's defaults have it. The same pose, seed and
@@ -52,8 +61,9 @@ struct MissionPlace {
 struct RememberedPlace {
   VisualMemory memory;
   NavigationGraph graph;
-  std::vector<Pose2> truth;  ///< by node of the graph; NaN where it is not known
-  double spacing_m = 0.0;    ///< of the references
+  std::vector<Pose2> truth;          ///< by node of the graph; NaN where it is not known
+  double spacing_m = 0.0;            ///< of the references
+  std::vector<KnownRoute> routes{};  ///< recorded on the way
 };
 
 /// Views on a grid, 20 cm or more from all things, each in a heading at random, arranged by their
@@ -62,7 +72,9 @@ struct RememberedPlace {
                                             std::uint64_t seed, Executor& executor);
 
 /// Views along a drive, mapped by visual odometry and closure of loops, lengths by `wheels`
-/// [F11 section 4]. The memory gets the poses of the map's largest part.
+/// [F11 section 4]. The memory gets the poses of the map's largest part. Where the place has lines
+/// the robot records a route, too, as far as that part goes without a gap: a line every 10 cm at
+/// most [Y03 section 2.2], posed between the map's views, so that both lie in one frame.
 [[nodiscard]] RememberedPlace remember_drive(const MissionPlace& place,
                                              const std::vector<Pose2>& poses,
                                              const OdometryNoise& wheels, std::uint64_t seed,
@@ -165,8 +177,9 @@ struct MissionRun {
 using LookReport = std::function<void(const NavigationDecision& decision, const Pose2& pose)>;
 
 /// Sends a robot over what is remembered; `place` may differ from the place that was remembered.
-/// Where it is not known where the goal's view was taken, nobody carries the robot away. The same
-/// seed gives the same run. Cost: a picture a look.
+/// Where it is not known where the goal's view was taken, nobody carries the robot away. The robot
+/// takes lines when the navigator has routes. The same seed gives the same run. Cost: a picture a
+/// look.
 [[nodiscard]] MissionRun run_mission(const MissionPlace& place, const RememberedPlace& remembered,
                                      Navigator& navigator, const Mission& mission,
                                      const MissionOptions& options, std::uint64_t seed,
@@ -181,7 +194,8 @@ using LookReport = std::function<void(const NavigationDecision& decision, const 
                                                std::span<const ViewId> goals,
                                                const MissionOptions& options, std::uint64_t seed);
 
-/// All runs, mission by mission, each by a navigator of its own; run i has the stream (seed, i).
+/// All runs, mission by mission, each by a navigator of its own with the routes of what is
+/// remembered; run i has the stream (seed, i).
 [[nodiscard]] std::vector<MissionRun> run_missions(const MissionPlace& place,
                                                    const RememberedPlace& remembered,
                                                    const std::vector<Mission>& missions,

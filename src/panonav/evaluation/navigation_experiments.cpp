@@ -19,6 +19,7 @@
 #include "panonav/evaluation/s06_support.hpp"
 #include "panonav/evaluation/statistics.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/route/route_place.hpp"
 #include "panonav/simulation/load_gazebo.hpp"
 #include "panonav/simulation/recording.hpp"
 #include "panonav/simulation/scenes.hpp"
@@ -311,6 +312,60 @@ void reproduce_tours(const NavigationReproductionOptions& options, Executor& exe
                       ": read of signatures and index by a look, mean",
                   1e-3 * kind.measures.bytes_a_look(), "kB");
   }
+}
+
+void reproduce_route_missions(const NavigationReproductionOptions& options, Executor& executor,
+                              Reproduction& result) {
+  struct Kind {
+    std::string id;
+    std::string what;
+    Measures measures;
+    std::vector<double> off_m;  // from the way that was driven before
+  };
+  std::vector<Kind> kinds{{"route", "with the route recorded on it", {}, {}},
+                          {"without_route", "the same missions without the route", {}, {}}};
+  std::vector<double> on_route_m;
+  std::map<NavigationEvent, std::size_t> events;
+  for (int i = 0; i < options.scenes; ++i) {
+    const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
+    MissionPlace place = make_mission_place(make_scene("loop", {.seed = seed}), executor);
+    place.line = mirror_lines(place);
+    const auto drive = exploring_drive(place, seed);
+    RememberedPlace remembered =
+        remember_drive(place, drive, cheap_wheels(), Random(seed, 1).next(), executor);
+    const auto missions = random_missions(
+        place, remembered, {.count = runs_of(options, i), .beside_m = beside_drive_m},
+        Random(seed, 13).next());
+    for (Kind& kind : kinds) {
+      const auto runs =
+          run_missions(place, remembered, missions, {}, Random(seed, 14).next(), executor);
+      kind.measures.add(runs, 0.5 * remembered.spacing_m);
+      for (const MissionRun& run : runs) {
+        for (std::size_t look = 0; look < run.decisions.size(); ++look) {
+          const double off_m = std::abs(place_on_route(drive, run.path[look].position()).lateral_m);
+          kind.off_m.push_back(off_m);
+          if (run.decisions[look].on_route) on_route_m.push_back(off_m);
+          for (const NavigationEvent event : run.decisions[look].events) ++events[event];
+        }
+      }
+      remembered.routes.clear();
+    }
+  }
+  const std::string map = "loop, map of a drive of 60 m, ";
+  for (const Kind& kind : kinds) {
+    report("navigation." + kind.id, map + kind.what, kind.measures, std::nullopt, std::nullopt,
+           result);
+    add_median(result, "navigation." + kind.id + ".off",
+               map + kind.what + ": distance from the way that was driven", "m", kind.off_m);
+  }
+  const std::string what = map + kinds.front().what;
+  add_rate(result, "navigation.route.share", what + ": looks on a leg along the route",
+           on_route_m.size(), kinds.front().off_m.size());
+  if (on_route_m.empty()) return;
+  add_rate(result, "navigation.route.left", what + ": legs that did not come to their end",
+           events[NavigationEvent::route_left], events[NavigationEvent::route]);
+  add_median(result, "navigation.route.leg_off",
+             what + ": distance from the way that was driven, on a leg", "m", on_route_m);
 }
 
 void reproduce_blocked_missions(const NavigationReproductionOptions& options, Executor& executor,

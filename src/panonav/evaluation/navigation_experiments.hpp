@@ -21,6 +21,10 @@ void reproduce_drive_missions(const NavigationReproductionOptions& options,
 /// compared at each look instead of the first few in the open.
 void reproduce_tours(const NavigationReproductionOptions& options, Executor& executor,
                      Reproduction& result);
+/// Variants of `loop`: the same missions over the map of a drive with and without the route that
+/// was recorded on it.
+void reproduce_route_missions(const NavigationReproductionOptions& options, Executor& executor,
+                              Reproduction& result);
 /// Variants of `loop` with a passage blocked that has a detour, and with two blocked so that there
 /// is none.
 void reproduce_blocked_missions(const NavigationReproductionOptions& options, Executor& executor,

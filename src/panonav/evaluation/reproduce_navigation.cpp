@@ -36,6 +36,7 @@ Reproduction reproduce_navigation(const NavigationReproductionOptions& options, 
                       [&, scene] { reproduce_drive_missions(options, scene, executor, result); }});
   }
   stages.push_back({"tours", 4.0, [&] { reproduce_tours(options, executor, result); }});
+  stages.push_back({"routes", 3.0, [&] { reproduce_route_missions(options, executor, result); }});
   stages.push_back(
       {"blocked passages", 2.0, [&] { reproduce_blocked_missions(options, executor, result); }});
   run_stages(stages, progress);

@@ -175,9 +175,9 @@ struct NavigationReproductionOptions {
 
 /// Going somewhere over the memory as in [M04] section 3.5, where its authors left it to later
 /// work: drives through corridors and Gazebo worlds mapped by visual odometry, other light and
-/// moved objects, a robot that is carried away, tours of several goals, people who walk about,
-/// blocked passages. Same options: same rows and pictures on any number of threads. Throws
-/// ContractError, FileError.
+/// moved objects, a robot that is carried away, tours of several goals, people who walk about, a
+/// recorded route, blocked passages. Same options: same rows and pictures on any number of threads.
+/// Throws ContractError, FileError.
 [[nodiscard]] Reproduction reproduce_navigation(const NavigationReproductionOptions& options,
                                                 Executor& executor,
                                                 const ReproductionProgress& progress = {});

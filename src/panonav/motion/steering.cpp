@@ -118,8 +118,8 @@ void PathFollower::advance(Point2 robot) {
 }
 
 // As far ahead as the path stays near the straight way there.
-Point2 PathFollower::aim() const {
-  const Point2 here = place_at(along_m_);
+Point2 PathFollower::place_ahead() const {
+  const Point2 here = place();
   // Nearer, the robot would turn for every error of its position.
   double ahead_m = along_m_ + options_.look_ahead_m / 3.0;
   const double most_m = along_m_ + options_.look_ahead_m;
@@ -148,13 +148,19 @@ Point2 PathFollower::aim() const {
   return there;
 }
 
-std::optional<Pose2> PathFollower::next_step(const Pose2& robot) {
-  advance(robot.position());
+std::optional<Point2> PathFollower::next_aim(Point2 robot) {
+  advance(robot);
   // A robot beside the end has arrived, too.
   const double left_m = length_m() - along_m_;
-  const bool near = distance(robot.position(), path_.back()) <= options_.arrived_m;
+  const bool near = distance(robot, path_.back()) <= options_.arrived_m;
   if (left_m <= 1e-9 || (near && left_m <= options_.look_ahead_m)) return std::nullopt;
-  return steer_to(robot, aim(), options_.steering);
+  return place_ahead();
+}
+
+std::optional<Pose2> PathFollower::next_step(const Pose2& robot) {
+  const auto aim = next_aim(robot.position());
+  if (!aim) return std::nullopt;
+  return steer_to(robot, *aim, options_.steering);
 }
 
 }  // namespace panonav

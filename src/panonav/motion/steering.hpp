@@ -48,18 +48,22 @@ class PathFollower {
   /// not finite.
   explicit PathFollower(std::span<const Point2> path, const PathFollowerOptions& options = {});
 
-  /// The next step of a robot that is at `robot`, as an odometry step; empty when it has arrived.
-  /// Cost: O(places of the path within twice the look-ahead, squared).
+  /// Where a robot that is at `robot` has to steer to; empty when it has arrived. Cost: O(places of
+  /// the path within twice the look-ahead, squared).
+  [[nodiscard]] std::optional<Point2> next_aim(Point2 robot);
+  /// The step there, as an odometry step; empty when it has arrived.
   [[nodiscard]] std::optional<Pose2> next_step(const Pose2& robot);
 
   /// Way along the path to the robot's place.
   [[nodiscard]] double along_m() const noexcept { return along_m_; }
+  /// The robot's place on the path.
+  [[nodiscard]] Point2 place() const { return place_at(along_m_); }
   [[nodiscard]] double length_m() const noexcept { return way_m_.back(); }
 
  private:
   [[nodiscard]] Point2 place_at(double along_m) const;
   void advance(Point2 robot);
-  [[nodiscard]] Point2 aim() const;
+  [[nodiscard]] Point2 place_ahead() const;
 
   PathFollowerOptions options_;
   std::vector<Point2> path_;

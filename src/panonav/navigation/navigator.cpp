@@ -89,6 +89,8 @@ void Navigator::set_goal(ViewId goal) {
   arrival_ = learn_arrival_scale(*source_, planner_.graph(), goal);
   goal_view_ = homing_view(source_->load({&goal, 1}).signature(goal));
   homing_.reset();
+  pilot_.stop();
+  pilot_.forgive();
   last_view_.reset();
   commanded_rad_.reset();
   elsewhere_.reset();
@@ -107,10 +109,19 @@ void Navigator::forget_place() {
   known_node_.reset();
   node_.reset();
   homing_.reset();
+  pilot_.stop();
   last_view_.reset();
   commanded_rad_.reset();
   known_at_.reset();
   under_way_.reset();
+}
+
+// The robot is not where it was taken for: what it held to there does not lead on.
+void Navigator::forget_plans(NavigationDecision& decision) {
+  homing_.reset();
+  under_way_.reset();
+  if (pilot_.drives()) decision.events.push_back(NavigationEvent::route_left);
+  pilot_.stop();
 }
 
 // The field of the loaded area, and progress, start anew.
@@ -142,8 +153,7 @@ void Navigator::relocalise(const Seen& seen, NavigationDecision& decision) {
   if (node_ && found->difference > scale_.limit()) return;
   if (node_) decision.events.push_back(NavigationEvent::kidnapped);
   decision.difference = found->difference;
-  homing_.reset();
-  under_way_.reset();
+  forget_plans(decision);
   enter(found->node, decision);
 }
 
@@ -194,15 +204,17 @@ void Navigator::accept(const Located& located, NavigationDecision& decision) {
     decision.events.push_back(NavigationEvent::kidnapped);
     elsewhere_looks_ = 0;
     elsewhere_.reset();
-    homing_.reset();
-    under_way_.reset();
+    forget_plans(decision);
   }
 }
 
 void Navigator::locate(Seen& seen, const RobotReport& report, NavigationDecision& decision) {
-  if (report.estimate) {
-    const auto estimated = planner_.graph().node_of(*report.estimate);
-    if (estimated) enter(*estimated, decision);
+  const bool line_tells = pilot_.drives() && pilot_.unknown_looks() == 0;
+  std::optional<ViewId> told = report.estimate;
+  if (!told && line_tells) told = pilot_.place();
+  if (told) {
+    const auto node = planner_.graph().node_of(*told);
+    if (node) enter(*node, decision);
   }
   if (!node_) {
     relocalise(seen, decision);
@@ -222,9 +234,10 @@ void Navigator::locate(Seen& seen, const RobotReport& report, NavigationDecision
     if (beyond || --under_way_->looks_left < 0) under_way_.reset();
   }
   // Between references that stand far apart no place looks right.
-  if (decision.difference <= limit(seen.view) || under_way_) {
+  const bool looks_right = decision.difference <= limit(seen.view);
+  if (looks_right || under_way_ || line_tells) {
     unknown_looks_ = 0;
-    if (!under_way_) known_node_ = node_;
+    if (looks_right && !under_way_) known_node_ = node_;
     return;
   }
   decision.events.push_back(NavigationEvent::unknown_place);
@@ -347,13 +360,13 @@ void Navigator::notice_obstacles(const Seen& seen, const RobotReport& report,
   heading_for_rad_.reset();
   if (commanded_rad_ && last_view_) {
     const HomeVector back = home_vector_unchecked(*last_view_, seen.view.view, short_way);
-    // The robot stood.
-    obstructed_ |= back.confidence < least_confidence &&
+    // The robot stood. Along a route steps may be short, and lines tell the place.
+    obstructed_ |= !pilot_.drives() && back.confidence < least_confidence &&
                    image_difference(*last_view_, seen.view.view) <
                        0.5 * std::min(scale_.neighbours, coarse_scale_.neighbours);
     heading_for_rad_ = wrap_angle(*commanded_rad_ + back.heading_rad);
     if (known_at_) {
-      const double way_m = obstructed_ ? 0.0 : options_.step_m;
+      const double way_m = obstructed_ ? 0.0 : commanded_m_;
       const Pose2 step{way_m * std::cos(*commanded_rad_), way_m * std::sin(*commanded_rad_),
                        -back.heading_rad};
       known_at_ = inverse(step) * *known_at_;
@@ -371,7 +384,7 @@ void Navigator::notice_obstacles(const Seen& seen, const RobotReport& report,
   }
   if (homing_) return;
   count_try();
-  if (tries_.empty() || !guide().reachable()) return;
+  if (pilot_.drives() || tries_.empty() || !guide().reachable()) return;
   const auto most_obstructed =
       std::ranges::max_element(tries_, {}, [](const auto& t) { return t.second.obstructed; });
   if (most_obstructed->second.obstructed >= static_cast<int>(detours_rad.size())) {
@@ -541,6 +554,48 @@ void Navigator::follow(const Seen& seen, NavigationDecision& decision) {
   if (obstruction_ >= 2 || std::abs(detour) < most_aside_rad) aimed_for_ = ahead.passage;
 }
 
+// A leg along a route, where views leave no doubt of the place and nothing was in the way so far:
+// what shut a passage may shut the route, too.
+void Navigator::begin_leg(const RobotReport& report, NavigationDecision& decision) {
+  if (pilot_.routes().empty() || report.line.empty() || obstructed_ || unknown_looks_ > 0 ||
+      elsewhere_looks_ > 0 || planner_.closed() > 0) {
+    return;
+  }
+  const NavigationGraph& graph = planner_.graph();
+  std::vector<ViewId> way;
+  for (const std::size_t node : planner_.planned_way(*node_)) way.push_back(graph.view(node));
+  if (!pilot_.begin(way, report.line, options_.shortest_leg_m)) return;
+  under_way_.reset();
+  decision.events.push_back(NavigationEvent::route);
+}
+
+// Repeats a recorded route; false where there is none to go along, or none any more.
+bool Navigator::go_along_route(const RobotReport& report, NavigationDecision& decision) {
+  if (!pilot_.drives()) {
+    begin_leg(report, decision);
+  } else if (pilot_.unknown_looks() >= options_.agreeing_looks ||
+             obstruction_ >= 2 * options_.agreeing_looks || looks_in_vain_ > patience()) {
+    pilot_.give_up();
+    decision.events.push_back(NavigationEvent::route_left);
+    // The way by views has not been tried here.
+    tries_.clear();
+    obstruction_ = looks_in_vain_ = 0;
+  }
+  if (!pilot_.drives()) return false;
+  const auto aim = pilot_.aim();
+  if (!aim) {
+    pilot_.stop();
+    return false;
+  }
+  decision.on_route = true;
+  decision.next = pilot_.end();
+  decision.direction_rad = std::atan2(aim->y_m, aim->x_m);
+  // The straight way there is near the route; odometry errs by little over a usual step.
+  decision.advance_m = std::min(options_.step_m, std::hypot(aim->x_m, aim->y_m));
+  commanded_rad_ = decision.direction_rad;
+  return true;
+}
+
 NavigationDecision Navigator::look(const FourierSignature& view, const RobotReport& report) {
   if (!goal_) throw ContractError("goal", "none", "one that was set");
   NavigationDecision decision;
@@ -551,6 +606,7 @@ NavigationDecision Navigator::look(const FourierSignature& view, const RobotRepo
     return decision;
   }
   const std::uint64_t bytes_before = views_.bytes_read();
+  if (pilot_.drives()) pilot_.track(report.line, report.moved);
   Seen seen{view, SeenView(view, full_scale_, needs_all_components() ? 0 : coarse_components_)};
   locate(seen, report, decision);
   if (state_ == NavigationState::moving) notice_obstacles(seen, report, decision);
@@ -566,16 +622,18 @@ NavigationDecision Navigator::look(const FourierSignature& view, const RobotRepo
   const bool waits = unknown_looks_ > 0 && unknown_looks_ < options_.agreeing_looks && !obstructed_;
   if (state_ == NavigationState::moving && !waits) {
     if (is_at_goal()) {
+      pilot_.stop();
       go_home(seen, decision);
     } else {
       homing_.reset();
-      follow(seen, decision);
+      if (!go_along_route(report, decision)) follow(seen, decision);
     }
   }
   if (state_ == NavigationState::moving && looks_ >= options_.most_looks) {
     state_ = NavigationState::blocked;
   }
   last_view_ = seen.view.view;
+  commanded_m_ = decision.advance_m;
   decision.state = state_;
   if (state_ != NavigationState::moving) decision.advance_m = 0.0;
   decision.nearest = planner_.graph().view(*node_);

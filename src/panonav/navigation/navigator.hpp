@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "panonav/navigation/area_planner.hpp"
 #include "panonav/navigation/area_views.hpp"
 #include "panonav/navigation/place_scale.hpp"
+#include "panonav/navigation/route_pilot.hpp"
 
 namespace panonav {
 
@@ -35,6 +37,8 @@ struct NavigatorOptions {
   /// Looks without coming nearer to the goal, more along a longer passage than usual; from half of
   /// them on the robot searches around. Then the passage that was tried most counts as blocked.
   int passage_patience = 8;
+  /// Of the way along a recorded route that is worth a leg: three steps.
+  double shortest_leg_m = 0.75;
   int attempts = 3;       ///< times that closed passages, or the last stretch, are tried
   int most_looks = 5000;  ///< after which a run ends as blocked
 };
@@ -61,6 +65,8 @@ enum class NavigationEvent {
   reopened,       ///< closed passages are tried again
   homing,         ///< the last stretch begins
   homing_failed,  ///< the last stretch ended at another place
+  route,          ///< a leg along a recorded route begins
+  route_left,     ///< it did not come to its end
 };
 [[nodiscard]] std::string_view name_of(NavigationEvent event);
 
@@ -73,6 +79,11 @@ struct RobotReport {
   /// navigator looks around it, so it need not be exact. For places that look alike, where a single
   /// view misleads. Leave it empty where the estimate is not certain: the views decide then.
   std::optional<ViewId> estimate;
+  /// The horizon line of this look (route/horizon_line.hpp), for legs along routes; empty: none.
+  std::span<const float> line;
+  /// How the robot moved since its last look as its odometry has it, in the frame that it had then;
+  /// for legs along routes.
+  Pose2 moved;
 };
 
 /// One decision with its reasons: the log entry of a look.
@@ -82,8 +93,9 @@ struct NavigationDecision {
   double direction_rad = 0.0;     ///< in which to go, in the current robot frame
   double advance_m = 0.0;         ///< how far; 0 unless moving
   bool homing = false;            ///< the last stretch, by the home vector to the goal itself
+  bool on_route = false;          ///< a leg along a recorded route, by the horizon line
   std::optional<ViewId> nearest;  ///< the place
-  std::optional<ViewId> next;     ///< the reference ahead
+  std::optional<ViewId> next;     ///< the reference ahead; of a leg that at its end
   std::size_t area = 0;           ///< that is loaded
   double difference =
       0.0;             ///< of what is seen from `nearest` (homing: the goal), `image_difference`
@@ -97,12 +109,14 @@ struct NavigationDecision {
 
 /// Goes to a place over the memory by views alone [M04 section 3.5]: look, find the nearest
 /// reference, take its direction, move, look again; the last stretch by homing. As every look
-/// decides anew, neither a distorted map nor a step that leads elsewhere matters.
+/// decides anew, neither a distorted map nor a step that leads elsewhere matters. Where the way
+/// goes along a recorded route and the robot tells its horizon lines, it repeats the route instead
+/// [Y03]; views still tell its place, and that it was carried away.
 ///
 /// Holds the state of a run, and of the memory the views of one area, two at a border. Knows
 /// nothing of how the robot moves: `command_towards` (motion/velocity.hpp) does. Same calls, same
 /// bits. Cost of a look without a change of area: the search among the loaded views and three home
-/// vectors at most.
+/// vectors at most; with a line near a route also a plan, `RoutePilot::begin`, or a fit.
 class Navigator {
  public:
   /// The source must hold all views of the planner's graph and outlive *this. Throws OptionError,
@@ -113,11 +127,17 @@ class Navigator {
   /// when the view is not in the graph.
   void set_goal(ViewId goal);
 
+  /// Recorded routes to go along, which must outlive *this; none at first, and `RobotReport::line`
+  /// is not looked at.
+  void set_routes(std::span<const KnownRoute> routes) { pilot_ = RoutePilot(routes); }
+  [[nodiscard]] std::span<const KnownRoute> routes() const noexcept { return pilot_.routes(); }
+
   /// The robot may be anywhere: the next look searches the whole memory.
   void forget_place();
 
   /// What to do after a look. After a decision that stops, further ones do too. Throws
-  /// ContractError without a goal, and on a signature of another shape than the memory's.
+  /// ContractError without a goal, and on a signature or line of another shape than the memory's
+  /// and the routes'.
   [[nodiscard]] NavigationDecision look(const FourierSignature& view,
                                         const RobotReport& report = {});
 
@@ -163,6 +183,9 @@ class Navigator {
   [[nodiscard]] bool go_back(const Seen& seen, NavigationDecision& decision);
   [[nodiscard]] bool is_at_goal() const;
   void follow(const Seen& seen, NavigationDecision& decision);
+  void forget_plans(NavigationDecision& decision);
+  void begin_leg(const RobotReport& report, NavigationDecision& decision);
+  [[nodiscard]] bool go_along_route(const RobotReport& report, NavigationDecision& decision);
   void plan_fields();
   [[nodiscard]] int patience() const;
   [[nodiscard]] double detour_rad() const;
@@ -190,10 +213,12 @@ class Navigator {
   std::optional<Point2> known_at_;         // in the current frame, as far as steps tell; metres
   std::optional<HomingView> last_view_;
   std::optional<double>
-      commanded_rad_;  // direction of the step before, in the frame of `last_view_`
+      commanded_rad_;         // direction of the step before, in the frame of `last_view_`
+  double commanded_m_ = 0.0;  // its length
   std::optional<double> heading_for_rad_;  // the same in the current frame, unless it failed
   NavigationState state_ = NavigationState::moving;
   std::optional<UnderWay> under_way_;
+  RoutePilot pilot_;
   int looks_ = 0;
   int unknown_looks_ = 0;
   int elsewhere_looks_ = 0;

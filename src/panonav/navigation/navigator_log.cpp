@@ -18,9 +18,9 @@ std::string_view name_of(NavigationState state) {
 }
 
 std::string_view name_of(NavigationEvent event) {
-  constexpr std::array<std::string_view, 9> names{"relocalised",   "kidnapped",  "entered_area",
-                                                  "unknown_place", "obstructed", "closed",
-                                                  "reopened",      "homing",     "homing_failed"};
+  constexpr std::array<std::string_view, 11> names{
+      "relocalised", "kidnapped", "entered_area",  "unknown_place", "obstructed", "closed",
+      "reopened",    "homing",    "homing_failed", "route",         "route_left"};
   return names.at(static_cast<std::size_t>(event));
 }
 
@@ -34,9 +34,9 @@ std::string describe(const NavigationDecision& decision) {
                 decision.difference);
   line += numbers.data();
   if (decision.advance_m > 0.0) {
-    std::snprintf(numbers.data(), numbers.size(), ", %s %.3f m towards %.1f degrees",
-                  decision.homing ? "home" : "go", decision.advance_m,
-                  degrees(decision.direction_rad));
+    const char* how = decision.homing ? "home" : decision.on_route ? "along a route" : "go";
+    std::snprintf(numbers.data(), numbers.size(), ", %s %.3f m towards %.1f degrees", how,
+                  decision.advance_m, degrees(decision.direction_rad));
     line += numbers.data();
   }
   for (const NavigationEvent event : decision.events) line += ", " + std::string(name_of(event));
@@ -81,6 +81,12 @@ void visit_options(NavigatorOptions& options, OptionVisitor& visitor) {
                  .low = 1,
                  .high = 1e6},
                 options.passage_patience);
+  visitor.visit({.name = "shortest_leg_m",
+                 .help = "shortest way along a recorded route that is worth a leg",
+                 .low = 0,
+                 .high = 1000,
+                 .low_open = true},
+                options.shortest_leg_m);
   visitor.visit({.name = "attempts",
                  .help = "times that closed passages, or the last stretch, are tried",
                  .low = 1,
