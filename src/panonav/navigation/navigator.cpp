@@ -333,7 +333,7 @@ bool Navigator::find_way_from_here(const Seen& seen, NavigationDecision& decisio
   decision.events.push_back(NavigationEvent::relocalised);
   if (!found || found->difference > scale_.limit()) return false;
   decision.difference = found->difference;
-  under_way_.reset();
+  forget_plans(decision);
   enter(found->node, decision);
   return true;
 }
