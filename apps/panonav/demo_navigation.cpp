@@ -13,6 +13,7 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/positions.hpp"
 #include "panonav/io/atomic_file.hpp"
+#include "panonav/motion/path.hpp"
 #include "panonav/navigation/navigation_graph.hpp"
 #include "panonav/simulation/screen.hpp"
 
@@ -45,12 +46,6 @@ void give_sight(MissionPlace& place, const DemoRecordings& recordings, const Pip
   const SimulationArguments& settled = recordings.office_world->arguments();
   place.sight = sight_through(place.renderer, recordings.true_camera, settled.frame, settled.sensor,
                               pipeline, nullptr);
-}
-
-double length_of(const std::vector<Point2>& way) {
-  double length_m = 0.0;
-  for (std::size_t i = 1; i < way.size(); ++i) length_m += distance(way[i - 1], way[i]);
-  return length_m;
 }
 
 /// A mission, and the office with a screen across the middle of its planned way.
@@ -88,7 +83,8 @@ std::optional<ScreenedMission> screened_mission(const MissionPlace& place,
     const Point2 goal = remembered.truth[*remembered.graph.node_of(mission.goal)].position();
     const auto direct = place.free_space->shortest_path(mission.start.position(), goal);
     const auto around = screened.free_space->shortest_path(mission.start.position(), goal);
-    if (!direct || !around || length_of(*around) < length_of(*direct) + least_detour_m) continue;
+    if (!direct || !around || path_length_m(*around) < path_length_m(*direct) + least_detour_m)
+      continue;
     screened.renderer =
         std::make_shared<const Renderer>(screened.scene, RendererOptions{}, executor);
     give_sight(screened, recordings, pipeline);

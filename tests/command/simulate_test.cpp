@@ -65,7 +65,7 @@ TEST(Simulate, WritesADataSetThatSaysWhereEachViewWasTaken) {
 TEST(Simulate, ArenaOnAGridNeedsNoFurtherFlags) {
   const TemporaryFolder folder;
   const auto out = folder / "run";
-  const auto result = run_panonav({"simulate", "arena", out, "--grid", "0.2"});
+  const auto result = run_panonav({"simulate", "arena", out, "--grid", "0.4"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const Dataset dataset = read_dataset(out);
   ASSERT_GE(dataset.entries.size(), 8U);
@@ -74,7 +74,7 @@ TEST(Simulate, ArenaOnAGridNeedsNoFurtherFlags) {
   for (const auto& entry : dataset.entries) {
     EXPECT_TRUE(fs::is_regular_file(entry.path)) << entry.path;
     ASSERT_TRUE(entry.pose);
-    const double steps = (entry.pose->x_m - dataset.entries.front().pose->x_m) / 0.2;
+    const double steps = (entry.pose->x_m - dataset.entries.front().pose->x_m) / 0.4;
     EXPECT_NEAR(steps, std::round(steps), 1e-9);
     columns.insert(std::round(steps));
   }

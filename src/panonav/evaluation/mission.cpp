@@ -12,6 +12,7 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/localisation/monte_carlo.hpp"
 #include "panonav/mapping/lattice.hpp"
+#include "panonav/motion/path.hpp"
 #include "panonav/panorama/preprocessing.hpp"
 #include "panonav/signature/fourier_signature.hpp"
 
@@ -116,10 +117,7 @@ bool has_room(const FreeSpace& space, double robot_radius_m, Point2 from, Point2
 double shortest_way_m(const FreeSpace& space, Point2 from, Point2 to) {
   if (!std::isfinite(to.x_m) || !std::isfinite(to.y_m)) return distance(from, to);
   const auto way = space.shortest_path(from, to);
-  if (!way) return distance(from, to);
-  double length = 0.0;
-  for (std::size_t i = 1; i < way->size(); ++i) length += distance((*way)[i - 1], (*way)[i]);
-  return length;
+  return way ? path_length_m(*way) : distance(from, to);
 }
 
 }  // namespace
@@ -191,10 +189,7 @@ RememberedPlace remember_drive(const MissionPlace& place, const std::vector<Pose
     if (node.part != 0) continue;
     memory.set_pose(node.view, ReferencePose{node.pose.x_m, node.pose.y_m, node.pose.heading_rad});
   }
-  double way_m = 0.0;
-  for (std::size_t i = 1; i < poses.size(); ++i) {
-    way_m += distance(poses[i - 1].position(), poses[i].position());
-  }
+  const double way_m = path_length_m(poses);
   NavigationGraph graph = navigation_graph(map, memory, executor);
   std::vector<KnownRoute> routes;
   if (place.line) {

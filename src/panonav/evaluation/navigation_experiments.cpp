@@ -19,6 +19,7 @@
 #include "panonav/evaluation/s06_support.hpp"
 #include "panonav/evaluation/statistics.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/motion/path.hpp"
 #include "panonav/route/route_place.hpp"
 #include "panonav/simulation/load_gazebo.hpp"
 #include "panonav/simulation/recording.hpp"
@@ -138,16 +139,11 @@ std::vector<Pose2> exploring_drive(const MissionPlace& place, std::uint64_t seed
   roomy.robot_radius_m += 0.1;
   const FreeSpace space(place.scene, roomy);
   std::vector<Point2> way;
-  double length_m = 0.0;
-  while (length_m < drive_m) {
-    const std::size_t before = way.size();
+  while (path_length_m(way) < drive_m) {
     if (place.scene.tour.empty()) {
       way.push_back(space.random_pose(random).position());
     } else {
       way.insert(way.end(), place.scene.tour.begin(), place.scene.tour.end());
-    }
-    for (std::size_t i = std::max<std::size_t>(1, before); i < way.size(); ++i) {
-      length_m += distance(way[i - 1], way[i]);
     }
   }
   std::vector<Pose2> poses;
