@@ -251,7 +251,8 @@ TEST(Navigator, AKidnappedRobotStillArrives) {
     }
   }
   EXPECT_GE(outcome.arrived, outcome.runs * 9 / 10);
-  EXPECT_GE(noticed, outcome.runs / 2);
+  // Not by who was carried a few passages only: the search around finds such a place.
+  EXPECT_GE(noticed, outcome.runs / 3);
 }
 
 // The door, or one of two, is shut after the memory was made.
@@ -328,6 +329,36 @@ TEST(Navigator, GoesNowhereWithoutAWay) {
   EXPECT_EQ(run.end.state, NavigationState::unreachable);
   EXPECT_EQ(run.end.look, 1);
   EXPECT_EQ(run.end.advance_m, 0.0);
+}
+
+// A step leads beyond the references that lie two passages away, and past the goal.
+TEST(Navigator, ArrivesOverReferencesThatStandCloseTogether) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  constexpr double close_m = 0.1;
+  const WalledWorld world = two_rooms(3, false);
+  const RememberedWorld remembered(world, {3.0, 2.0}, close_m, 3);
+  const MemoryViewSource source(remembered.memory);
+  Navigator navigator(source, phase_planner(remembered.memory, 200));
+  Random random(7);
+  constexpr int runs = 10;
+  int arrived = 0;
+  std::vector<double> ratios;
+  for (int i = 0; i < runs; ++i) {
+    const ViewId goal = remembered.memory.views()[random.index(remembered.memory.size())];
+    Pose2 start;
+    do {
+      start = {random.uniform(0.3, 2.7), random.uniform(0.3, 1.7), random.uniform(-pi, pi)};
+    } while (world.clearance_m(start.position()) < 0.25);
+    const Drive run =
+        drive(world, remembered, navigator, goal, start, DriveKind::holonomic, random.next());
+    arrived +=
+        static_cast<int>(run.end.state == NavigationState::arrived && run.error_m <= 0.5 * close_m);
+    const double straight_m = distance(start.position(), remembered.pose_of(goal).position());
+    if (straight_m > 0.5) ratios.push_back(run.travelled_m / straight_m);
+  }
+  EXPECT_GE(arrived, runs - 1);
+  ASSERT_GE(ratios.size(), 5U);
+  EXPECT_LT(upper_median(ratios), 2.0);
 }
 
 // The memory lacks the passages of some views: a robot that stands at one goes on by another.

@@ -164,13 +164,17 @@ Scene with_screens(Scene scene, std::span<const Pose2> across, double width_m) {
   return scene;
 }
 
-// How wide screens must be so that no way leads past them; empty: none of these widths does it. At
-// a corner a way leads past screens that shut a straight passage.
+// How wide screens must be so that no way leads past them; empty: none of these widths does it and
+// leaves room at both ends. At a corner a way leads past screens that shut a straight passage.
 std::optional<double> shutting_width_m(const Scene& scene, std::span<const Pose2> across,
                                        Point2 from, Point2 to) {
   for (const double width_m : {2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0}) {
     const Scene shut = with_screens(scene, across, width_m);
-    if (!FreeSpace(shut, free_space_options(shut), from).is_free(to)) return width_m;
+    const FreeSpaceOptions room = free_space_options(shut);
+    const FreeSpace largest(shut, room);
+    const double least_m = room.robot_radius_m + 2.0 * room.cell_m;
+    if (largest.clearance_m(from) < least_m || largest.clearance_m(to) < least_m) break;
+    if (!FreeSpace(shut, room, from).is_free(to)) return width_m;
   }
   return std::nullopt;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numbers>
 #include <utility>
@@ -31,6 +32,11 @@ constexpr int links_across = 3;
 // A passage so much longer than usual is held to until its end. `step_m` is half a usual passage.
 constexpr double least_long = 2.0;
 constexpr double steps_of_passage = 2.0;
+// The next place is looked for again around the outermost that was found, so often: a step is half
+// a passage, and four where references stand eight times as close as it was meant for.
+constexpr int rounds_farther = 2;
+// So many of the last steps tell how far one leads.
+constexpr std::size_t steps_kept = 5;
 // Fewer tell no home vector.
 constexpr int least_components = 3;
 
@@ -172,6 +178,21 @@ Navigator::Located Navigator::search_around(const SeenView& view) {
   Located located;
   located.around = nodes_around(graph, {&*node_, 1}, options_.near_links);
   located.here = views_.nearest(graph, located.around, view);
+  // Where references stand close together a step leads beyond those: from the outermost on the
+  // search goes on, if it finds more alike ones.
+  std::size_t centre = *node_;
+  for (int round = 0; round < rounds_farther && located.here; ++round) {
+    const auto inner = nodes_around(graph, {&centre, 1}, options_.near_links - 1);
+    if (std::ranges::binary_search(inner, located.here->node)) break;
+    centre = located.here->node;
+    const auto farther = nodes_around(graph, {&centre, 1}, options_.near_links);
+    const auto found = views_.nearest(graph, farther, view);
+    if (!found || found->dissimilarity >= located.here->dissimilarity) break;
+    located.here = found;
+    std::vector<std::size_t> both;
+    std::ranges::set_union(located.around, farther, std::back_inserter(both));
+    located.around = std::move(both);
+  }
   located.anywhere = views_.nearest(graph, view);
   located.elsewhere = located.here && located.anywhere &&
                       located.anywhere->dissimilarity < located.here->dissimilarity &&
@@ -340,6 +361,10 @@ bool Navigator::find_way_from_here(const Seen& seen, NavigationDecision& decisio
 
 // What became of the step before, and whether the robot comes nearer to the goal.
 void Navigator::count_try() {
+  if (way_before_ && !obstructed_ && guide().way < *way_before_) {
+    if (ways_of_steps_.size() == steps_kept) ways_of_steps_.erase(ways_of_steps_.begin());
+    ways_of_steps_.push_back(*way_before_ - guide().way);
+  }
   if (!std::ranges::binary_search(around_closed_, *node_)) closed_here_ = false;
   const auto tried = aimed_for_ ? tries_.find(*aimed_for_) : tries_.end();
   if (tried != tries_.end()) tried->second.obstructed += static_cast<int>(obstructed_);
@@ -505,10 +530,16 @@ bool Navigator::go_back(const Seen& seen, NavigationDecision& decision) {
   return true;
 }
 
-// The goal, or another reference from which the goal is too near for a direction: views of several
-// drives may be from one place.
+// The goal, or another reference from which the goal is too near for a direction, as views of
+// several drives may be from one place, or for a step, which would lead beyond it.
 bool Navigator::is_at_goal() const {
   if (*node_ == *goal_) return true;
+  // The first steps of homing try how far one leads.
+  if (homing_ && around_goal_.contains(*node_)) return true;
+  if (!ways_of_steps_.empty() && around_goal_.contains(*node_) &&
+      guide().way <= 0.5 * upper_median(ways_of_steps_)) {
+    return true;
+  }
   if (guide().next != *goal_) return false;
   const auto motion = planner_.graph().motion_from(*node_, guide().passage);
   return motion && std::hypot(motion->x_m, motion->y_m) <= 0.5 * typical_length_;
@@ -634,6 +665,8 @@ NavigationDecision Navigator::look(const FourierSignature& view, const RobotRepo
   }
   last_view_ = seen.view.view;
   commanded_m_ = decision.advance_m;
+  way_before_.reset();
+  if (commanded_m_ == options_.step_m && !homing_) way_before_ = guide().way;
   decision.state = state_;
   if (state_ != NavigationState::moving) decision.advance_m = 0.0;
   decision.nearest = planner_.graph().view(*node_);

@@ -228,6 +228,8 @@ class Navigator {
   int attempts_ = 0;
   int ways_sought_ = 0;                     // from places without one, in this attempt
   double least_way_ = 0.0;                  // since the last plan
+  std::optional<double> way_before_;        // at the look before, if a whole step followed
+  std::vector<double> ways_of_steps_;       // by which the last ones brought the goal nearer
   int looks_in_vain_ = 0;                   // since the way became shorter or a passage was closed
   bool closed_here_ = false;                // a passage, and the robot was not far from there since
   std::map<std::size_t, Tries> tries_;      // of passages, since the way became shorter
