@@ -466,7 +466,7 @@ void Navigator::go_home(const Seen& seen, NavigationDecision& decision) {
     homing.longest_step_m = std::min(homing.longest_step_m, options_.step_m);
     homing.arrived_difference = arrival_.difference;
     // Well inside: the vector has an error of its own.
-    homing.stop_length = 0.5 * arrival_.length;
+    homing.stop_length = 0.25 * arrival_.length;
     homing_.emplace(*goal_view_, homing);
     decision.events.push_back(NavigationEvent::homing);
   }
