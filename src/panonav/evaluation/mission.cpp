@@ -13,6 +13,7 @@
 #include "panonav/localisation/monte_carlo.hpp"
 #include "panonav/mapping/lattice.hpp"
 #include "panonav/motion/path.hpp"
+#include "panonav/motion/trajectory.hpp"
 #include "panonav/panorama/preprocessing.hpp"
 #include "panonav/signature/fourier_signature.hpp"
 
@@ -51,12 +52,6 @@ VisualMemory empty_memory(const std::vector<FourierSignature>& views) {
           views.front().elevations()};
 }
 
-Pose2 between(const Pose2& from, const Pose2& to, double share) {
-  return {
-      from.x_m + share * (to.x_m - from.x_m), from.y_m + share * (to.y_m - from.y_m),
-      wrap_angle(from.heading_rad + share * angle_difference(to.heading_rad, from.heading_rad))};
-}
-
 // Of a drive whose poses the map has placed, from the first one in its largest part until one is
 // not.
 RoutePanorama record_route(const MissionPlace& place, const std::vector<Pose2>& poses,
@@ -81,8 +76,8 @@ RoutePanorama record_route(const MissionPlace& place, const std::vector<Pose2>& 
     const int steps = std::max(1, static_cast<int>(std::ceil(far_m / line_spacing_m)));
     for (int k = 1; k <= steps; ++k) {
       const double share = static_cast<double>(k) / steps;
-      stops.push_back(
-          {between(last.truth, next.truth, share), between(last.mapped, next.mapped, share)});
+      stops.push_back({interpolate(last.truth, next.truth, share),
+                       interpolate(last.mapped, next.mapped, share)});
     }
   }
   std::vector<std::vector<float>> lines(stops.size());
