@@ -3,8 +3,8 @@
 #include <memory>
 #include <vector>
 
-#include "panonav/evaluation/place_recording.hpp"
-#include "panonav/evaluation/tracking_run.hpp"
+#include "experiments/runs/place_recording.hpp"
+#include "experiments/runs/tracking_run.hpp"
 
 namespace panonav::bench {
 

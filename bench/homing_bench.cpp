@@ -8,9 +8,9 @@
 #include <optional>
 #include <vector>
 
+#include "experiments/baselines/expected_image_homing.hpp"
 #include "panonav/core/random.hpp"
-#include "panonav/homing/expected_image_homing.hpp"
-#include "panonav/homing/fourier_homing.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
 #include "panonav/signature/fourier_signature.hpp"
 
 namespace {

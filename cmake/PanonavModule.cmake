@@ -1,12 +1,17 @@
 # One target per module, and one test program per module.
 
 # panonav_module(NAME [SOURCES ...] [DEPENDS modules of ours ...] [LINK public libraries ...]
-#                [LINK_PRIVATE libraries that no public header shows ...])
-# Makes the static library panonav_NAME with the alias panonav::NAME. Headers lie beside the
-# sources and are included as "panonav/NAME/x.hpp".
+#                [LINK_PRIVATE libraries that no public header shows ...] [PACKAGES that find those ...])
+# Makes the static library panonav_NAME with the alias panonav::NAME of the sources beside the CMake file and in its
+# folder `internal`, unless SOURCES names others. Headers are included as "panonav/NAME/x.hpp"; those in `internal` are
+# the module's own and are not installed. Each module has an export set of its own, so that users of a module need
+# only the packages of that module and of those before it.
 function(panonav_module name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;LINK;LINK_PRIVATE" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;LINK;LINK_PRIVATE;PACKAGES" ${ARGN})
   set(target panonav_${name})
+  if(NOT ARG_SOURCES)
+    file(GLOB ARG_SOURCES CONFIGURE_DEPENDS *.cpp internal/*.cpp)
+  endif()
   add_library(${target} STATIC ${ARG_SOURCES})
   add_library(panonav::${name} ALIAS ${target})
   set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
@@ -14,13 +19,41 @@ function(panonav_module name)
   target_include_directories(${target} PUBLIC
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src>
     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
-  list(TRANSFORM ARG_DEPENDS PREPEND panonav::)
-  target_link_libraries(${target} PUBLIC ${ARG_DEPENDS} ${ARG_LINK} PRIVATE ${ARG_LINK_PRIVATE})
+  list(TRANSFORM ARG_DEPENDS PREPEND panonav:: OUTPUT_VARIABLE libraries)
+  target_link_libraries(${target} PUBLIC ${libraries} ${ARG_LINK} PRIVATE ${ARG_LINK_PRIVATE})
   panonav_warnings(${target})
-  install(TARGETS ${target} EXPORT panonavTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  panonav_precompile(${target})
+  install(TARGETS ${target} EXPORT panonav_${name} ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  install(EXPORT panonav_${name} NAMESPACE panonav:: FILE panonav-${name}.cmake DESTINATION ${PANONAV_PACKAGE_FOLDER})
   install(DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/panonav/${name}
-          FILES_MATCHING PATTERN "*.hpp")
-  set_property(GLOBAL APPEND PROPERTY PANONAV_MODULE_TARGETS ${target})
+          FILES_MATCHING PATTERN "*.hpp" PATTERN internal EXCLUDE)
+  set_property(GLOBAL APPEND PROPERTY PANONAV_MODULE_NAMES ${name})
+  set_property(GLOBAL PROPERTY PANONAV_DEPENDS_${name} ${ARG_DEPENDS})
+  set_property(GLOBAL PROPERTY PANONAV_PACKAGES_${name} ${ARG_PACKAGES})
+endfunction()
+
+# panonav_library(NAME DEPENDS targets ...): a library for the command and the experiments that is not installed.
+# Its headers are included as "NAME/x.hpp".
+function(panonav_library name)
+  cmake_parse_arguments(ARG "" "" "DEPENDS;LINK_PRIVATE" ${ARGN})
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS *.cpp)
+  add_library(panonav_${name} STATIC ${sources})
+  add_library(panonav::${name} ALIAS panonav_${name})
+  target_compile_features(panonav_${name} PUBLIC cxx_std_20)
+  target_include_directories(panonav_${name} PUBLIC ${PROJECT_SOURCE_DIR})
+  target_link_libraries(panonav_${name} PUBLIC ${ARG_DEPENDS} PRIVATE ${ARG_LINK_PRIVATE})
+  panonav_warnings(panonav_${name})
+  panonav_precompile(panonav_${name})
+endfunction()
+
+# panonav_precompile(TARGET [HEADER ...]): the standard headers that most sources include, and these, are parsed once
+# for the whole target.
+function(panonav_precompile target)
+  if(PANONAV_PRECOMPILE)
+    target_precompile_headers(${target} PRIVATE
+      <algorithm> <array> <chrono> <cmath> <cstdint> <filesystem> <functional> <map> <memory> <numbers> <optional>
+      <random> <ranges> <span> <sstream> <string> <string_view> <unordered_map> <utility> <variant> <vector> ${ARGN})
+  endif()
 endfunction()
 
 function(panonav_warnings target)
@@ -51,40 +84,37 @@ function(panonav_module_tests name)
   target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
   target_link_libraries(test_${name} PRIVATE panonav::${name} ${ARG_LINK} GTest::gtest_main)
   panonav_warnings(test_${name})
+  panonav_precompile(test_${name} <gtest/gtest.h>)
   gtest_discover_tests(test_${name} TEST_PREFIX ${name}. DISCOVERY_MODE PRE_TEST
                        PROPERTIES LABELS unit)
 endfunction()
 
 # The target panonav::panonav links every module that was built.
 function(panonav_umbrella)
-  get_property(targets GLOBAL PROPERTY PANONAV_MODULE_TARGETS)
+  get_property(names GLOBAL PROPERTY PANONAV_MODULE_NAMES)
+  list(TRANSFORM names PREPEND panonav_)
   add_library(panonav INTERFACE)
   add_library(panonav::panonav ALIAS panonav)
-  target_link_libraries(panonav INTERFACE ${targets})
-  install(TARGETS panonav EXPORT panonavTargets)
+  target_link_libraries(panonav INTERFACE ${names})
 endfunction()
-
-# panonav_find(PACKAGE ...): find_package, and remembers it for users of the installed package.
-# Sets PACKAGE_FOUND in the caller's scope as find_package does.
-macro(panonav_find package)
-  find_package(${package} ${ARGN})
-  if(${package}_FOUND)
-    set_property(GLOBAL APPEND PROPERTY PANONAV_FOUND_PACKAGES ${package})
-  endif()
-endmacro()
 
 # The CMake package that `find_package(panonav)` finds after an installation.
 function(panonav_install_package)
   include(CMakePackageConfigHelpers)
-  get_property(PANONAV_FOUND_PACKAGES GLOBAL PROPERTY PANONAV_FOUND_PACKAGES)
-  list(REMOVE_DUPLICATES PANONAV_FOUND_PACKAGES)
-  string(REPLACE ";" " " PANONAV_FOUND_PACKAGES "${PANONAV_FOUND_PACKAGES}")
-  set(destination ${CMAKE_INSTALL_LIBDIR}/cmake/panonav)
+  get_property(names GLOBAL PROPERTY PANONAV_MODULE_NAMES)
+  set(PANONAV_MODULE_TABLE "")
+  foreach(name IN LISTS names)
+    get_property(depends GLOBAL PROPERTY PANONAV_DEPENDS_${name})
+    get_property(packages GLOBAL PROPERTY PANONAV_PACKAGES_${name})
+    string(APPEND PANONAV_MODULE_TABLE "set(_panonav_depends_${name} ${depends})\n"
+           "set(_panonav_packages_${name} ${packages})\n")
+  endforeach()
+  string(REPLACE ";" " " PANONAV_MODULE_TABLE "${PANONAV_MODULE_TABLE}")
+  string(REPLACE ";" " " PANONAV_MODULE_NAMES "${names}")
   configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/panonavConfig.cmake.in
-    ${PROJECT_BINARY_DIR}/panonavConfig.cmake INSTALL_DESTINATION ${destination})
+    ${PROJECT_BINARY_DIR}/panonavConfig.cmake INSTALL_DESTINATION ${PANONAV_PACKAGE_FOLDER})
   write_basic_package_version_file(${PROJECT_BINARY_DIR}/panonavConfigVersion.cmake
     COMPATIBILITY SameMinorVersion)
-  install(EXPORT panonavTargets NAMESPACE panonav:: DESTINATION ${destination})
   install(FILES ${PROJECT_BINARY_DIR}/panonavConfig.cmake ${PROJECT_BINARY_DIR}/panonavConfigVersion.cmake
-          DESTINATION ${destination})
+          DESTINATION ${PANONAV_PACKAGE_FOLDER})
 endfunction()

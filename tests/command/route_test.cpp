@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "../route/textured_room.hpp"
+#include "route/textured_room.hpp"
 #include "command_runner.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/dataset.hpp"

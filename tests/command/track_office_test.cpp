@@ -8,7 +8,7 @@
 #include <regex>
 
 #include "command_runner.hpp"
-#include "panonav/evaluation/statistics.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
 

@@ -7,7 +7,7 @@
 
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/pose2.hpp"
-#include "panonav/homing/homing_view.hpp"
+#include "panonav/relative_pose/homing_view.hpp"
 
 namespace panonav::test {
 

@@ -7,8 +7,8 @@
 #include "localisation/recordings.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/homing/fourier_homing.hpp"
 #include "panonav/panorama/preprocessing.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
 
 namespace panonav {
 namespace {

@@ -11,8 +11,8 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/io/internal/written_degrees.hpp"
 #include "panonav/io/panorama_reader.hpp"
-#include "panonav/io/written_degrees.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace panonav {

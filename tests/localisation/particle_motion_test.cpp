@@ -1,4 +1,4 @@
-#include "panonav/localisation/particle_motion.hpp"
+#include "panonav/localisation/internal/particle_motion.hpp"
 
 #include <gtest/gtest.h>
 

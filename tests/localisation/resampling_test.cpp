@@ -1,4 +1,4 @@
-#include "panonav/localisation/resampling.hpp"
+#include "panonav/localisation/internal/resampling.hpp"
 
 #include <gtest/gtest.h>
 

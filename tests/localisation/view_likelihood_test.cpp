@@ -1,4 +1,4 @@
-#include "panonav/localisation/view_likelihood.hpp"
+#include "panonav/localisation/internal/view_likelihood.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "panonav/mapping/azimuth_flow.hpp"
+#include "panonav/mapping/internal/azimuth_flow.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "panonav/mapping/ground_displacement.hpp"
+#include "panonav/mapping/internal/ground_displacement.hpp"
 
 #include <gtest/gtest.h>
 

@@ -11,8 +11,8 @@
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/mapping/dissimilarity_curve.hpp"
+#include "panonav/mapping/internal/lattice_solver.hpp"
 #include "panonav/mapping/lattice_graph.hpp"
-#include "panonav/mapping/lattice_solver.hpp"
 
 namespace panonav {
 namespace {

@@ -1,4 +1,4 @@
-#include "panonav/mapping/multidimensional_scaling.hpp"
+#include "panonav/mapping/internal/multidimensional_scaling.hpp"
 
 #include <gtest/gtest.h>
 

@@ -9,7 +9,7 @@
 
 #include "mapping/round_room.hpp"
 #include "panonav/core/error.hpp"
-#include "panonav/homing/fourier_homing.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
 
 namespace panonav {
 namespace {

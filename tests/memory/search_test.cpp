@@ -4,7 +4,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/kernels/dispatch.hpp"
-#include "panonav/memory/exact_search.hpp"
+#include "panonav/memory/internal/exact_search.hpp"
 #include "search_oracle.hpp"
 
 namespace panonav {

@@ -13,14 +13,14 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/homing/fourier_homing.hpp"
 #include "panonav/mapping/lattice_map.hpp"
-#include "panonav/mapping/view_pair.hpp"
 #include "panonav/memory/view_source.hpp"
 #include "panonav/navigation/area_views.hpp"
 #include "panonav/navigation/direction_field.hpp"
 #include "panonav/navigation/obstacle.hpp"
 #include "panonav/navigation/place_scale.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
+#include "panonav/relative_pose/view_pair.hpp"
 
 namespace panonav {
 namespace {

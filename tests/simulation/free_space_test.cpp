@@ -7,11 +7,11 @@
 #include <numbers>
 
 #include "panonav/core/error.hpp"
-#include "panonav/simulation/affine3.hpp"
-#include "panonav/simulation/mesh_library.hpp"
-#include "panonav/simulation/occupancy.hpp"
+#include "panonav/simulation/internal/affine3.hpp"
+#include "panonav/simulation/internal/mesh_library.hpp"
+#include "panonav/simulation/internal/occupancy.hpp"
+#include "panonav/simulation/internal/shapes.hpp"
 #include "panonav/simulation/scenes.hpp"
-#include "panonav/simulation/shapes.hpp"
 
 namespace panonav {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/simulation/free_space.hpp"
-#include "panonav/simulation/mesh_library.hpp"
+#include "panonav/simulation/internal/mesh_library.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace panonav {

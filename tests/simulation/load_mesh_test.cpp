@@ -6,7 +6,7 @@
 #include <fstream>
 
 #include "panonav/core/error.hpp"
-#include "panonav/simulation/mesh_library.hpp"
+#include "panonav/simulation/internal/mesh_library.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace panonav {

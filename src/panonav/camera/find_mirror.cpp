@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <numbers>
 
-#include "panonav/camera/circle_search.hpp"
-#include "panonav/camera/edge_field.hpp"
+#include "panonav/camera/internal/circle_search.hpp"
+#include "panonav/camera/internal/edge_field.hpp"
 #include "panonav/core/error.hpp"
 
 namespace panonav {

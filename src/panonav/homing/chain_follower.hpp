@@ -4,9 +4,9 @@
 #include <optional>
 
 #include "panonav/core/options.hpp"
-#include "panonav/homing/fourier_homing.hpp"
 #include "panonav/homing/homing_pursuit.hpp"
 #include "panonav/homing/snapshot_chain.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
 
 namespace panonav {
 

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "panonav/core/options.hpp"
-#include "panonav/homing/fourier_homing.hpp"
 #include "panonav/homing/snapshot_chain.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
 
 namespace panonav {
 

@@ -3,8 +3,8 @@
 #include <optional>
 
 #include "panonav/core/options.hpp"
-#include "panonav/homing/fourier_homing.hpp"
-#include "panonav/homing/homing_view.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
+#include "panonav/relative_pose/homing_view.hpp"
 
 namespace panonav {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "panonav/geometry/pose2.hpp"
-#include "panonav/homing/homing_view.hpp"
+#include "panonav/relative_pose/homing_view.hpp"
 
 namespace panonav {
 

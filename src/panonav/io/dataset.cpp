@@ -10,9 +10,9 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/io/camera_file.hpp"
-#include "panonav/io/csv_table.hpp"
+#include "panonav/io/internal/csv_table.hpp"
+#include "panonav/io/internal/written_degrees.hpp"
 #include "panonav/io/toml_fields.hpp"
-#include "panonav/io/written_degrees.hpp"
 
 namespace panonav {
 

@@ -6,7 +6,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/io/atomic_file.hpp"
-#include "panonav/io/image_codecs.hpp"
+#include "panonav/io/internal/image_codecs.hpp"
 
 namespace panonav {
 

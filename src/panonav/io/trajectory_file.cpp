@@ -10,8 +10,8 @@
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
-#include "panonav/io/csv_table.hpp"
-#include "panonav/io/written_degrees.hpp"
+#include "panonav/io/internal/csv_table.hpp"
+#include "panonav/io/internal/written_degrees.hpp"
 
 namespace panonav {
 

@@ -12,9 +12,9 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/kernels/likeness.hpp"
 #include "panonav/localisation/hierarchical.hpp"
-#include "panonav/localisation/particle_motion.hpp"
-#include "panonav/localisation/resampling.hpp"
-#include "panonav/localisation/view_likelihood.hpp"
+#include "panonav/localisation/internal/particle_motion.hpp"
+#include "panonav/localisation/internal/resampling.hpp"
+#include "panonav/localisation/internal/view_likelihood.hpp"
 
 namespace panonav {
 

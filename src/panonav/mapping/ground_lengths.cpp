@@ -5,7 +5,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/median.hpp"
-#include "panonav/mapping/ground_displacement.hpp"
+#include "panonav/mapping/internal/ground_displacement.hpp"
 #include "panonav/mapping/visual_odometry.hpp"
 
 namespace panonav {

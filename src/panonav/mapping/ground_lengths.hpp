@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "panonav/homing/homing_view.hpp"
+#include "panonav/relative_pose/homing_view.hpp"
 
 namespace panonav {
 

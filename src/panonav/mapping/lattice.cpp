@@ -12,10 +12,10 @@
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/positions.hpp"
+#include "panonav/mapping/internal/lattice_solver.hpp"
+#include "panonav/mapping/internal/lattice_springs.hpp"
+#include "panonav/mapping/internal/lattice_start.hpp"
 #include "panonav/mapping/lattice_graph.hpp"
-#include "panonav/mapping/lattice_solver.hpp"
-#include "panonav/mapping/lattice_springs.hpp"
-#include "panonav/mapping/lattice_start.hpp"
 
 namespace panonav {
 

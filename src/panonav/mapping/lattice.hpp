@@ -9,8 +9,8 @@
 #include "panonav/core/options.hpp"
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/mapping/dissimilarity_curve.hpp"
-#include "panonav/mapping/view_pair.hpp"
 #include "panonav/memory/visual_memory.hpp"
+#include "panonav/relative_pose/view_pair.hpp"
 
 namespace panonav {
 

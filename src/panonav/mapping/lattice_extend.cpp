@@ -3,9 +3,9 @@
 #include <map>
 
 #include "panonav/core/error.hpp"
+#include "panonav/mapping/internal/lattice_solver.hpp"
+#include "panonav/mapping/internal/lattice_springs.hpp"
 #include "panonav/mapping/lattice.hpp"
-#include "panonav/mapping/lattice_solver.hpp"
-#include "panonav/mapping/lattice_springs.hpp"
 #include "panonav/signature/dissimilarity.hpp"
 
 namespace panonav {

@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
-#include "panonav/homing/fourier_homing.hpp"
-#include "panonav/homing/homing_view.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
+#include "panonav/relative_pose/homing_view.hpp"
 
 namespace panonav {
 

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
-#include "panonav/homing/fourier_homing.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
 
 namespace panonav {
 

@@ -8,7 +8,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/median.hpp"
-#include "panonav/mapping/azimuth_flow.hpp"
+#include "panonav/mapping/internal/azimuth_flow.hpp"
 #include "panonav/signature/compass.hpp"
 #include "panonav/signature/dissimilarity.hpp"
 

@@ -6,9 +6,9 @@
 
 #include "panonav/core/options.hpp"
 #include "panonav/geometry/pose2.hpp"
-#include "panonav/homing/fourier_homing.hpp"
-#include "panonav/homing/homing_view.hpp"
 #include "panonav/mapping/ground_lengths.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
+#include "panonav/relative_pose/homing_view.hpp"
 #include "panonav/signature/fourier_signature.hpp"
 
 namespace panonav {

@@ -10,11 +10,11 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
-#include "panonav/memory/comparison.hpp"
-#include "panonav/memory/exact_search.hpp"
-#include "panonav/memory/link_set.hpp"
-#include "panonav/memory/sketch_index.hpp"
-#include "panonav/memory/view_store.hpp"
+#include "panonav/memory/internal/comparison.hpp"
+#include "panonav/memory/internal/exact_search.hpp"
+#include "panonav/memory/internal/link_set.hpp"
+#include "panonav/memory/internal/sketch_index.hpp"
+#include "panonav/memory/internal/view_store.hpp"
 
 namespace panonav {
 

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
-#include "panonav/homing/fourier_homing.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
 #include "panonav/signature/dissimilarity.hpp"
 
 namespace panonav {

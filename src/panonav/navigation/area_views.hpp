@@ -7,10 +7,10 @@
 #include <span>
 #include <vector>
 
-#include "panonav/homing/homing_view.hpp"
 #include "panonav/memory/view_source.hpp"
 #include "panonav/navigation/navigation_graph.hpp"
 #include "panonav/navigation/sub_areas.hpp"
+#include "panonav/relative_pose/homing_view.hpp"
 #include "panonav/signature/compass.hpp"
 
 namespace panonav {

@@ -8,11 +8,11 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/homing/fourier_homing.hpp"
-#include "panonav/mapping/view_pair.hpp"
 #include "panonav/memory/view_source.hpp"
 #include "panonav/navigation/navigation_graph.hpp"
 #include "panonav/navigation/place_scale.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
+#include "panonav/relative_pose/view_pair.hpp"
 
 namespace panonav {
 

@@ -12,11 +12,11 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/median.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/homing/fourier_homing.hpp"
-#include "panonav/homing/homing_view.hpp"
-#include "panonav/localisation/sample.hpp"
-#include "panonav/mapping/view_pair.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
+#include "panonav/relative_pose/homing_view.hpp"
+#include "panonav/relative_pose/view_pair.hpp"
 
 namespace panonav {
 

@@ -10,9 +10,9 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/median.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/homing/fourier_homing.hpp"
-#include "panonav/navigation/navigator_place.hpp"
+#include "panonav/navigation/internal/navigator_place.hpp"
 #include "panonav/navigation/obstacle.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
 
 namespace panonav {
 

@@ -8,8 +8,8 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/median.hpp"
-#include "panonav/homing/fourier_homing.hpp"
-#include "panonav/mapping/view_pair.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
+#include "panonav/relative_pose/view_pair.hpp"
 
 namespace panonav {
 

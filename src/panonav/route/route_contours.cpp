@@ -11,7 +11,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/median.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/route/line_sampling.hpp"
+#include "panonav/route/internal/line_sampling.hpp"
 
 namespace panonav {
 

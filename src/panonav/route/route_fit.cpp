@@ -13,7 +13,7 @@
 #include "panonav/core/median.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/motion/path.hpp"
-#include "panonav/route/line_sampling.hpp"
+#include "panonav/route/internal/line_sampling.hpp"
 
 namespace panonav {
 

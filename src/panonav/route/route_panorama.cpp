@@ -7,7 +7,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/motion/path.hpp"
-#include "panonav/route/line_sampling.hpp"
+#include "panonav/route/internal/line_sampling.hpp"
 
 namespace panonav {
 

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
-#include "panonav/simulation/occupancy.hpp"
+#include "panonav/simulation/internal/occupancy.hpp"
 
 namespace panonav {
 

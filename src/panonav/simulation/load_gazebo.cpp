@@ -12,10 +12,10 @@
 #endif
 
 #include "panonav/core/error.hpp"
-#include "panonav/simulation/gazebo_files.hpp"
-#include "panonav/simulation/material_script.hpp"
-#include "panonav/simulation/mesh_library.hpp"
-#include "panonav/simulation/shapes.hpp"
+#include "panonav/simulation/internal/gazebo_files.hpp"
+#include "panonav/simulation/internal/material_script.hpp"
+#include "panonav/simulation/internal/mesh_library.hpp"
+#include "panonav/simulation/internal/shapes.hpp"
 
 namespace panonav {
 

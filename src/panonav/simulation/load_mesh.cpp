@@ -10,7 +10,7 @@
 #include <cmath>
 
 #include "panonav/core/error.hpp"
-#include "panonav/simulation/mesh_library.hpp"
+#include "panonav/simulation/internal/mesh_library.hpp"
 
 namespace panonav {
 

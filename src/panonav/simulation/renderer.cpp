@@ -10,10 +10,10 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
-#include "panonav/simulation/light.hpp"
+#include "panonav/simulation/internal/light.hpp"
+#include "panonav/simulation/internal/ray_tracer.hpp"
+#include "panonav/simulation/internal/texture_sampler.hpp"
 #include "panonav/simulation/mirror.hpp"
-#include "panonav/simulation/ray_tracer.hpp"
-#include "panonav/simulation/texture_sampler.hpp"
 
 namespace panonav {
 

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "panonav/core/error.hpp"
-#include "panonav/simulation/built_in_scenes.hpp"
+#include "panonav/simulation/internal/built_in_scenes.hpp"
 
 namespace panonav {
 

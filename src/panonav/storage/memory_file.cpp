@@ -9,14 +9,14 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
-#include "panonav/storage/chain_tables.hpp"
 #include "panonav/storage/checksum.hpp"
-#include "panonav/storage/map_tables.hpp"
-#include "panonav/storage/memory_file_access.hpp"
-#include "panonav/storage/memory_file_implementation.hpp"
+#include "panonav/storage/internal/chain_tables.hpp"
+#include "panonav/storage/internal/map_tables.hpp"
+#include "panonav/storage/internal/memory_file_access.hpp"
+#include "panonav/storage/internal/memory_file_implementation.hpp"
+#include "panonav/storage/internal/memory_schema.hpp"
+#include "panonav/storage/internal/route_tables.hpp"
 #include "panonav/storage/memory_header.hpp"
-#include "panonav/storage/memory_schema.hpp"
-#include "panonav/storage/route_tables.hpp"
 
 namespace panonav {
 

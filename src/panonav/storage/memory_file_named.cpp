@@ -1,11 +1,11 @@
 // Chains, maps and routes of a memory file, each under a name.
 
 #include "panonav/core/error.hpp"
-#include "panonav/storage/chain_tables.hpp"
-#include "panonav/storage/map_tables.hpp"
-#include "panonav/storage/memory_file_implementation.hpp"
-#include "panonav/storage/memory_schema.hpp"
-#include "panonav/storage/route_tables.hpp"
+#include "panonav/storage/internal/chain_tables.hpp"
+#include "panonav/storage/internal/map_tables.hpp"
+#include "panonav/storage/internal/memory_file_implementation.hpp"
+#include "panonav/storage/internal/memory_schema.hpp"
+#include "panonav/storage/internal/route_tables.hpp"
 
 namespace panonav {
 

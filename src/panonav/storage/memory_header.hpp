@@ -1,9 +1,19 @@
 #pragma once
 
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <variant>
+#include <vector>
+
 #include "panonav/storage/memory_file.hpp"
-#include "panonav/storage/memory_schema.hpp"
 
 namespace panonav {
+
+/// What a memory file says of itself, by key.
+using SettingValue = std::variant<std::int64_t, double, std::string, std::vector<std::uint8_t>>;
+using Settings = std::map<std::string, SettingValue, std::less<>>;
 
 /// Throws ContractError or OptionError that names the field, its value and its range.
 void validate(const MemoryHeader& header);

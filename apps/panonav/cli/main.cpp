@@ -1,0 +1,56 @@
+#include <csignal>
+#include <iostream>
+#include <new>
+#include <string>
+
+#include "cli/arguments.hpp"
+#include "cli/session.hpp"
+#include "cli/verbs.hpp"
+#include "panonav/core/error.hpp"
+
+namespace {
+
+using panonav::command::ExitCode;
+
+/// One line, whatever the message holds.
+void report(std::string_view verb, std::string message) {
+  for (char& c : message) {
+    if (c == '\n' || c == '\r') c = ' ';
+  }
+  std::cerr << "panonav" << (verb.empty() ? "" : " ") << verb << ": " << message << '\n';
+}
+
+ExitCode run(std::string_view& verb, int argc, char** argv) {
+  const auto verbs = panonav::command::all_verbs();
+  verb = panonav::command::verb_in(verbs, argc, argv);
+  const auto command = panonav::command::parse(verbs, argc, argv);
+  if (!command) return ExitCode::done;
+  panonav::command::Session session(command->common.json, command->common.threads);
+  const ExitCode code = command->run(session);
+  session.finish_output();
+  return code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  // A file that hits its size limit is then a failed write with a message, not a killed process.
+  std::signal(SIGXFSZ, SIG_IGN);
+  std::string_view verb;
+  try {
+    return static_cast<int>(run(verb, argc, argv));
+  } catch (const panonav::command::UsageError& error) {
+    std::string hint = verb.empty() ? "panonav --help" : "panonav " + std::string(verb) + " --help";
+    report(verb, std::string(error.what()) + "; see " + hint);
+    return static_cast<int>(ExitCode::bad_input);
+  } catch (const panonav::Error& error) {
+    report(verb, error.what());
+    return static_cast<int>(ExitCode::bad_input);
+  } catch (const std::bad_alloc&) {
+    report(verb, "not enough memory");
+    return static_cast<int>(ExitCode::fault);
+  } catch (const std::exception& error) {
+    report(verb, std::string("fault of the program: ") + error.what());
+    return static_cast<int>(ExitCode::fault);
+  }
+}

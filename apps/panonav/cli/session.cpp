@@ -1,0 +1,93 @@
+#include "cli/session.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <iomanip>
+#include <iostream>
+#include <sstream>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+bool wants_colours(int descriptor) {
+  const char* terminal = std::getenv("TERM");
+  return isatty(descriptor) == 1 && std::getenv("NO_COLOR") == nullptr && terminal != nullptr &&
+         std::string_view(terminal) != "dumb";
+}
+
+}  // namespace
+
+Session::Session(bool json, int threads)
+    : json_(json), colours_(!json && wants_colours(STDOUT_FILENO)), executor_(threads) {}
+
+void Session::print(std::string_view line) {
+  std::cout << line << '\n';
+}
+
+void Session::note(std::string_view line) {
+  std::cerr << line << '\n';
+}
+
+void Session::finish_output() {
+  std::cout.flush();
+  if (!std::cout) throw FileError("standard output", "cannot be written; is the disk full?");
+}
+
+std::string Session::styled(std::string_view text, std::string_view code) const {
+  if (!colours_) return std::string(text);
+  return "\033[" + std::string(code) + "m" + std::string(text) + "\033[0m";
+}
+
+std::string Session::strong(std::string_view text) const {
+  return styled(text, "1");
+}
+std::string Session::good(std::string_view text) const {
+  return styled(text, "32");
+}
+std::string Session::bad(std::string_view text) const {
+  return styled(text, "31");
+}
+
+Progress::Progress(std::string label, std::size_t total)
+    : label_(std::move(label)), total_(total), terminal_(isatty(STDERR_FILENO) == 1) {}
+
+Progress::~Progress() {
+  clear();
+}
+
+void Progress::advance(std::size_t steps) {
+  done_ += steps;
+  if (!terminal_) return;
+  const auto now = Clock::now();
+  using namespace std::chrono_literals;
+  if (now - start_ < 1s || now - last_draw_ < 100ms) return;
+  last_draw_ = now;
+  draw();
+}
+
+void Progress::relabel(std::string label) {
+  label_ = std::move(label);
+  if (terminal_ && Clock::now() - start_ >= std::chrono::seconds(1)) draw();
+}
+
+void Progress::draw() {
+  constexpr std::size_t width = 30;
+  const std::size_t filled = total_ == 0 ? 0 : std::min(width, width * done_ / total_);
+  std::cerr << "\r\033[K" << label_ << " [" << std::string(filled, '=')
+            << std::string(width - filled, ' ') << "] " << done_ << '/' << total_ << std::flush;
+  drawn_ = true;
+}
+
+void Progress::clear() {
+  if (!drawn_) return;
+  std::cerr << "\r\033[K" << std::flush;
+  drawn_ = false;
+}
+
+}  // namespace panonav::command

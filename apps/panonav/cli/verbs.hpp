@@ -1,0 +1,33 @@
+#pragma once
+
+#include <vector>
+
+#include "cli/verb.hpp"
+
+namespace panonav::command {
+
+/// Every verb, in the order in which a newcomer meets them.
+[[nodiscard]] std::vector<Verb> all_verbs();
+
+[[nodiscard]] Verb arrange_verb();
+[[nodiscard]] Verb calibrate_verb();
+[[nodiscard]] Verb catchment_verb();
+[[nodiscard]] Verb demo_verb();
+[[nodiscard]] Verb evaluate_verb();
+[[nodiscard]] Verb forget_verb();
+[[nodiscard]] Verb home_verb();
+[[nodiscard]] Verb info_verb();
+[[nodiscard]] Verb localise_verb();
+[[nodiscard]] Verb map_verb();
+[[nodiscard]] Verb memorise_verb();
+[[nodiscard]] Verb navigate_verb();
+[[nodiscard]] Verb prune_verb();
+[[nodiscard]] Verb reproduce_verb();
+[[nodiscard]] Verb route_follow_verb();
+[[nodiscard]] Verb route_record_verb();
+[[nodiscard]] Verb simulate_verb();
+[[nodiscard]] Verb track_verb();
+[[nodiscard]] Verb unwrap_verb();
+[[nodiscard]] Verb verify_verb();
+
+}  // namespace panonav::command

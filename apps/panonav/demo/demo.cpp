@@ -1,0 +1,445 @@
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string_view>
+#include <vector>
+
+#include "cli/arguments.hpp"
+#include "cli/session.hpp"
+#include "cli/verbs.hpp"
+#include "demo/homing.hpp"
+#include "demo/maps.hpp"
+#include "demo/navigation.hpp"
+#include "demo/pictures.hpp"
+#include "demo/recordings.hpp"
+#include "demo/route.hpp"
+#include "demo/track.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/core/statistics.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/io/image_file.hpp"
+#include "reports/report_page.hpp"
+#include "verbs/memorising.hpp"
+#include "verbs/stored_lattice.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string percent(double share) {
+  return fixed(100.0 * share, 0) + " %";
+}
+
+// Raw picture, what calibration found in it, and the cylinder made of it.
+void show_camera(const DemoRecordings& recordings, const fs::path& out, Session& session,
+                 ReportPage& page) {
+  const Dataset& asked = recordings.query_run;
+  const Image colour = recordings.colour_picture(asked.entries.front(), session.executor());
+  write_png(out / "mirror.png", colour.view());
+  const Image overlay = draw_mirror(colour.view(), recordings.mirror);
+  write_png(out / "calibration.png", overlay.view());
+  const PanoramaReader reader(asked.source, {});
+  const Panorama cylinder = reader.read(asked.entries.front().path);
+  const Image picture = to_picture(cylinder);
+  write_png(out / "cylinder.png", picture.view());
+
+  const Camera truth = recordings.true_camera;
+  const MirrorCircle& found = recordings.mirror;
+  page.part("What the robot sees", {fixed(std::hypot(found.centre.u_px - truth.centre.u_px,
+                                                     found.centre.v_px - truth.centre.v_px),
+                                          2) +
+                                        " px",
+                                    "off: the centre of the mirror, found in pictures alone"});
+  page.text(
+      "A camera looks up into a curved mirror and sees all around at once. The dark disc in the "
+      "middle is the camera "
+      "itself. Before anything else, calibration finds the mirror in some of the raw pictures: "
+      "centre, rim and inner radius. "
+      "Everything below uses what it found, not the simulator's own numbers.");
+  page.pictures(
+      {{"mirror.png", "Raw picture of the mirror camera, " +
+                          std::to_string(truth.image_size.width) + " x " +
+                          std::to_string(truth.image_size.height) +
+                          " (in colour for you; the robot works on grey)"},
+       {"calibration.png",
+        "What calibration found in " + std::to_string(recordings.calibrated_on) +
+            " raw pictures: rim green, inner radius orange, centre red. The centre is off by " +
+            fixed(std::hypot(found.centre.u_px - truth.centre.u_px,
+                             found.centre.v_px - truth.centre.v_px),
+                  2) +
+            " pixels, the rim by " + fixed(std::abs(found.rim_radius_px - truth.rim_radius_px), 2) +
+            "."}});
+  page.text(
+      "The picture is then unwrapped to a panoramic cylinder. Of each of its 80 rows only the "
+      "first "
+      "15 Fourier components "
+      "are kept, 2.4 kB a view. Their magnitudes do not change when the robot turns, so they tell "
+      "the place whichever way "
+      "it faces; their phases tell the heading.");
+  page.pictures({{"cylinder.png",
+                  "The same view as a cylinder of 512 x 80 pixels, forward in the middle, left on "
+                  "the left"}});
+}
+
+std::vector<AskedView> ask(const Localiser& localiser, const ViewEncoder& pipeline,
+                           const Dataset& queries, Executor& executor) {
+  std::vector<std::optional<AskedView>> asked(queries.entries.size());
+  for_each_entry(executor, queries.entries.size(), [&](std::size_t i) {
+    const auto& entry = queries.entries[i];
+    PackedSignature signature = pipeline.packed(pipeline.read(entry));
+    Localisation found = localiser.localise(signature);
+    const ReferencePose& pose = *entry.pose;
+    asked[i] =
+        AskedView{{pose.x_m, pose.y_m, *pose.heading_rad}, std::move(signature), std::move(found)};
+  });
+  std::vector<AskedView> all;
+  for (auto& view : asked) all.push_back(std::move(*view));
+  return all;
+}
+
+/// What the answers are worth.
+struct Outcome {
+  std::vector<double> errors_m;
+  std::vector<double> nearest_errors_m;
+  std::vector<double> heading_errors_rad;
+  double known = 0.0;        ///< share of all questions
+  double bytes_share = 0.0;  ///< of a full scan
+};
+
+Outcome outcome_of(const std::vector<AskedView>& asked, const VisualMemory& memory) {
+  Outcome outcome;
+  std::uint64_t read = 0;
+  std::uint64_t in_full = 0;
+  std::size_t known = 0;
+  for (const auto& [truth, signature, found] : asked) {
+    known += found.known ? 1 : 0;
+    read += found.bytes_read;
+    in_full += found.bytes_in_full;
+    if (!found.matches.empty()) {
+      const Point2 nearest = memory.info(found.matches.front().view).pose->position();
+      outcome.nearest_errors_m.push_back(distance(nearest, truth.position()));
+    }
+    if (found.position) {
+      outcome.errors_m.push_back(distance(found.position->position, truth.position()));
+    }
+    if (found.heading_rad) {
+      outcome.heading_errors_rad.push_back(
+          std::abs(angle_difference(*found.heading_rad, truth.heading_rad)));
+    }
+  }
+  outcome.known = static_cast<double>(known) / static_cast<double>(asked.size());
+  outcome.bytes_share = static_cast<double>(read) / static_cast<double>(in_full);
+  return outcome;
+}
+
+std::string median_text(const std::vector<double>& values, double unit, int digits,
+                        std::string_view name) {
+  if (values.empty()) return "none";
+  return fixed(unit * median(values), digits) + " " + std::string(name);
+}
+
+void show_answers(const VisualMemory& memory, const FloorPlan& plan,
+                  const std::vector<AskedView>& asked, const Outcome& own, const Outcome& foreign,
+                  double spacing_m, const fs::path& out, ReportPage& page) {
+  draw_answers(memory, plan, asked, out / "map.png");
+  const std::string spacing = fixed(100.0 * spacing_m, 0) + " cm";
+  page.part("It remembers and localises itself",
+            {median_text(own.errors_m, 100.0, 1, "cm"), "median error, from one picture"});
+  page.text("The robot took a view every " + spacing +
+            " and remembered it. Then it was put down at " + std::to_string(asked.size()) +
+            " random places between them, facing anywhere, and asked from one new picture each: "
+            "where are you, and which way do "
+            "you face? It was also put into another room, where the right answer is that it does "
+            "not know the place.");
+  page.figures({{std::to_string(memory.size()), "views remembered, " + spacing + " apart"},
+                {median_text(own.errors_m, 100.0, 1, "cm"), "median error of the position"},
+                {median_text(own.heading_errors_rad, degrees(1.0), 2, "degrees"),
+                 "median error of the heading"},
+                {percent(own.known), "of its own places recognised"},
+                {percent(foreign.known), "of the views of another room taken for this one"}});
+  page.text(
+      "On the map, circles are the remembered views and green crosses the places where the robot "
+      "was put down. From each a "
+      "line runs to where its memory says it is; the shorter, the better. The nearest remembered "
+      "view alone would be " +
+      median_text(own.nearest_errors_m, 100.0, 1, "cm") +
+      " off (median): the position is interpolated between views.");
+  page.pictures({{"map.png", "True places, and the error of each answer"}});
+}
+
+/// The first place that was recognised stands for all.
+const AskedView& shown_view(const std::vector<AskedView>& asked) {
+  const auto known =
+      std::find_if(asked.begin(), asked.end(), [](const auto& view) { return view.found.known; });
+  return known == asked.end() ? asked.front() : *known;
+}
+
+void show_levels(const VisualMemory& memory, const FloorPlan& plan, const AskedView& view,
+                 double spacing_m, const fs::path& out, ReportPage& page) {
+  const auto areas_m2 = draw_areas(memory, plan, view, out / "areas.png");
+  draw_similarity(memory, spacing_m, view, out / "similarity.png");
+  page.part("As accurate as needed",
+            {fixed(areas_m2.front(), 1) + " to " + fixed(areas_m2.back(), 2) + " m²",
+             "where it may be, with 1 to 15 components compared"});
+  page.text(
+      "With one Fourier component compared, the robot may be anywhere in a large area (" +
+      fixed(areas_m2.front(), 1) +
+      " square metres here); with each further component the area shrinks, down to " +
+      fixed(areas_m2.back(), 2) +
+      ". In the open a coarse answer is enough and costs less; at a door a fine one is needed.");
+  page.pictures({{"areas.png",
+                  "Orange: where the robot may be, after 1, 3, 6 and 15 components. Red cross: "
+                  "where it is."}});
+  page.pictures({{"similarity.png",
+                  "How similar each remembered view is to the one asked for. It falls with "
+                  "distance on all sides."}});
+}
+
+void show_what_next(const DemoOptions& wanted, const DemoRecordings& recordings,
+                    const DemoNavigation& navigation, ReportPage& page) {
+  const auto in_out = [&](const char* name) { return (wanted.out / name).string(); };
+  page.section("Try it yourself");
+  page.text(
+      "The recordings and the memory of this run lie beside this page. Each command shows more "
+      "with --help.");
+  const std::string memory = in_out("office.panonav");
+  const SimulationArguments seen = simulation_of(wanted, 0);
+  std::string mission;
+  for (const std::string& word : navigation.first_mission) mission += " " + word;
+  page.commands(
+      {"alias panonav=build/release/bin/panonav", "panonav info " + memory,
+       "panonav localise " + memory + " " + in_out("query_run"),
+       "panonav localise " + memory + " " + in_out("elsewhere_run") + "    # another room: unknown",
+       "panonav localise " + memory + " " + recordings.query_run.entries.front().path.string() +
+           " --areas",
+       "panonav track " + memory + " " + in_out("walk_run") + " --report " + in_out("track_report"),
+       "panonav home view_00000.png " + recordings.query_run.entries.front().path.string() +
+           " --memory " + memory + " --report " + in_out("way_home"),
+       "panonav navigate " + memory + " --scene office --scene-seed " +
+           std::to_string(seen.simulation.scene.scene_seed) + " --exposure " +
+           short_number(seen.sensor.exposure) + mission + " --picture " + in_out("way.png"),
+       "panonav unwrap " + recordings.query_run.entries.front().path.string() + " --camera " +
+           (recordings.query_run.folder / "camera.toml").string() + " -o panorama.png"});
+}
+
+/// What came of all parts.
+struct DemoResults {
+  std::size_t views = 0;
+  std::size_t questions = 0;
+  Outcome own;
+  Outcome foreign;
+  DemoTrack track;
+  DemoMaps maps;
+  DemoHoming homing;
+  DemoRoute route;
+  DemoNavigation navigation;
+  double seconds = 0.0;
+};
+
+nlohmann::ordered_json median_or_null(const std::vector<double>& values) {
+  return values.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(median(values));
+}
+
+template <typename Value>
+nlohmann::ordered_json value_or_null(const std::optional<Value>& value) {
+  return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json();
+}
+
+nlohmann::ordered_json as_json(const MissionRun& run) {
+  return {{"end", name_of(run.end)},
+          {"goal_distance_m", run.end_distance_m},
+          {"looks", run.decisions.size()},
+          {"travelled_m", run.travelled_m},
+          {"shortest_m", run.shortest_m}};
+}
+
+nlohmann::ordered_json as_json(const DemoResults& done, const fs::path& out) {
+  const DemoNavigation& navigation = done.navigation;
+  return {{"report", (out / "index.html").string()},
+          {"views", done.views},
+          {"questions", done.questions},
+          {"position_error_m", median_or_null(done.own.errors_m)},
+          {"heading_error_rad", median_or_null(done.own.heading_errors_rad)},
+          {"known", done.own.known},
+          {"known_elsewhere", done.foreign.known},
+          {"bytes_share", done.own.bytes_share},
+          {"track_images", done.track.images},
+          {"track_until_localised", value_or_null(done.track.until_localised)},
+          {"track_until_found_again", value_or_null(done.track.until_found_again)},
+          {"track_localised", done.track.localised},
+          {"track_wrong", done.track.wrong},
+          {"track_error_m", median_or_null(done.track.errors_m)},
+          {"arranged_shape_difference",
+           done.maps.lattice ? nlohmann::ordered_json(done.maps.lattice->shape_difference)
+                             : nlohmann::ordered_json()},
+          {"drive_shape_difference", done.maps.map_error},
+          {"wheels_shape_difference", done.maps.wheels_error},
+          {"runs_home", done.homing.runs.size()},
+          {"arrived_home", done.homing.arrived},
+          {"home_error_m", median(done.homing.distances_m)},
+          {"route_runs", done.route.runs.size()},
+          {"route_completed", done.route.completed},
+          {"route_distance_m", median_or_null(done.route.lateral_m)},
+          {"missions", navigation.runs.size()},
+          {"missions_arrived", navigation.arrived},
+          {"mission_detour", median_or_null(navigation.detours)},
+          {"mission_looks", median_or_null(navigation.looks)},
+          {"mission_carried", as_json(navigation.carried)},
+          {"mission_screen",
+           navigation.screened ? as_json(*navigation.screened) : nlohmann::ordered_json()},
+          {"seconds", done.seconds}};
+}
+
+std::string images_text(const std::optional<std::size_t>& images) {
+  return images ? "after " + std::to_string(*images) + (*images == 1 ? " image" : " images")
+                : "never";
+}
+
+void print(const DemoResults& done, Session& session) {
+  const auto of = [](std::size_t part, std::size_t all) {
+    return std::to_string(part) + " of " + std::to_string(all);
+  };
+  session.print("panonav demo: " + std::to_string(done.views) + " views of an office remembered, " +
+                std::to_string(done.questions) + " questions asked, " + fixed(done.seconds, 0) +
+                " s");
+  session.print(
+      "  position: median error " + median_text(done.own.errors_m, 100.0, 1, "cm") +
+      "; heading: " + median_text(done.own.heading_errors_rad, degrees(1.0), 2, "degrees"));
+  session.print("  own places recognised: " + percent(done.own.known) +
+                "; views of another room taken for this one: " + percent(done.foreign.known));
+  session.print("  tracked: localised " + images_text(done.track.until_localised) +
+                "; carried away, found again " + images_text(done.track.until_found_again) +
+                "; median error " + median_text(done.track.errors_m, 100.0, 1, "cm") + "; " +
+                of(done.track.wrong, done.track.localised) + " answers wrong");
+  session.print("  arranged without positions: shape difference " +
+                (done.maps.lattice ? fixed(done.maps.lattice->shape_difference, 3) : "none") +
+                "; map from a drive: " + fixed(done.maps.map_error, 3) + ", its wheels alone " +
+                fixed(done.maps.wheels_error, 3));
+  session.print("  home from one metre away: " + of(done.homing.arrived, done.homing.runs.size()) +
+                " runs ended within 10 cm; median " +
+                fixed(100.0 * median(done.homing.distances_m), 1) + " cm");
+  session.print("  a route of " + fixed(done.route.length_m, 0) +
+                " m repeated from 0.3 m off: " + of(done.route.completed, done.route.runs.size()) +
+                " runs reached its end; distance from it: median " +
+                median_text(done.route.lateral_m, 100.0, 1, "cm"));
+  const DemoNavigation& navigation = done.navigation;
+  session.print("  missions by views alone: " + of(navigation.arrived, navigation.runs.size()) +
+                " arrived; way driven over the shortest: median " +
+                (navigation.detours.empty() ? "none" : fixed(median(navigation.detours), 2)) +
+                "; carried away half way: " + std::string(name_of(navigation.carried.end)) +
+                "; a screen in the way: " +
+                (navigation.screened ? std::string(name_of(navigation.screened->end)) : "none"));
+}
+
+ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
+  const auto start = std::chrono::steady_clock::now();
+  const fs::path& out = wanted.out;
+  prepare_demo_folder(out);
+  constexpr int parts = 8;
+  int part = 0;
+  Progress progress("demo", parts);
+  const auto next_part = [&](const std::string& what) {
+    if (part > 0) progress.advance();
+    progress.relabel("part " + std::to_string(++part) + " of " + std::to_string(parts) + ": " +
+                     what);
+  };
+  next_part("simulates what the robot sees");
+  const auto recordings = record_demo(wanted, session);
+  if (!recordings) {
+    session.note("panonav demo: no mirror was found in the simulated pictures");
+    return ExitCode::no_answer;
+  }
+  ReportPage page("panonav: a robot that remembers what places look like",
+                  "A simulated robot with one mirror camera drives through an office and remembers "
+                  "what it looks like. From that memory alone it says where it is, is found again "
+                  "when it was carried away, arranges what it remembers, finds home, repeats a "
+                  "route and goes where it is told. No laser, no GPU, no training. Each figure "
+                  "leads to its part below.");
+  show_camera(*recordings, out, session, page);
+
+  next_part("remembers and localises itself");
+  MemoryFile file = MemoryFile::create(
+      out / "office.panonav", header_from_first_views(recordings->memory_run, SignatureOptions{},
+                                                      PreprocessingOptions{}, session.executor()));
+  const auto pipeline =
+      std::make_shared<const ViewEncoder>(file.header(), recordings->memory_run.source);
+  (void)append_views(recordings->memory_run, *pipeline, true, file, session);
+  const VisualMemory memory = file.load();
+  const Localiser localiser(memory);
+  const auto asked = ask(localiser, *pipeline, recordings->query_run, session.executor());
+  const auto elsewhere = ask(localiser, *pipeline, recordings->elsewhere_run, session.executor());
+  DemoResults done{.views = memory.size(), .questions = asked.size()};
+  done.own = outcome_of(asked, memory);
+  done.foreign = outcome_of(elsewhere, memory);
+  constexpr double margin_m = 1.2;  // furniture stands around the free floor
+  const FloorPlan plan = floor_plan(
+      *recordings->office, {recordings->low.x_m - margin_m, recordings->low.y_m - margin_m},
+      {recordings->high.x_m + margin_m, recordings->high.y_m + margin_m});
+  show_answers(memory, plan, asked, done.own, done.foreign, wanted.spacing_m(), out, page);
+  next_part("as accurate as needed");
+  show_levels(memory, plan, shown_view(asked), wanted.spacing_m(), out, page);
+  next_part("tracks itself");
+  done.track = show_track(wanted, *recordings, memory, *pipeline, plan, session, page);
+  next_part("arranges what it remembers");
+  done.maps = show_maps(memory, wanted.seed, wanted.quick, out, session, page);
+  store_lattice(done.maps.arranged, memory, file);
+  next_part("goes home");
+  done.homing = show_homing(recordings->office_scene, plan, wanted.runs_home(), wanted.seed, out,
+                            session, page);
+  next_part("repeats a route");
+  done.route =
+      show_route(recordings->office_scene, plan, wanted.route_m(), wanted.seed, out, session, page);
+  next_part("goes where it is told");
+  done.navigation = show_navigation(wanted, *recordings, memory, done.maps.arranged, pipeline, plan,
+                                    session, page);
+  show_what_next(wanted, *recordings, done.navigation, page);
+  page.write(out);
+  progress.clear();
+
+  done.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (session.json()) {
+    session.print(as_json(done, out).dump());
+  } else {
+    print(done, session);
+    tell_report(out, session);
+  }
+  return ExitCode::done;
+}
+
+Run declare(Arguments& arguments) {
+  auto wanted = std::make_shared<DemoOptions>();
+  auto out = std::make_shared<std::string>("demo");
+  auto seed = std::make_shared<std::optional<std::uint64_t>>();
+  arguments.option("-o,--out", *out,
+                   "Folder for the report: a new one, or that of an earlier demo (default: demo)");
+  arguments.option("--seed", *seed, "Of the simulated office (default: 1)");
+  arguments.flag("--quick", wanted->quick,
+                 "A smoke run: fewer and smaller pictures, fewer questions and missions");
+  return [wanted, out, seed](Session& session) {
+    wanted->out = *out;
+    wanted->seed = seed->value_or(1);
+    return demonstrate(*wanted, session);
+  };
+}
+
+}  // namespace
+
+Verb demo_verb() {
+  return {
+      "demo", "The whole story on a simulated office, with a report to look at",
+      "A robot sees, remembers, localises and tracks itself, arranges what it remembers, goes "
+      "home, repeats\n"
+      "a route and goes where it is told. Takes about a minute on two cores. Needs nothing but "
+      "this program\n"
+      "and gnuplot. What an earlier demo left in the folder is written anew; a folder that holds "
+      "anything\n"
+      "else is refused.",
+      "  panonav demo\n  panonav demo --seed 5 -o other_office", declare};
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "cli/session.hpp"
+#include "demo/pictures.hpp"
+#include "experiments/runs/homing_run.hpp"
+#include "reports/report_page.hpp"
+
+namespace panonav::command {
+
+/// Robots that go home to places in the office, each from one view of it and about a metre away.
+struct DemoHoming {
+  std::vector<HomingRun> runs;
+  std::size_t arrived = 0;          ///< within 10 cm, and they know it
+  std::vector<double> distances_m;  ///< between home and where each run ended
+};
+
+/// Runs them and adds a section with its pictures to the page. The same seed gives the same runs.
+DemoHoming show_homing(const Scene& office, const FloorPlan& plan, int runs, std::uint64_t seed,
+                       const std::filesystem::path& out, Session& session, ReportPage& page);
+
+}  // namespace panonav::command

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+
+#include "cli/session.hpp"
+#include "experiments/runs/mapping_run.hpp"
+#include "reports/lattice_picture.hpp"
+#include "reports/report_page.hpp"
+
+namespace panonav::command {
+
+/// What the memory's views tell about how they lie.
+struct DemoMaps {
+  Lattice arranged;                          ///< the office, its views in no order
+  std::optional<LatticeComparison> lattice;  ///< beside the truth
+  double map_error = 1.0;                    ///< shape difference of a map from a drive
+  double wheels_error = 1.0;                 ///< of the wheels on the same drive
+  std::size_t closures = 0;
+};
+
+/// Arranges the views of `office` without their poses, makes a map of a drive through rooms of
+/// another place, and adds a section with both pictures to the page.
+DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick,
+                   const std::filesystem::path& out, Session& session, ReportPage& page);
+
+}  // namespace panonav::command

@@ -1,0 +1,253 @@
+#include "demo/navigation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <utility>
+
+#include "experiments/runs/mission_picture.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/core/statistics.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/positions.hpp"
+#include "panonav/io/atomic_file.hpp"
+#include "panonav/motion/path.hpp"
+#include "panonav/navigation/navigation_graph.hpp"
+#include "panonav/simulation/screen.hpp"
+#include "reporting/plot.hpp"
+#include "verbs/navigated_run.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// Random streams of the demonstration's missions.
+constexpr std::uint64_t mission_stream = 1;
+constexpr std::uint64_t carried_stream = 2;
+constexpr std::uint64_t screen_stream = 3;
+constexpr std::uint64_t noise_stream = 4;
+
+using Pipeline = std::shared_ptr<const ViewEncoder>;
+
+RememberedPlace remembered_place(const VisualMemory& memory, const Lattice& arranged,
+                                 double spacing_m) {
+  RememberedPlace remembered{memory, navigation_graph(arranged), {}, spacing_m};
+  for (const ViewId view : remembered.graph.views()) {
+    const ReferencePose& pose = *memory.info(view).pose;
+    remembered.truth.push_back({pose.x_m, pose.y_m, *pose.heading_rad});
+  }
+  return remembered;
+}
+
+/// The robot sees through the camera as it is, and understands it as it was calibrated.
+void give_sight(MissionPlace& place, const DemoRecordings& recordings, const Pipeline& pipeline) {
+  const SimulationArguments& settled = recordings.office_world->arguments();
+  place.sight = sight_through(place.renderer, recordings.true_camera, settled.frame, settled.sensor,
+                              pipeline, nullptr);
+}
+
+/// A mission, and the office with a screen across the middle of its planned way.
+struct ScreenedMission {
+  Mission mission;
+  MissionPlace place;
+};
+
+/// The first of `missions` that such a screen makes longer but not impossible.
+std::optional<ScreenedMission> screened_mission(const MissionPlace& place,
+                                                const RememberedPlace& remembered,
+                                                const std::vector<Mission>& missions,
+                                                const DemoRecordings& recordings,
+                                                const Pipeline& pipeline, Executor& executor) {
+  constexpr double width_m = 0.6;
+  constexpr double height_m = 1.0;
+  constexpr double least_detour_m = 0.1;
+  AreaPlanner planner(remembered.graph);
+  for (const Mission& mission : missions) {
+    const auto nearest = std::ranges::min_element(remembered.truth, {}, [&](const Pose2& pose) {
+      return distance(pose.position(), mission.start.position());
+    });
+    planner.set_goal(mission.goal);
+    const auto way =
+        planner.planned_way(static_cast<std::size_t>(nearest - remembered.truth.begin()));
+    if (way.size() < 4) continue;
+    const Point2 before = remembered.truth[way[way.size() / 2 - 1]].position();
+    const Point2 behind = remembered.truth[way[way.size() / 2]].position();
+    const Pose2 across{0.5 * (before.x_m + behind.x_m), 0.5 * (before.y_m + behind.y_m),
+                       std::atan2(behind.y_m - before.y_m, behind.x_m - before.x_m)};
+    MissionPlace screened = place;
+    add_screen(screened.scene, across, width_m, height_m);
+    screened.free_space = std::make_shared<const FreeSpace>(
+        screened.scene, recordings.office_world->arguments().free_space);
+    const Point2 goal = remembered.truth[*remembered.graph.node_of(mission.goal)].position();
+    const auto direct = place.free_space->shortest_path(mission.start.position(), goal);
+    const auto around = screened.free_space->shortest_path(mission.start.position(), goal);
+    if (!direct || !around || path_length_m(*around) < path_length_m(*direct) + least_detour_m)
+      continue;
+    screened.renderer =
+        std::make_shared<const Renderer>(screened.scene, RendererOptions{}, executor);
+    give_sight(screened, recordings, pipeline);
+    return ScreenedMission{mission, std::move(screened)};
+  }
+  return std::nullopt;
+}
+
+void draw_runs(const DemoNavigation& navigation, const RememberedPlace& remembered,
+               const std::vector<Mission>& missions, const FloorPlan& plan, const fs::path& path) {
+  MapLayer views{.label = "remembered views", .colour = "#cccccc"};
+  for (const Pose2& pose : remembered.truth) views.circles.push_back(pose.position());
+  MapLayer good{.label = "way to the goal", .colour = "#0072b2"};
+  MapLayer bad{.label = "ended elsewhere", .colour = "#d55e00"};
+  MapLayer starts{.label = "start", .colour = "#009e73"};
+  MapLayer goals{.label = "goal", .colour = "#000000"};
+  for (std::size_t i = 0; i < navigation.runs.size(); ++i) {
+    const MissionRun& run = navigation.runs[i];
+    starts.squares.push_back(run.path.front().position());
+    goals.crosses.push_back(
+        remembered.truth[*remembered.graph.node_of(missions[i].goal)].position());
+    std::vector<Point2> line = positions_of(run.path);
+    if (line.size() > 1) {
+      (run.arrives(navigation.within_m) ? good : bad).lines.push_back(std::move(line));
+    }
+  }
+  write_plot(path, MapPlot{.title = "All missions from above: x and y in metres",
+                           .layers = {MapLayer{.label = "furniture",
+                                               .colour = "#999999",
+                                               .filled_polygons = plan.boxes},
+                                      views, good, bad, starts, goals}});
+}
+
+std::string end_text(const MissionRun& run, double within_m) {
+  const std::string name(name_of(run.end));
+  if (run.end != NavigationState::arrived) return name;
+  return run.arrives(within_m) ? "arrived" : "arrived, but too far off";
+}
+
+/// A heading with what came of a run, and a line for each look.
+std::string log_of(const std::string& title, const std::string& goal, const MissionRun& run,
+                   double within_m) {
+  std::string text = title + ", to " + goal + ": " + end_text(run, within_m) + ", " +
+                     fixed(100.0 * run.end_distance_m, 0) + " cm from it\n";
+  for (const NavigationDecision& decision : run.decisions) text += describe(decision) + "\n";
+  return text + "\n";
+}
+
+/// What one mission more came to, as a sentence.
+std::string sentence_on(const MissionRun& run, double within_m) {
+  return "It ended as: " + end_text(run, within_m) + ", " + fixed(100.0 * run.end_distance_m, 0) +
+         " cm from the goal after " + std::to_string(run.decisions.size()) + " looks and " +
+         fixed(run.travelled_m, 1) + " m.";
+}
+
+void add_part(const DemoNavigation& navigation, ReportPage& page) {
+  const std::string count = std::to_string(navigation.runs.size());
+  const std::string arrived = std::to_string(navigation.arrived) + " of " + count;
+  const std::string within = fixed(100.0 * navigation.within_m, 1) + " cm";
+  page.part("It goes where it is told", {arrived, "missions arrived, by views alone"});
+  page.text(
+      "The goal is a remembered view. The robot knows how the views arranged themselves (part 5), "
+      "and what it sees now. It knows no positions, not where it starts, nor which way it faces, "
+      "and it has no map of walls: it feels what stands in the way of its next step. Each "
+      "remembered view has a direction "
+      "towards the goal, read from the phases of the views on the way. The robot looks, finds the "
+      "view that it is at, takes its direction, drives a step and looks again; the last stretch is "
+      "the way home to the goal's view.");
+  page.text("It was sent from " + count + " random places to " + count +
+            " random views. One more robot was carried elsewhere half way, and another one found a "
+            "screen across its way that had not been there before. A mission counts when the robot "
+            "says that it arrived and is within half the spacing of the views, " +
+            within + ".");
+  page.figures(
+      {{arrived, "missions arrived within " + within + ", and knew it"},
+       {navigation.detours.empty() ? "none" : fixed(median(navigation.detours), 2),
+        "times the shortest way, driven by those that arrived (median)"},
+       {fixed(median(navigation.looks), 0), "looks a mission (median)"},
+       {end_text(navigation.carried, navigation.within_m), "the robot that was carried away"},
+       {navigation.screened ? end_text(*navigation.screened, navigation.within_m) : "none",
+        navigation.screened ? "the robot with a screen in its way"
+                            : "no screen leaves a way round here"}});
+  std::vector<ReportPicture> pictures{
+      {"mission.png",
+       "The first mission. Arrows: which way each remembered view sends the robot; orange: the way "
+       "planned at the start; red: the way driven."},
+      {"missions.png", "All missions. A way that did not end at its goal is orange."},
+      {"mission_carried.png", "Half way, somebody carried this robot to the pink square. " +
+                                  sentence_on(navigation.carried, navigation.within_m)}};
+  if (navigation.screened) {
+    pictures.push_back({"mission_screen.png",
+                        "A screen stands across the middle of the planned way, which the memory "
+                        "does not know; the "
+                        "robot cannot stand in the grey patch around it. There is a way round. " +
+                            sentence_on(*navigation.screened, navigation.within_m)});
+  }
+  page.pictures(pictures);
+  page.link("mission.log", "Read each decision of all missions");
+}
+
+}  // namespace
+
+DemoNavigation show_navigation(const DemoOptions& options, const DemoRecordings& recordings,
+                               const VisualMemory& memory, const Lattice& arranged,
+                               std::shared_ptr<const ViewEncoder> pipeline, const FloorPlan& plan,
+                               Session& session, ReportPage& page) {
+  Executor& executor = session.executor();
+  const RememberedPlace remembered = remembered_place(memory, arranged, options.spacing_m());
+  MissionPlace place = recordings.office_world->place();
+  give_sight(place, recordings, pipeline);
+  const auto random = [&](std::uint64_t stream, int count, bool carried) {
+    return random_missions(place, remembered, {.count = count, .carried = carried},
+                           Random(options.seed, stream).next());
+  };
+  auto missions = random(mission_stream, options.missions(), false);
+  missions.push_back(random(carried_stream, 1, true).front());
+  const MissionOptions settings;
+  const std::uint64_t noise = Random(options.seed, noise_stream).next();
+  DemoNavigation navigation{.within_m = 0.5 * options.spacing_m()};
+  navigation.runs = run_missions(place, remembered, missions, settings, noise, executor);
+  navigation.carried = std::move(navigation.runs.back());
+  navigation.runs.pop_back();
+  for (const MissionRun& run : navigation.runs) {
+    navigation.looks.push_back(static_cast<double>(run.decisions.size()));
+    if (!run.arrives(navigation.within_m)) continue;
+    ++navigation.arrived;
+    if (run.shortest_m > 0.0) navigation.detours.push_back(run.travelled_m / run.shortest_m);
+  }
+  const auto draw = [&](const char* file, const std::string& what, const MissionPlace& where,
+                        const Mission& mission, const MissionRun& run) {
+    write_mission_picture(options.out / file, what + ", from above: x and y in metres", where,
+                          remembered, settings.planner, mission.goal, run);
+  };
+  const Mission& first = missions.front();
+  draw("mission.png", "To a remembered view", place, first, navigation.runs.front());
+  draw("mission_carried.png", "Carried away half way", place, missions.back(), navigation.carried);
+  draw_runs(navigation, remembered, missions, plan, options.out / "missions.png");
+  std::string log;
+  const auto add_log = [&](const std::string& title, const Mission& mission,
+                           const MissionRun& run) {
+    log += log_of(title, memory.info(mission.goal).name, run, navigation.within_m);
+  };
+  for (std::size_t i = 0; i < navigation.runs.size(); ++i) {
+    add_log("Mission " + std::to_string(i + 1), missions[i], navigation.runs[i]);
+  }
+  add_log("Carried away half way", missions.back(), navigation.carried);
+  navigation.first_mission = {"--goal", memory.info(first.goal).name, "--start",
+                              fixed(first.start.x_m, 3) + "," + fixed(first.start.y_m, 3) + "," +
+                                  fixed(degrees(first.start.heading_rad), 1)};
+  constexpr int candidates = 30;
+  if (const auto screened =
+          screened_mission(place, remembered, random(screen_stream, candidates, false), recordings,
+                           pipeline, executor)) {
+    navigation.screened =
+        run_missions(screened->place, remembered, {screened->mission}, settings, noise, executor)
+            .front();
+    draw("mission_screen.png", "A screen in the way", screened->place, screened->mission,
+         *navigation.screened);
+    add_log("A screen in the way", screened->mission, *navigation.screened);
+  }
+  write_file(options.out / "mission.log", std::string_view(log));
+  add_part(navigation, page);
+  return navigation;
+}
+
+}  // namespace panonav::command

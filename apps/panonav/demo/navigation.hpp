@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/session.hpp"
+#include "demo/pictures.hpp"
+#include "demo/recordings.hpp"
+#include "experiments/runs/mission.hpp"
+#include "panonav/mapping/lattice.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
+#include "reports/report_page.hpp"
+
+namespace panonav::command {
+
+/// Robots that go to remembered views of the office, over nothing but the arrangement of its views.
+struct DemoNavigation {
+  double within_m = 0.0;         ///< half the views' spacing
+  std::vector<MissionRun> runs;  ///< from random starts to random goals
+  std::size_t arrived = 0;       ///< within `within_m`, and they know it
+  std::vector<double> detours;   ///< of those: way driven over the shortest one
+  std::vector<double> looks;     ///< of all
+  MissionRun carried;            ///< one more, carried away half way
+  /// One more, a screen across its way; empty: no screen leaves a way round.
+  std::optional<MissionRun> screened;
+  /// The first run as options of the verb `navigate`.
+  std::vector<std::string> first_mission;
+};
+
+/// Sends them and adds a part with pictures and a log to the page. The same seed gives the same
+/// runs.
+DemoNavigation show_navigation(const DemoOptions& options, const DemoRecordings& recordings,
+                               const VisualMemory& memory, const Lattice& arranged,
+                               std::shared_ptr<const ViewEncoder> pipeline, const FloorPlan& plan,
+                               Session& session, ReportPage& page);
+
+}  // namespace panonav::command

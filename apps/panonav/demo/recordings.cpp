@@ -1,0 +1,229 @@
+#include "demo/recordings.hpp"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "panonav/camera/find_mirror.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/io/atomic_file.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav/simulation/mirror.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Says that the folder is a demo's; written first, so that an interrupted demo can be run again.
+constexpr std::string_view mark = "made_by_panonav_demo.txt";
+
+/// Everything else that a demo makes.
+constexpr std::array<std::string_view, 28> made{"memory_run",
+                                                "query_run",
+                                                "elsewhere_run",
+                                                "walk_run",
+                                                "office.panonav",
+                                                "office.panonav-wal",
+                                                "office.panonav-shm",
+                                                "mirror.png",
+                                                "calibration.png",
+                                                "cylinder.png",
+                                                "map.png",
+                                                "areas.png",
+                                                "similarity.png",
+                                                "tracked.png",
+                                                "particles.png",
+                                                "track.html",
+                                                "arranged.png",
+                                                "drive.png",
+                                                "homing.png",
+                                                "way_home.png",
+                                                "route.png",
+                                                "route_panorama.png",
+                                                "mission.png",
+                                                "mission.log",
+                                                "mission_carried.png",
+                                                "mission_screen.png",
+                                                "missions.png",
+                                                "index.html"};
+
+/// A world with the places of one recording.
+struct PlannedRun {
+  SimulatedWorld world;
+  std::vector<RecordedPose> poses;
+  bool with_path;
+};
+
+PlannedRun plan(SimulatedWorld world) {
+  const auto& settled = world.arguments();
+  auto poses =
+      plan_recording(world.scene(), world.free_space(), settled.recording, settled.odometry,
+                     static_cast<std::uint64_t>(settled.simulation.scene.seed));
+  const bool with_path = settled.recording.path != RecordingPath::random;
+  return {std::move(world), std::move(poses), with_path};
+}
+
+SimulatedWorld world_of(const std::string& scene, const SimulationArguments& wanted,
+                        Executor& executor) {
+  return {scene, wanted, [](const std::string&, const std::string&) { return false; }, executor};
+}
+
+/// Sees the same with half as many pixels each way.
+Camera half_as_large(Camera camera) {
+  std::get<HyperboloidalModel>(camera.model).focal_length_px *= 0.5;
+  camera.image_size = {camera.image_size.width / 2, camera.image_size.height / 2};
+  camera.centre = {0.5 * camera.centre.u_px, 0.5 * camera.centre.v_px};
+  camera.rim_radius_px *= 0.5;
+  camera.inner_radius_px *= 0.5;
+  return camera;
+}
+
+std::optional<MirrorCircle> find_mirror_in(const Dataset& recording, int count) {
+  std::vector<Image> images;
+  // Spread over the run: what stays the same in all of them is the mirror.
+  for (int i = 0; i < count; ++i) {
+    const auto index =
+        recording.entries.size() * static_cast<std::size_t>(i) / static_cast<std::size_t>(count);
+    images.push_back(read_image(recording.entries[index].path));
+  }
+  const std::vector<ImageView> views = [&] {
+    std::vector<ImageView> all;
+    for (const auto& image : images) all.push_back(image.view());
+    return all;
+  }();
+  return find_mirror(views);
+}
+
+/// Two walks as one recording. Between them somebody carries the robot far away, to the farthest
+/// place in the first half of `after`; its odometry knows nothing of that.
+std::vector<RecordedPose> carried_walk(std::vector<RecordedPose> walk,
+                                       const std::vector<RecordedPose>& after) {
+  const RecordedPose last = walk.back();
+  const std::size_t images = (after.size() + 1) / 2;
+  const auto first =
+      std::ranges::max_element(after.begin(), after.begin() + static_cast<std::ptrdiff_t>(images),
+                               {}, [&](const RecordedPose& there) {
+                                 return distance(there.pose.position(), last.pose.position());
+                               });
+  for (auto there = first; there < first + static_cast<std::ptrdiff_t>(after.size() / 2); ++there) {
+    RecordedPose next = *there;
+    next.stamp_s += last.stamp_s - first->stamp_s + 1.0;
+    next.odometry = last.odometry * (inverse(first->odometry) * there->odometry);
+    walk.push_back(next);
+  }
+  return walk;
+}
+
+}  // namespace
+
+SimulationArguments simulation_of(const DemoOptions& options, int stream) {
+  SimulationArguments wanted;
+  wanted.simulation.scene.seed = static_cast<int>(3 * (options.seed % 100000000) + stream);
+  wanted.simulation.scene.scene_seed = static_cast<int>(options.seed % 1000000000);
+  // One ray a pixel: unwrapping averages over pixels, and it takes a third of the time.
+  wanted.frame.rays_per_axis = 1;
+  // What automatic exposure would choose in these rooms.
+  wanted.sensor.exposure = 2.0;
+  if (options.quick) wanted.mirror = half_as_large(simulated_mirror_camera());
+  return wanted;
+}
+
+void prepare_demo_folder(const fs::path& out) {
+  std::error_code error;
+  const bool there = fs::exists(out, error);
+  if (there && !fs::is_directory(out, error)) {
+    throw FileError(out.string(), "is no folder; allowed: a new folder, or one of an earlier demo");
+  }
+  if (there && !fs::exists(out / mark, error) && !fs::is_empty(out, error)) {
+    throw FileError(out.string(),
+                    "is there already and was not made by panonav demo; allowed: a new folder, or "
+                    "one of an earlier demo");
+  }
+  fs::create_directories(out, error);
+  if (error) throw FileError(out.string(), "cannot be made: " + error.message());
+  write_file(out / mark, std::string_view("This folder was made by panonav demo. Running it again "
+                                          "with this folder writes its files anew.\n"));
+  for (const auto name : made) {
+    fs::remove_all(out / name, error);
+    if (error) throw FileError((out / name).string(), "cannot be removed: " + error.message());
+  }
+}
+
+std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& session) {
+  Executor& executor = session.executor();
+  SimulationArguments grid = simulation_of(options, 0);
+  grid.recording.path = RecordingPath::grid;
+  grid.recording.spacing_m = options.spacing_m();
+  const RecordingOptions anywhere{.path = RecordingPath::random,
+                                  .heading = RecordingHeading::random,
+                                  .poses = options.questions()};
+  // Twice as long as needed: where the second half begins is chosen.
+  const RecordingOptions walking{.path = RecordingPath::walk,
+                                 .heading = RecordingHeading::path,
+                                 .spacing_m = 0.2,
+                                 .poses = options.walk_images()};
+  const auto seed_of = [&](int stream) {
+    return simulation_of(options, stream).simulation.scene.seed;
+  };
+  const PlannedRun office = plan(world_of("office", grid, executor));
+  const PlannedRun asked = plan(office.world.with(anywhere, seed_of(1)));
+  const PlannedRun elsewhere =
+      plan(world_of("lab", simulation_of(options, 2), executor).with(anywhere, seed_of(2)));
+  PlannedRun walk = plan(office.world.with(walking, seed_of(3)));
+  const PlannedRun after = plan(office.world.with(walking, seed_of(4)));
+  walk.poses.resize((walk.poses.size() + 1) / 2);
+  const std::size_t carried_after = walk.poses.size() - 1;
+  walk.poses = carried_walk(std::move(walk.poses), after.poses);
+
+  Progress progress("rendering", office.poses.size() + asked.poses.size() + elsewhere.poses.size() +
+                                     walk.poses.size());
+  const auto record_run = [&](const PlannedRun& run, const char* name) {
+    return record_dataset(run.world, options.out / name, run.poses, run.with_path, executor,
+                          [&] { progress.advance(); });
+  };
+  DemoRecordings recordings;
+  recordings.memory_run = record_run(office, "memory_run");
+  recordings.query_run = record_run(asked, "query_run");
+  recordings.elsewhere_run = record_run(elsewhere, "elsewhere_run");
+  recordings.walk_run = record_run(walk, "walk_run");
+  recordings.carried_after = carried_after;
+  progress.clear();
+
+  recordings.true_camera = std::get<Camera>(office.world.camera());
+  recordings.calibrated_on =
+      static_cast<int>(std::min<std::size_t>(6, recordings.memory_run.entries.size()));
+  const auto mirror = find_mirror_in(recordings.memory_run, recordings.calibrated_on);
+  if (!mirror) return std::nullopt;
+  recordings.mirror = *mirror;
+  // No picture shows a mirror's shape and how it is mounted; these are known of the robot.
+  const Camera camera =
+      camera_from_mirror(*mirror, {.model = recordings.true_camera.model,
+                                   .direction = recordings.true_camera.direction,
+                                   .forward_angle_rad = recordings.true_camera.forward_angle_rad});
+  for (Dataset* run : {&recordings.memory_run, &recordings.query_run, &recordings.elsewhere_run,
+                       &recordings.walk_run}) {
+    run->source.camera = camera;
+    write_dataset(*run);
+  }
+
+  recordings.low = office.world.free_space().low();
+  recordings.high = office.world.free_space().high();
+  recordings.office_scene = office.world.scene();
+  recordings.office = std::make_shared<const Renderer>(office.world.scene(),
+                                                       RendererOptions{.channels = 3}, executor);
+  recordings.colour_picture = [renderer = recordings.office, frame = office.world.arguments().frame,
+                               sensor = grid.sensor, seen_by = recordings.true_camera](
+                                  const DatasetEntry& entry, Executor& threads) {
+    const Viewpoint viewpoint{.pose = {entry.pose->x_m, entry.pose->y_m, *entry.pose->heading_rad},
+                              .height_m = frame.camera_height_m};
+    return apply_sensor(renderer->render_image(viewpoint, seen_by, 3, threads), seen_by, sensor, 1);
+  };
+  recordings.office_world = std::make_shared<const SimulatedWorld>(office.world);
+  return recordings;
+}
+
+}  // namespace panonav::command

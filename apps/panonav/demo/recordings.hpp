@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+
+#include "cli/session.hpp"
+#include "panonav/camera/mirror_camera.hpp"
+#include "panonav/camera/mirror_overlay.hpp"
+#include "panonav/io/dataset.hpp"
+#include "panonav/simulation/renderer.hpp"
+#include "panonav/simulation/scene.hpp"
+#include "verbs/simulated_recording.hpp"
+
+namespace panonav::command {
+
+struct DemoOptions {
+  std::filesystem::path out = "demo";
+  std::uint64_t seed = 1;  ///< of the office, the noise and the questions
+  bool quick = false;
+
+  [[nodiscard]] double spacing_m() const noexcept { return quick ? 0.5 : 0.25; }
+  [[nodiscard]] int questions() const noexcept { return quick ? 8 : 40; }
+  [[nodiscard]] int runs_home() const noexcept { return quick ? 3 : 12; }
+  /// Images of the robot that is tracked, half of them before it is carried elsewhere.
+  [[nodiscard]] int walk_images() const noexcept { return quick ? 20 : 60; }
+  [[nodiscard]] int missions() const noexcept { return quick ? 3 : 12; }
+  [[nodiscard]] double route_m() const noexcept { return quick ? 3.0 : 10.0; }
+};
+
+/// What the demonstration works on: pictures of a simulated mirror camera with its sensor's noise,
+/// on the disk as any recording, and the camera as calibration found it in them.
+struct DemoRecordings {
+  Dataset memory_run;             ///< the office on a grid
+  Dataset query_run;              ///< the same office at random places
+  Dataset elsewhere_run;          ///< another room
+  Dataset walk_run;               ///< a walk through the office, with odometry
+  std::size_t carried_after = 0;  ///< the image of the walk; odometry does not know
+  MirrorCircle mirror;            ///< what calibration found
+  int calibrated_on = 0;          ///< pictures
+  Camera true_camera;
+  Scene office_scene;
+  std::shared_ptr<const SimulatedWorld> office_world;  ///< in grey, as the robot sees it
+  std::shared_ptr<const Renderer> office;              ///< in colour
+  Point2 low, high;                                    ///< corners of the office's floor
+  /// What the camera sees at an entry of the office, in colour, for people.
+  std::function<Image(const DatasetEntry&, Executor&)> colour_picture;
+};
+
+/// How the demonstration's camera sees its office. `stream` tells the noise of different robots
+/// apart.
+[[nodiscard]] SimulationArguments simulation_of(const DemoOptions& options, int stream);
+
+/// Makes the folder, or clears away what an earlier demo made in it and nothing else. Throws
+/// FileError when it holds anything and was not made by a demo, or cannot be written.
+void prepare_demo_folder(const std::filesystem::path& out);
+
+/// Renders all pictures, calibrates, and writes the three data sets. Empty when calibration finds
+/// no mirror.
+[[nodiscard]] std::optional<DemoRecordings> record_demo(const DemoOptions& options,
+                                                        Session& session);
+
+}  // namespace panonav::command

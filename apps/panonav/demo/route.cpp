@@ -1,0 +1,114 @@
+#include "demo/route.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "panonav/core/statistics.hpp"
+#include "panonav/geometry/positions.hpp"
+#include "reporting/picture_plot.hpp"
+#include "reporting/plot.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+void draw_runs(const FloorPlan& plan, std::span<const Pose2> way, const std::vector<RouteRun>& runs,
+               const std::filesystem::path& path) {
+  MapLayer route{.label = "remembered route", .colour = "#000000", .lines = {positions_of(way)}};
+  MapLayer forward{.label = "driven forward", .colour = "#0072b2"};
+  MapLayer back{.label = "driven back", .colour = "#009e73"};
+  MapLayer starts{.label = "starts", .colour = "#e0201b"};
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    (i == 0 ? forward : back).lines.push_back(positions_of(runs[i].truth));
+    starts.circles.push_back(runs[i].truth.front().position());
+  }
+  write_plot(path, MapPlot{.title = "A route through the office, from above: x and y in metres",
+                           .layers = {MapLayer{.label = "furniture",
+                                               .colour = "#999999",
+                                               .filled_polygons = plan.boxes},
+                                      route, forward, back, starts}});
+}
+
+void draw_panorama(const RoutePanorama& route, const std::filesystem::path& path) {
+  const auto columns = static_cast<std::size_t>(route.columns());
+  PicturePlot plot{.title = "What the robot remembers of the route",
+                   .x_label = "azimuth from straight ahead [degrees], left positive",
+                   .y_label = "way along the route [m]",
+                   .x_range = {180.0, -180.0},
+                   .y_range = {0.0, route.length_m()},
+                   .columns = route.columns(),
+                   .rows = static_cast<int>(route.size()),
+                   .x_tick = 45.0};
+  for (std::size_t row = 0; row < route.size(); ++row) {
+    const auto line = route.line(row);
+    for (std::size_t i = 0; i < columns; ++i) {
+      const std::size_t c = (2 * columns + columns / 2 - i) % columns;
+      plot.values.push_back(static_cast<float>(line[c]) / 255.0F);
+    }
+  }
+  write_plot(path, plot);
+}
+
+}  // namespace
+
+DemoRoute show_route(const Scene& office, const FloorPlan& plan, double length_m,
+                     std::uint64_t seed, const std::filesystem::path& out, Session& session,
+                     ReportPage& page) {
+  constexpr double spacing_m = 0.1;
+  Executor& executor = session.executor();
+  RouteScene place = make_route_scene(office, "office", executor);
+  // What automatic exposure would choose in these rooms.
+  place.camera.sensor.exposure = 2.0;
+  const auto way = curved_route(place, length_m, spacing_m, seed);
+  const RoutePanorama panorama = record_route(place, way, seed, executor);
+  const RouteTracker tracker(panorama);
+  DemoRoute route;
+  route.length_m = panorama.length_m();
+  route.bytes = panorama.size() * static_cast<std::size_t>(panorama.columns());
+  route.runs.resize(2);
+  executor.for_chunks(route.runs.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
+    for (std::size_t i = begin; i < end; ++i) {
+      route.runs[i] = repeat_route(place, tracker, {.back = i == 1}, seed + i);
+    }
+  });
+  for (const RouteRun& run : route.runs) {
+    route.completed += run.completes() ? 1 : 0;
+    double way_m = 0.0;
+    for (std::size_t i = 0; i < run.truth.size(); ++i) {
+      if (i > 0) way_m += distance(run.truth[i - 1].position(), run.truth[i].position());
+      if (way_m >= 1.0) route.lateral_m.push_back(run.lateral_m[i]);
+    }
+    route.position_m.insert(route.position_m.end(), run.position_m.begin(), run.position_m.end());
+  }
+  draw_panorama(panorama, out / "route_panorama.png");
+  draw_runs(plan, way, route.runs, out / "route.png");
+
+  const auto median_cm = [](const std::vector<double>& values) {
+    return values.empty() ? std::string("none") : fixed(100.0 * median(values), 1) + " cm";
+  };
+  page.part("A route, again and again",
+            {median_cm(route.lateral_m), "from the route, when driven again (median)"});
+  page.text(
+      "Of a route the robot remembers one line of pixels every 10 cm: its horizon, a byte a "
+      "degree. "
+      "Light in the plane of the camera goes straight from place to place, so that these lines "
+      "also "
+      "tell what is seen from beside the route. The robot was shown a route of " +
+      fixed(route.length_m, 0) +
+      " m once, then put down 0.3 m off its start and told that it stands on it, with wheels that "
+      "are wrong by 5 %; it drove the route to its end, and another robot drove it back.");
+  page.figures({{std::to_string(route.completed) + " of " + std::to_string(route.runs.size()),
+                 "runs that reached the end of the route, and knew it"},
+                {median_cm(route.lateral_m), "median distance from the route, from 1 m on"},
+                {median_cm(route.position_m), "median error of the position"},
+                {fixed(1e-3 * static_cast<double>(route.bytes), 0) + " kB",
+                 "what the route takes, before packing"}});
+  page.pictures(
+      {{"route_panorama.png",
+        "The route panorama: each row is the horizon at one place of the route, the start "
+        "at the bottom."},
+       {"route.png", "The remembered route and both drives, which lie on it."}});
+  return route;
+}
+
+}  // namespace panonav::command

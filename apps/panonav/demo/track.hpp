@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "cli/session.hpp"
+#include "demo/pictures.hpp"
+#include "demo/recordings.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
+#include "reports/report_page.hpp"
+
+namespace panonav::command {
+
+/// A robot that does not know where it is drives through the office and is carried away half way.
+struct DemoTrack {
+  std::size_t images = 0;
+  /// Images until it says that it is localised and is within the views' spacing of the truth, that
+  /// one included; empty: never before it was carried away.
+  std::optional<std::size_t> until_localised;
+  /// The same from the first image after it was carried away on.
+  std::optional<std::size_t> until_found_again;
+  std::size_t localised = 0;     ///< images at which it says so
+  std::size_t wrong = 0;         ///< of these, farther off than the spacing
+  std::vector<double> errors_m;  ///< of these, right or wrong
+};
+
+/// Tracks it by Monte-Carlo localisation and adds a part with pictures and an animation to the
+/// page. The same seed gives the same run.
+DemoTrack show_track(const DemoOptions& options, const DemoRecordings& recordings,
+                     const VisualMemory& memory, const ViewEncoder& pipeline, const FloorPlan& plan,
+                     Session& session, ReportPage& page);
+
+}  // namespace panonav::command

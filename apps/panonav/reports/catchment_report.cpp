@@ -1,0 +1,190 @@
+#include "reports/catchment_report.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "panonav/geometry/angles.hpp"
+#include "reporting/plot.hpp"
+#include "reports/report_page.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* homeward_file = "homeward.png";
+constexpr const char* blue = "#0072b2";
+constexpr const char* red = "#e0201b";
+
+/// Places as cells of a raster of their spacing. Places that share a cell show the last one.
+HeatMap raster(const std::vector<Pose2>& places, double spacing_m,
+               const std::function<double(std::size_t)>& value) {
+  Point2 low = places.front().position();
+  Point2 high = low;
+  for (const Pose2& place : places) {
+    low = {std::min(low.x_m, place.x_m), std::min(low.y_m, place.y_m)};
+    high = {std::max(high.x_m, place.x_m), std::max(high.y_m, place.y_m)};
+  }
+  // A far outlier must not blow up the raster.
+  constexpr double most_cells = 500.0;
+  const double extent_m = std::max(high.x_m - low.x_m, high.y_m - low.y_m);
+  const double cell_m = std::max(spacing_m, extent_m / most_cells);
+  const auto cell = [&](double at_m, double from_m) {
+    return static_cast<int>(std::lround((at_m - from_m) / cell_m));
+  };
+  HeatMap map{.columns = cell(high.x_m, low.x_m) + 1,
+              .rows = cell(high.y_m, low.y_m) + 1,
+              .first_cell = low,
+              .spacing_m = cell_m};
+  map.values.assign(static_cast<std::size_t>(map.columns) * static_cast<std::size_t>(map.rows),
+                    std::numeric_limits<double>::quiet_NaN());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const auto column = static_cast<std::size_t>(cell(places[i].x_m, low.x_m));
+    const auto row = static_cast<std::size_t>(cell(places[i].y_m, low.y_m));
+    map.values[row * static_cast<std::size_t>(map.columns) + column] = value(i);
+  }
+  return map;
+}
+
+void draw_curves(const CatchmentResult& result, const fs::path& folder) {
+  Series homeward{.label = "", .style = SeriesStyle::lines_and_points};
+  Series orientation{.label = "", .style = SeriesStyle::lines_and_points};
+  for (const CatchmentBin& bin : result.bins) {
+    if (bin.homeward.distance_m <= 0.0) continue;
+    homeward.x.push_back(bin.homeward.distance_m);
+    homeward.y.push_back(bin.homeward.component);
+    orientation.x.push_back(bin.homeward.distance_m);
+    orientation.y.push_back(degrees(bin.orientation_error_rad));
+  }
+  write_plot(folder / homeward_file, LinePlot{.title = "Average homeward component",
+                                              .x_label = "distance from home [m]",
+                                              .y_label = "homeward component",
+                                              .series = {homeward},
+                                              .y_range = std::pair{-0.2, 1.0}});
+  write_plot(folder / "orientation.png",
+             LinePlot{.title = "Error of the heading",
+                      .x_label = "distance from home [m]",
+                      .y_label = "circular standard deviation [degrees]",
+                      .series = {orientation}});
+  Series areas{.label = "", .style = SeriesStyle::lines_and_points};
+  const auto places = static_cast<double>(result.survey.places.size());
+  for (std::size_t i = 0; i < result.areas.size(); ++i) {
+    areas.x.push_back(result.accepted_m[i]);
+    areas.y.push_back(100.0 * result.areas[i] / places);
+  }
+  write_plot(folder / "areas.png", LinePlot{.title = "Mean catchment area",
+                                            .x_label = "accepted distance from home [m]",
+                                            .y_label = "share of all places [%]",
+                                            .series = {areas},
+                                            .y_range = std::pair{0.0, 100.0}});
+}
+
+void draw_field(const RecordedViews& places, const std::vector<HomeVector>& vectors,
+                const CatchmentResult& result, std::size_t goal, const fs::path& path) {
+  const double side_m = 0.5 * result.spacing_m;
+  const double arrow_m = 0.8 * result.spacing_m;
+  MapLayer inside{.label = "catchment area", .colour = "#b7e4c7"};
+  MapLayer arrows{.label = "home vector", .colour = blue};
+  for (std::size_t p = 0; p < places.views.size(); ++p) {
+    const Pose2& place = result.survey.places[p];
+    const float end_m = result.final_m[goal * places.views.size() + p];
+    if (static_cast<double>(end_m) <= 1.001 * result.spacing_m) {
+      inside.filled_polygons.push_back({{place.x_m - side_m, place.y_m - side_m},
+                                        {place.x_m + side_m, place.y_m - side_m},
+                                        {place.x_m + side_m, place.y_m + side_m},
+                                        {place.x_m - side_m, place.y_m + side_m}});
+    }
+    arrows.dots.push_back(place.position());
+    if (!(vectors[p].length() > 0.0)) continue;
+    const double towards = place.heading_rad + vectors[p].direction_rad();
+    arrows.lines.push_back(
+        {place.position(),
+         {place.x_m + arrow_m * std::cos(towards), place.y_m + arrow_m * std::sin(towards)}});
+  }
+  const MapLayer home{
+      .label = "home", .colour = red, .squares = {result.survey.goals[goal].position()}};
+  write_plot(path, MapPlot{.title = "Home vectors from above: x and y in metres",
+                           .layers = {inside, arrows, home}});
+}
+
+}  // namespace
+
+void prepare_catchment_report(const fs::path& folder) {
+  prepare_report_folder(folder, homeward_file, "catchment");
+}
+
+void write_catchment_report(const fs::path& folder, const RecordedViews& goals,
+                            const RecordedViews& places, const CatchmentResult& result,
+                            const FourierHomingOptions& homing, std::size_t goal) {
+  draw_curves(result, folder);
+  const double accepted_m = result.spacing_m;
+  const auto count = static_cast<double>(result.survey.places.size());
+  auto sizes = raster(result.survey.goals, result.spacing_m, [&](std::size_t g) {
+    return 100.0 * static_cast<double>(catchment_of(result, g, accepted_m)) / count;
+  });
+  sizes.title = "Catchment area of the view at each place";
+  sizes.value_label = "share of all places [%]";
+  write_plot(folder / "catchment.png", sizes);
+
+  std::vector<HomeVector> vectors;
+  std::vector<double> differences;
+  for (const HomingView& view : places.views) {
+    vectors.push_back(home_vector(goals.views[goal], view, homing));
+    differences.push_back(image_difference(goals.views[goal], view, homing.highest));
+  }
+  draw_field(places, vectors, result, goal, folder / "field.png");
+  auto difference =
+      raster(result.survey.places, result.spacing_m, [&](std::size_t p) { return differences[p]; });
+  difference.title = "Difference from the view at home (cross)";
+  difference.value_label = "image difference, 0 to 1";
+  difference.crosses = {result.survey.goals[goal].position()};
+  write_plot(folder / "difference.png", difference);
+  auto ends = raster(result.survey.places, result.spacing_m, [&](std::size_t p) {
+    return static_cast<double>(result.final_m[goal * places.views.size() + p]);
+  });
+  ends.title = "Where runs home end, by where they start (home: cross)";
+  ends.value_label = "distance from home at the end [m]";
+  ends.crosses = difference.crosses;
+  write_plot(folder / "ends.png", ends);
+
+  ReportPage page("From how far do views lead home?",
+                  "Every view of a recording as a home, every view of " +
+                      std::to_string(places.views.size()) +
+                      " places as what the robot sees: does the home vector point home, and where "
+                      "does a robot end that follows it from place to place?");
+  page.figures(
+      {{fixed(result.component, 3),
+        "average homeward component, " + std::to_string(result.pairs) + " pairs"},
+       {fixed(degrees(result.orientation_error_rad), 1) + " degrees", "error of the heading"},
+       {fixed(result.areas[1], 1) + " of " + std::to_string(result.survey.places.size()),
+        "places from which runs end within " + fixed(result.spacing_m, 2) + " m"}});
+  page.section("Against the distance");
+  page.pictures({{homeward_file,
+                  "Cosine between home vector and true direction: 1 straight home, "
+                  "0 chance [S06 figure 10]"},
+                 {"orientation.png", "Error of the heading that comes with it [S06 figure 8]"},
+                 {"areas.png",
+                  "Runs from place to place: share of starts from which a run ends "
+                  "within a distance of home [S06 figure 11]"}});
+  page.section("Place by place");
+  page.pictures({{"catchment.png", "Share of all places from which runs end within " +
+                                       fixed(result.spacing_m, 2) + " m of home, home by home"}});
+  page.section("One home: " + goals.files[goal]);
+  page.pictures({{"field.png", "Home vectors, and the catchment area [S06 figure 9]"},
+                 {"difference.png", "How far views differ from home's [S06 figure 9]"},
+                 {"ends.png", "How far from home runs end [S06 figure 14]"}});
+  page.section("Numbers");
+  std::vector<std::vector<std::string>> rows;
+  for (const CatchmentBin& bin : result.bins) {
+    rows.push_back({fixed(bin.homeward.distance_m, 3), std::to_string(bin.homeward.pairs),
+                    fixed(bin.homeward.component, 3),
+                    fixed(degrees(bin.orientation_error_rad), 1)});
+  }
+  page.table({"distance [m]", "pairs", "homeward component", "heading error [degrees]"}, rows);
+  page.write(folder);
+}
+
+}  // namespace panonav::command

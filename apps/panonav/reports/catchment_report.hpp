@@ -1,0 +1,18 @@
+#pragma once
+
+#include <filesystem>
+
+#include "verbs/catchment_survey.hpp"
+
+namespace panonav::command {
+
+/// Makes the folder. Throws FileError when something else is there.
+void prepare_catchment_report(const std::filesystem::path& folder);
+
+/// Writes index.html, curves, and maps of all catchment areas and of the view number `goal`. Throws
+/// FileError.
+void write_catchment_report(const std::filesystem::path& folder, const RecordedViews& goals,
+                            const RecordedViews& places, const CatchmentResult& result,
+                            const FourierHomingOptions& homing, std::size_t goal);
+
+}  // namespace panonav::command

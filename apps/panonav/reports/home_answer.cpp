@@ -1,0 +1,38 @@
+#include "reports/home_answer.hpp"
+
+#include <cmath>
+#include <numbers>
+
+#include "cli/session.hpp"
+#include "panonav/geometry/angles.hpp"
+
+namespace panonav::command {
+
+bool points_home(const HomeVector& found) {
+  return found.length() > 0.0 && found.confidence >= 0.5;
+}
+
+std::string in_words(double direction_rad) {
+  const double off = std::abs(degrees(direction_rad));
+  if (off < 0.5) return "straight ahead";
+  if (off >= 179.5) return "straight behind";
+  return fixed(off, 0) + (fixed(off, 0) == "1" ? " degree" : " degrees") + " to the " +
+         (direction_rad > 0.0 ? "left" : "right");
+}
+
+std::string turn_in_words(double heading_rad) {
+  // heading_rad is home's heading seen from here, so the robot has turned the other way.
+  const double turned = wrap_angle(-heading_rad);
+  if (std::abs(degrees(turned)) < 0.5) return "the robot faces as at home";
+  if (std::abs(degrees(turned)) >= 179.5) return "the robot faces the other way than at home";
+  return "the robot has turned by " + in_words(turned);
+}
+
+std::string why_none(const HomeVector& found) {
+  // Above it more than half of the energy of either view is found in the other.
+  constexpr double alike = std::numbers::sqrt2 / 2.0;
+  if (found.correlation >= alike) return "this looks like home itself";
+  return "the views have too little in common";
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "panonav/memory/visual_memory.hpp"
+#include "panonav/panorama/panorama.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
+#include "panonav/relative_pose/homing_view.hpp"
+
+namespace panonav::command {
+
+/// The place to return to.
+struct Goal {
+  std::string name;
+  std::optional<ReferencePose> pose;
+  HomingView view;
+  std::optional<Panorama> panorama;  ///< empty for views of a memory
+};
+
+/// One view and the way home from it.
+struct HomeAnswer {
+  std::string file;
+  std::optional<ReferencePose> pose;
+  HomeVector vector;
+};
+
+/// Whether the vector stands out of what its residual alone would make of it: its length is at
+/// least its own standard deviation.
+[[nodiscard]] bool points_home(const HomeVector& found);
+
+/// "34 degrees to the left", "straight ahead".
+[[nodiscard]] std::string in_words(double direction_rad);
+/// How the robot faces compared with the home view.
+[[nodiscard]] std::string turn_in_words(double heading_rad);
+/// Why there is no direction.
+[[nodiscard]] std::string why_none(const HomeVector& found);
+
+}  // namespace panonav::command

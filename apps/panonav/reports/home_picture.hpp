@@ -1,0 +1,18 @@
+#pragma once
+
+#include <optional>
+
+#include "panonav/core/image.hpp"
+#include "panonav/panorama/panorama.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
+
+namespace panonav::command {
+
+/// The home view, turned as if the robot there faced the same way as here, above the current one;
+/// clockwise with forward in the middle. Red marks show the direction home, blue ones the opposite:
+/// things spread out around the red ones on the way and close up around the blue ones. Without a
+/// home panorama the current one alone.
+[[nodiscard]] Image picture_of_homing(const std::optional<Panorama>& home, const Panorama& current,
+                                      const HomeVector& found, bool points);
+
+}  // namespace panonav::command

@@ -1,0 +1,132 @@
+#include "reports/home_report.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "cli/session.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/voronoi.hpp"
+#include "panonav/io/image_file.hpp"
+#include "reporting/plot.hpp"
+#include "reports/home_picture.hpp"
+#include "reports/report_page.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* first_picture = "home_1.png";
+
+/// First, last and evenly between.
+std::set<std::size_t> shown_of(std::size_t count) {
+  constexpr std::size_t most = 4;
+  std::set<std::size_t> shown;
+  for (std::size_t i = 0; i < std::min(most, count); ++i) {
+    shown.insert(i * (count - 1) / std::max<std::size_t>(1, std::min(most, count) - 1));
+  }
+  return shown;
+}
+
+std::string caption_of(const HomeAnswer& answer) {
+  const HomeVector& found = answer.vector;
+  if (!points_home(found)) return answer.file + ": no direction home, " + why_none(found);
+  return answer.file + ": home is " + in_words(found.direction_rad()) + ", about " +
+         fixed(found.length(), 2) + " R away; " + turn_in_words(found.heading_rad);
+}
+
+/// Arrows as long as the nearest views are apart.
+double arrow_length_m(const std::vector<HomeAnswer>& answers) {
+  std::vector<Point2> places;
+  for (const auto& answer : answers) {
+    if (answer.pose) places.push_back(answer.pose->position());
+  }
+  return places.size() < 2 ? 1.0 : 0.8 * VoronoiCells(places).spacing_m();
+}
+
+bool draw_field(const Goal& goal, const std::vector<HomeAnswer>& answers, const fs::path& path) {
+  MapLayer arrows{.label = "way home", .colour = "#0072b2"};
+  MapLayer silent{.label = "no direction", .colour = "#d55e00"};
+  const double length_m = arrow_length_m(answers);
+  for (const auto& answer : answers) {
+    if (!answer.pose || !answer.pose->heading_rad) continue;
+    const Point2 at = answer.pose->position();
+    if (!points_home(answer.vector)) {
+      silent.crosses.push_back(at);
+      continue;
+    }
+    const double towards = *answer.pose->heading_rad + answer.vector.direction_rad();
+    arrows.dots.push_back(at);
+    arrows.lines.push_back(
+        {at, {at.x_m + length_m * std::cos(towards), at.y_m + length_m * std::sin(towards)}});
+  }
+  if (arrows.lines.empty()) return false;
+  MapLayer home{.label = "home", .colour = "#e0201b"};
+  if (goal.pose) home.squares.push_back(goal.pose->position());
+  write_plot(path, MapPlot{.title = "Home vectors from above: x and y in metres",
+                           .layers = {arrows, silent, home}});
+  return true;
+}
+
+}  // namespace
+
+void prepare_home_report(const fs::path& folder) {
+  prepare_report_folder(folder, first_picture, "home");
+}
+
+void write_home_report(const fs::path& folder, const Goal& goal,
+                       const std::vector<HomeAnswer>& answers,
+                       const std::function<Panorama(std::size_t)>& current) {
+  ReportPage page("The way home",
+                  "From one view of a place, " + goal.name +
+                      ", and what the robot sees now: which way to go, without a map and without "
+                      "knowing the heading.");
+  const HomeVector& first = answers.front().vector;
+  if (answers.size() == 1) {
+    page.figures({{points_home(first) ? in_words(first.direction_rad()) : "none", "direction home"},
+                  {fixed(first.length(), 2) + " R", "distance, R that of the things around"},
+                  {fixed(degrees(wrap_angle(-first.heading_rad)), 0) + " degrees",
+                   "turn of the robot since, left positive"},
+                  {fixed(first.confidence, 2), "confidence, 0 to 1"}});
+  }
+  page.section(goal.panorama ? "Both views" : "What the robot sees");
+  page.text(
+      std::string(goal.panorama
+                      ? "Above, the view at home, turned as if the robot there faced the same way "
+                        "as here; below, what it sees now. "
+                      : "") +
+      "Forward is in the middle (grey). Red: the direction home, where things spread out on the "
+      "way; blue: the opposite one, where they close up.");
+  std::vector<ReportPicture> pictures;
+  for (const std::size_t i : shown_of(answers.size())) {
+    const std::string file = "home_" + std::to_string(pictures.size() + 1) + ".png";
+    const Image picture = picture_of_homing(goal.panorama, current(i), answers[i].vector,
+                                            points_home(answers[i].vector));
+    write_png(folder / file, picture.view());
+    pictures.push_back({file, caption_of(answers[i])});
+  }
+  page.pictures(pictures);
+  if (draw_field(goal, answers, folder / "field.png")) {
+    page.section("From above");
+    page.pictures({{"field.png",
+                    "The direction home at each place whose position and heading are "
+                    "known"}});
+  }
+  page.section("Numbers");
+  std::vector<std::vector<std::string>> rows;
+  for (const HomeAnswer& answer : answers) {
+    const HomeVector& found = answer.vector;
+    rows.push_back({answer.file, points_home(found) ? in_words(found.direction_rad()) : "none",
+                    fixed(found.length(), 3), fixed(degrees(wrap_angle(-found.heading_rad)), 1),
+                    fixed(found.correlation, 3), fixed(found.residual, 3),
+                    fixed(found.confidence, 3)});
+  }
+  page.table({"view", "direction home", "distance [R]", "turned [degrees]", "correlation",
+              "residual", "confidence"},
+             rows);
+  page.write(folder);
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,110 @@
+#include "reports/lattice_picture.hpp"
+
+#include <algorithm>
+#include <vector>
+
+#include "panonav/geometry/alignment.hpp"
+#include "panonav/mapping/map_measures.hpp"
+#include "reporting/plot.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+constexpr int neighbours = 8;
+
+/// The views of the largest part that have a true position.
+struct Known {
+  std::vector<Point2> arranged;
+  std::vector<Point2> truth;
+};
+
+Known known_of(const Lattice& lattice, const VisualMemory& memory) {
+  Known known;
+  for (const LatticeNode& node : lattice.nodes) {
+    const auto& pose = memory.info(node.view).pose;
+    if (node.part != 0 || !pose) continue;
+    known.arranged.push_back(node.pose.position());
+    known.truth.push_back(pose->position());
+  }
+  return known;
+}
+
+bool is_one_place(const std::vector<Point2>& points) {
+  return std::ranges::all_of(points, [&](const Point2& p) { return p == points.front(); });
+}
+
+bool is_comparable(const Known& known) {
+  return known.truth.size() >= 3 && !is_one_place(known.truth) && !is_one_place(known.arranged);
+}
+
+/// Springs that were not given up, as lines between `positions`.
+MapLayer springs_between(const Lattice& lattice,
+                         const std::vector<std::optional<Point2>>& positions) {
+  MapLayer layer{.label = "springs", .colour = "#c7c7c7"};
+  for (const LatticeSpring& spring : lattice.springs) {
+    const auto& a = positions[spring.a];
+    const auto& b = positions[spring.b];
+    if (spring.weight >= 0.25 && a && b) layer.lines.push_back({*a, *b});
+  }
+  return layer;
+}
+
+MapPlot plot_of(std::string title, const Lattice& lattice,
+                const std::vector<std::optional<Point2>>& positions) {
+  MapLayer views{.label = "views"};
+  for (const auto& position : positions) {
+    if (position) views.circles.push_back(*position);
+  }
+  return {.title = std::move(title), .layers = {springs_between(lattice, positions), views}};
+}
+
+}  // namespace
+
+std::optional<LatticeComparison> compare_with_truth(const Lattice& lattice,
+                                                    const VisualMemory& memory) {
+  const Known known = known_of(lattice, memory);
+  if (!is_comparable(known)) return std::nullopt;
+  const auto difference = shape_difference(known.arranged, known.truth);
+  const auto alignment = align(known.arranged, known.truth, {.allow_scale = true});
+  LatticeComparison comparison{.compared = known.truth.size(),
+                               .shape_difference = difference.value,
+                               .with_reflection = difference.with_reflection,
+                               .rms_m = alignment.rms_m,
+                               .scale = alignment.scale};
+  if (3 * neighbours + 1 < 2 * static_cast<int>(known.truth.size())) {
+    const auto kept = neighbour_preservation(known.arranged, known.truth, neighbours);
+    comparison.trustworthiness = kept.trustworthiness;
+    comparison.continuity = kept.continuity;
+  }
+  return comparison;
+}
+
+void write_lattice_picture(const std::filesystem::path& path, const Lattice& lattice,
+                           const VisualMemory& memory) {
+  const Known known = known_of(lattice, memory);
+  const bool comparable = is_comparable(known);
+  Alignment truth_from_lattice;
+  if (comparable) {
+    truth_from_lattice =
+        align(known.arranged, known.truth, {.allow_scale = true, .allow_reflection = true});
+  }
+  std::vector<std::optional<Point2>> arranged;
+  std::vector<std::optional<Point2>> truth;
+  for (const LatticeNode& node : lattice.nodes) {
+    arranged.emplace_back();
+    truth.emplace_back();
+    if (node.part != 0) continue;
+    arranged.back() = truth_from_lattice.apply(node.pose.position());
+    const auto& pose = memory.info(node.view).pose;
+    if (pose) truth.back() = pose->position();
+  }
+  const MapPlot map = plot_of("as the views arrange themselves", lattice, arranged);
+  if (!comparable) {
+    write_plot(path, map);
+    return;
+  }
+  write_plot(path, {plot_of("as they were taken", lattice, truth), map}, 2);
+}
+
+}  // namespace panonav::command

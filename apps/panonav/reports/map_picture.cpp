@@ -1,0 +1,120 @@
+#include "reports/map_picture.hpp"
+
+#include <algorithm>
+#include <string>
+#include <unordered_map>
+
+#include "panonav/geometry/alignment.hpp"
+#include "panonav/mapping/map_measures.hpp"
+#include "reporting/plot.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+constexpr double right_closure_m = 1.0;
+constexpr std::size_t neighbours = 8;
+
+/// The nodes of the largest part beside what is known of them.
+struct Nodes {
+  std::vector<Point2> map;
+  std::vector<Point2> truth;     // as many, or none where one is not known
+  std::vector<Point2> odometry;  // likewise
+  std::unordered_map<ViewId, std::size_t> number;
+};
+
+Nodes nodes_of(const Dataset& recording, const MappedRun& run) {
+  Nodes nodes;
+  const std::size_t part = largest_part(run.map);
+  for (std::size_t i = 0; i < run.map.nodes.size(); ++i) {
+    const MapNode& node = run.map.nodes[i];
+    if (node.part != part) continue;
+    const DatasetEntry& entry = recording.entries[run.entries[i]];
+    nodes.number.emplace(node.view, nodes.map.size());
+    nodes.map.push_back(node.pose.position());
+    if (entry.pose) nodes.truth.push_back(entry.pose->position());
+    if (entry.odometry) nodes.odometry.push_back(entry.odometry->position());
+  }
+  if (nodes.truth.size() != nodes.map.size()) nodes.truth.clear();
+  if (nodes.odometry.size() != nodes.map.size()) nodes.odometry.clear();
+  return nodes;
+}
+
+bool is_one_place(const std::vector<Point2>& points) {
+  return std::ranges::all_of(points, [&](const Point2& p) { return p == points.front(); });
+}
+
+// Three points at least, and a shape in both.
+bool is_comparable(const std::vector<Point2>& points, const std::vector<Point2>& truth) {
+  return points.size() >= 3 && truth.size() == points.size() && !is_one_place(points) &&
+         !is_one_place(truth);
+}
+
+std::vector<Point2> moved(const std::vector<Point2>& points, const Alignment& alignment) {
+  std::vector<Point2> result;
+  for (const Point2& p : points) result.push_back(alignment.apply(p));
+  return result;
+}
+
+}  // namespace
+
+std::optional<MapComparison> compare_with_truth(const Dataset& recording, const MappedRun& run) {
+  const Nodes nodes = nodes_of(recording, run);
+  if (!is_comparable(nodes.map, nodes.truth)) return std::nullopt;
+  MapComparison comparison;
+  comparison.compared = nodes.map.size();
+  comparison.shape_difference = shape_difference(nodes.map, nodes.truth).value;
+  const Alignment alignment = align(nodes.map, nodes.truth, {.allow_scale = !run.wheels});
+  comparison.rms_m = alignment.rms_m;
+  comparison.scale = alignment.scale;
+  if (3 * neighbours + 1 < 2 * nodes.map.size()) {
+    const auto kept = neighbour_preservation(nodes.map, nodes.truth, static_cast<int>(neighbours));
+    comparison.trustworthiness = kept.trustworthiness;
+    comparison.continuity = kept.continuity;
+  }
+  const auto closures = count_closures(
+      run.map,
+      [&](ViewId view) -> std::optional<Point2> {
+        const auto found = nodes.number.find(view);
+        if (found == nodes.number.end()) return std::nullopt;
+        return nodes.truth[found->second];
+      },
+      right_closure_m);
+  comparison.right_closures = closures.right;
+  comparison.wrong_closures = closures.wrong;
+  if (is_comparable(nodes.odometry, nodes.truth)) {
+    comparison.odometry_shape_difference = shape_difference(nodes.odometry, nodes.truth).value;
+  }
+  return comparison;
+}
+
+void write_map_picture(const std::filesystem::path& path, const Dataset& recording,
+                       const MappedRun& run) {
+  const Nodes nodes = nodes_of(recording, run);
+  MapPlot plot{.title = "map", .layers = {}};
+  std::vector<Point2> map = nodes.map;
+  if (is_comparable(nodes.map, nodes.truth)) {
+    map = moved(nodes.map, align(nodes.map, nodes.truth, {.allow_scale = !run.wheels}));
+    plot.title = "map beside the truth";
+    plot.layers.push_back({.label = "truth", .colour = "#999999", .lines = {nodes.truth}});
+    if (is_comparable(nodes.odometry, nodes.truth)) {
+      plot.layers.push_back({.label = "wheels",
+                             .colour = "#d62728",
+                             .lines = {moved(nodes.odometry, align(nodes.odometry, nodes.truth))}});
+    }
+  }
+  MapLayer closures{.label = "closures", .colour = "#2ca02c"};
+  for (const MapEdge& edge : run.map.edges) {
+    const auto a = nodes.number.find(edge.a);
+    const auto b = nodes.number.find(edge.b);
+    if (edge.kind != LinkKind::closure || a == nodes.number.end() || b == nodes.number.end()) {
+      continue;
+    }
+    closures.lines.push_back({map[a->second], map[b->second]});
+  }
+  plot.layers.push_back({.label = "map", .colour = "#1f77b4", .lines = {map}, .dots = map});
+  if (!closures.lines.empty()) plot.layers.push_back(std::move(closures));
+  write_plot(path, plot);
+}
+
+}  // namespace panonav::command

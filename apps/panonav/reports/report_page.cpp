@@ -1,0 +1,170 @@
+#include "reports/report_page.hpp"
+
+#include <utility>
+
+#include "cli/session.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/io/atomic_file.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+constexpr std::string_view style = R"(
+:root { color-scheme: light dark; --line: #8884; --soft: #8881; --accent: #1f6fb4; }
+@media (prefers-color-scheme: dark) { :root { --accent: #6db3f2; } }
+body { font: 16px/1.5 system-ui, sans-serif; margin: 0 auto; max-width: 68rem; padding: 1rem 1.5rem 4rem; }
+h1 { font-size: 1.9rem; margin: 1.5rem 0 .3rem; }
+h2 { font-size: 1.3rem; margin: 2.5rem 0 .5rem; padding-top: .8rem; border-top: 1px solid var(--line); }
+p { max-width: 48rem; }
+.lead { font-size: 1.1rem; }
+.link { font-size: 1.1rem; font-weight: 600; }
+.figures { display: flex; flex-wrap: wrap; gap: 1rem; margin: 1.2rem 0; }
+.figures div { background: var(--soft); border-radius: .5rem; padding: .7rem 1.1rem; min-width: 8rem; }
+.figures b { display: block; font-size: 1.5rem; color: var(--accent); }
+.figures a { background: var(--soft); border-radius: .5rem; padding: .7rem 1.1rem; flex: 1 1 11rem; color: inherit; text-decoration: none; }
+.figures a:hover { outline: 2px solid var(--accent); }
+.figures small { display: block; font-weight: 600; }
+.pictures { display: flex; flex-wrap: wrap; gap: 1.2rem; }
+figure { margin: .8rem 0; flex: 1 1 22rem; max-width: 100%; }
+figure img { width: 100%; max-width: 60rem; border: 1px solid var(--line); border-radius: .3rem; background: #fff; }
+figcaption { font-size: .92rem; opacity: .85; }
+table { border-collapse: collapse; margin: 1rem 0; display: block; overflow-x: auto; }
+th, td { text-align: left; padding: .3rem .8rem; border-bottom: 1px solid var(--line); }
+td:not(:first-child) { white-space: nowrap; }
+pre { background: var(--soft); border-radius: .5rem; padding: .8rem 1rem; overflow-x: auto; }
+)";
+
+std::string escaped(std::string_view text) {
+  std::string result;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        result += "&amp;";
+        break;
+      case '<':
+        result += "&lt;";
+        break;
+      case '>':
+        result += "&gt;";
+        break;
+      case '"':
+        result += "&quot;";
+        break;
+      default:
+        result += c;
+    }
+  }
+  return result;
+}
+
+std::string element(std::string_view name, std::string_view text) {
+  std::string result = "<";
+  result.append(name).append(">").append(escaped(text));
+  return result.append("</").append(name).append(">");
+}
+
+std::string table_row(std::string_view cell, const std::vector<std::string>& texts) {
+  std::string row = "<tr>";
+  for (const auto& text : texts) row += element(cell, text);
+  return row + "</tr>\n";
+}
+
+}  // namespace
+
+void prepare_report_folder(const std::filesystem::path& folder, std::string_view own_file,
+                           std::string_view verb) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const bool there = fs::exists(folder, error);
+  const bool ours = fs::exists(folder / own_file, error);
+  if (there && (!fs::is_directory(folder, error) || (!ours && !fs::is_empty(folder, error)))) {
+    throw FileError(folder.string(), "is there already and was not made by panonav " +
+                                         std::string(verb) +
+                                         "; allowed for --report: a new folder, or that of an "
+                                         "earlier report");
+  }
+  fs::create_directories(folder, error);
+  if (error) throw FileError(folder.string(), "cannot be made: " + error.message());
+}
+
+ReportPage::ReportPage(std::string title, std::string lead)
+    : title_(std::move(title)), lead_(std::move(lead)) {}
+
+void ReportPage::section(std::string_view title) {
+  body_ += element("h2", title) + "\n";
+}
+
+void ReportPage::part(std::string_view title,
+                      const std::pair<std::string, std::string>& value_and_meaning) {
+  const std::string number = std::to_string(++parts_);
+  const std::string numbered = number + ". " + std::string(title);
+  overview_ += "<a href=\"#part" + number + "\">" + element("small", numbered) +
+               element("b", value_and_meaning.first) + escaped(value_and_meaning.second) + "</a>\n";
+  body_ += "<h2 id=\"part" + number + "\">" + escaped(numbered) + "</h2>\n";
+}
+
+void ReportPage::text(std::string_view paragraph) {
+  body_ += element("p", paragraph) + "\n";
+}
+
+void ReportPage::figures(
+    const std::vector<std::pair<std::string, std::string>>& value_and_meaning) {
+  body_ += "<div class=\"figures\">\n";
+  for (const auto& [value, meaning] : value_and_meaning) {
+    body_ += "<div>" + element("b", value) + escaped(meaning) + "</div>\n";
+  }
+  body_ += "</div>\n";
+}
+
+void ReportPage::table(const std::vector<std::string>& header,
+                       const std::vector<std::vector<std::string>>& rows) {
+  body_ += "<table>\n" + table_row("th", header);
+  for (const auto& row : rows) {
+    require(row.size() == header.size(), "cells of a table row", static_cast<double>(row.size()),
+            "as many as the header has");
+    body_ += table_row("td", row);
+  }
+  body_ += "</table>\n";
+}
+
+void ReportPage::pictures(const std::vector<ReportPicture>& pictures) {
+  body_ += "<div class=\"pictures\">\n";
+  for (const auto& picture : pictures) {
+    const std::string file = escaped(picture.file);
+    body_ += "<figure><a href=\"" + file + "\"><img src=\"" + file + "\" alt=\"" +
+             escaped(picture.caption) + "\"></a>" + element("figcaption", picture.caption) +
+             "</figure>\n";
+  }
+  body_ += "</div>\n";
+}
+
+void ReportPage::link(std::string_view file, std::string_view text) {
+  body_ += "<p class=\"link\"><a href=\"" + escaped(file) + "\">" + escaped(text) + "</a></p>\n";
+}
+
+void ReportPage::commands(const std::vector<std::string>& command_lines) {
+  std::string all;
+  for (const auto& line : command_lines) all += line + "\n";
+  body_ += element("pre", all) + "\n";
+}
+
+void ReportPage::write(const std::filesystem::path& folder) const {
+  std::string page = "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
+  page += "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n";
+  page += element("title", title_) + "\n<style>";
+  page.append(style)
+      .append("</style>\n</head>\n<body>\n")
+      .append(element("h1", title_))
+      .append("\n<p class=\"lead\">" + escaped(lead_) + "</p>\n");
+  if (!overview_.empty()) page += "<nav class=\"figures\">\n" + overview_ + "</nav>\n";
+  page.append(body_).append("</body>\n</html>\n");
+  write_file(folder / "index.html", std::string_view(page));
+}
+
+void tell_report(const std::filesystem::path& folder, Session& session) {
+  if (session.json()) return;
+  session.print("Open " + session.strong((folder / "index.html").string()) + " in a browser.");
+}
+
+}  // namespace panonav::command

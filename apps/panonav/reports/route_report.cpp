@@ -1,0 +1,263 @@
+#include "reports/route_report.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+
+#include "cli/session.hpp"
+#include "panonav/core/statistics.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/positions.hpp"
+#include "reporting/picture_plot.hpp"
+#include "reporting/plot.hpp"
+#include "reports/report_page.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* path_file = "path.png";
+
+/// Columns of a line as a person sees them: clockwise, forward in the middle. `to` is the first of
+/// `columns` values.
+void put_line(std::span<const float> line, float* to) {
+  const std::size_t columns = line.size();
+  for (std::size_t i = 0; i < columns; ++i) {
+    to[i] = line[(2 * columns + columns / 2 - i) % columns];
+  }
+}
+
+MapLayer path_layer(std::span<const Pose2> path) {
+  MapLayer layer{.label = "remembered route", .colour = "#999999"};
+  layer.lines.push_back(positions_of(path));
+  return layer;
+}
+
+/// Lines at equal steps of way from the bottom to the top.
+void draw_panorama(const fs::path& path, const RoutePanorama& route) {
+  constexpr int most_rows = 400;
+  const double length_m = route.length_m();
+  const int rows = std::clamp(static_cast<int>(route.size()), 1, most_rows);
+  const auto columns = static_cast<std::size_t>(route.columns());
+  PicturePlot plot{.title = "What the route looks like: each row is the horizon at one place",
+                   .x_label = "azimuth from straight ahead [degrees], left positive",
+                   .y_label = "way along the route [m]",
+                   .x_range = {180.0, -180.0},
+                   .y_range = {0.0, std::max(length_m, 1e-3)},
+                   .columns = route.columns(),
+                   .rows = rows,
+                   .x_tick = 45.0};
+  plot.values.resize(columns * static_cast<std::size_t>(rows));
+  double way_m = 0.0;
+  std::size_t line = 0;
+  std::vector<float> grey(columns);
+  for (int row = 0; row < rows; ++row) {
+    const double wanted_m = length_m * (row + 0.5) / rows;
+    // The line nearest to the middle of the row.
+    while (line + 1 < route.size()) {
+      const double step_m =
+          distance(route.poses()[line].position(), route.poses()[line + 1].position());
+      if (way_m + 0.5 * step_m > wanted_m) break;
+      way_m += step_m;
+      ++line;
+    }
+    const auto bytes = route.line(line);
+    for (std::size_t c = 0; c < columns; ++c) grey[c] = static_cast<float>(bytes[c]) / 255.0F;
+    put_line(grey, plot.values.data() + static_cast<std::size_t>(row) * columns);
+  }
+  write_plot(path, plot);
+}
+
+/// Pictures spread evenly over those on the route.
+std::vector<std::size_t> spread(const std::vector<FollowedImage>& images, std::size_t most) {
+  std::vector<std::size_t> on_route;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    if (images[i].fix) on_route.push_back(i);
+  }
+  if (on_route.size() <= most) return on_route;
+  std::vector<std::size_t> chosen;
+  for (std::size_t k = 0; k < most; ++k) {
+    chosen.push_back(on_route[k * (on_route.size() - 1) / (most - 1)]);
+  }
+  return chosen;
+}
+
+/// For each chosen picture two bands: seen above, shown by the route below.
+void draw_lines(const fs::path& path, const RouteLines& route,
+                const std::vector<FollowedImage>& images, const std::vector<std::size_t>& chosen) {
+  constexpr int band = 3;
+  constexpr int gap = 1;
+  constexpr int rows_of_pair = 2 * band + gap;
+  const auto columns = static_cast<std::size_t>(route.columns());
+  const int rows = rows_of_pair * static_cast<int>(chosen.size());
+  PicturePlot plot{.title = "Seen (upper band) and shown by the route from there (lower band)",
+                   .x_label = "azimuth from straight ahead [degrees], left positive",
+                   .y_label = "picture, the last one on top",
+                   .x_range = {180.0, -180.0},
+                   .y_range = {0.0, static_cast<double>(chosen.size())},
+                   .columns = route.columns(),
+                   .rows = rows,
+                   .x_tick = 45.0,
+                   .y_tick = 1.0};
+  plot.values.assign(columns * static_cast<std::size_t>(rows),
+                     std::numeric_limits<float>::quiet_NaN());
+  for (std::size_t k = 0; k < chosen.size(); ++k) {
+    const FollowedImage& image = images[chosen[k]];
+    const auto shown = route.synthesise(image.fix->fix.pose);
+    for (int row = 0; row < 2 * band; ++row) {
+      const auto& line = row < band ? shown : image.line;
+      put_line(line,
+               plot.values.data() + (k * rows_of_pair + static_cast<std::size_t>(row)) * columns);
+    }
+  }
+  write_plot(path, plot);
+}
+
+void draw_path(const fs::path& path, const RouteLines& route,
+               const std::vector<FollowedImage>& images) {
+  MapLayer truth{.label = "true path", .colour = "#1f5fd0"};
+  MapLayer fixes{.label = "fixes", .colour = "#000000"};
+  MapLayer changed{.label = "something changed in view", .colour = "#d55e00"};
+  MapLayer off{.label = "true place where not on the route", .colour = "#e0201b"};
+  std::vector<Point2> true_path;
+  for (const FollowedImage& image : images) {
+    if (image.truth) true_path.push_back(image.truth->position());
+    if (image.fix) fixes.dots.push_back(image.fix->fix.pose.position());
+    if (image.fix && !image.changed.empty()) {
+      changed.circles.push_back(image.fix->fix.pose.position());
+    }
+    if (!image.fix && image.truth) off.crosses.push_back(image.truth->position());
+  }
+  if (true_path.size() > 1) truth.lines.push_back(std::move(true_path));
+  write_plot(path, MapPlot{.title = "From above: x and y in metres",
+                           .layers = {path_layer(route.poses()), truth, changed, fixes, off}});
+}
+
+void draw_errors(const fs::path& path, const std::vector<FollowedImage>& images) {
+  Series position{.label = "position [cm]", .style = SeriesStyle::points};
+  Series along{.label = "along the route [cm]", .style = SeriesStyle::points};
+  Series lost{.label = "not on this route", .style = SeriesStyle::points};
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const FollowedImage& image = images[i];
+    const auto number = static_cast<double>(i + 1);
+    if (!image.fix) {
+      lost.x.push_back(number);
+      lost.y.push_back(0.0);
+    } else if (image.truth) {
+      position.x.push_back(number);
+      position.y.push_back(100.0 *
+                           distance(image.fix->fix.pose.position(), image.truth->position()));
+      along.x.push_back(number);
+      along.y.push_back(100.0 * std::abs(image.fix->along_m - image.true_place->along_m));
+    }
+  }
+  write_plot(path, LinePlot{.title = "How far off",
+                            .x_label = "picture",
+                            .y_label = "error [cm]",
+                            .series = {position, along, lost}});
+}
+
+void draw_correlations(const fs::path& path, const std::vector<FollowedImage>& images) {
+  Series correlation{.label = "of seen and shown line", .style = SeriesStyle::lines_and_points};
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    if (!images[i].fix) continue;
+    correlation.x.push_back(static_cast<double>(i + 1));
+    correlation.y.push_back(images[i].fix->fix.correlation);
+  }
+  write_plot(path, LinePlot{.title = "How well the route explains the pictures",
+                            .x_label = "picture",
+                            .y_label = "correlation",
+                            .series = {correlation}});
+}
+
+void add_figure(std::vector<std::pair<std::string, std::string>>& figures,
+                const std::vector<double>& errors, double scale, int digits,
+                const std::string& unit, const std::string& meaning) {
+  if (errors.empty()) return;
+  figures.emplace_back(fixed(scale * median(errors), digits) + unit, meaning);
+}
+
+}  // namespace
+
+void prepare_route_report(const fs::path& folder, std::string_view verb) {
+  prepare_report_folder(folder, path_file, verb);
+}
+
+void write_record_report(const fs::path& folder, const std::string& name,
+                         const RoutePanorama& route, double bytes_per_km) {
+  draw_panorama(folder / "panorama.png", route);
+  MapLayer path = path_layer(route.poses());
+  MapLayer start{.label = "start", .colour = "#009e73"};
+  start.squares.push_back(route.poses().front().position());
+  write_plot(folder / path_file,
+             MapPlot{.title = "From above: x and y in metres", .layers = {path, start}});
+  ReportPage page("Route '" + name + "'",
+                  "A robot drove this way once. From each place it keeps one line of pixels, what "
+                  "its camera sees at its own height, and that is all it needs to follow the way "
+                  "again.");
+  page.figures(
+      {{fixed(route.length_m(), 1) + " m", "long"},
+       {std::to_string(route.size()), "lines of " + std::to_string(route.columns()) + " pixels"},
+       {fixed(1e-6 * bytes_per_km, 2) + " MB", "a kilometre in the memory"}});
+  page.section("The route panorama");
+  page.text(
+      "Each row is one place, the start at the bottom, the end on top; from left to right all "
+      "around the robot, straight ahead in the middle. Things beside the way go from the middle "
+      "outwards as the robot passes them, the slower the farther they are.");
+  page.pictures({{"panorama.png", "Omnidirectional route panorama"}});
+  page.section("The way");
+  page.pictures({{path_file, "Where the lines were taken"}});
+  page.write(folder);
+}
+
+void write_follow_report(const fs::path& folder, const std::string& name, const RouteLines& route,
+                         const std::vector<FollowedImage>& images, const FollowSummary& summary) {
+  draw_path(folder / path_file, route, images);
+  const auto chosen = spread(images, 8);
+  std::vector<std::pair<std::string, std::string>> figures{
+      {std::to_string(summary.on_route) + " of " + std::to_string(summary.images),
+       "pictures on the route"}};
+  add_figure(figures, summary.position_m, 100.0, 1, " cm", "median error of position");
+  add_figure(figures, summary.along_m, 100.0, 1, " cm", "median error along the route");
+  add_figure(figures, summary.heading_rad, degrees(1.0), 2, " degrees", "median error of heading");
+  ReportPage page("Following route '" + name + "'",
+                  "A robot that drives the way again, or beside it, looks for the pose from which "
+                  "the remembered lines show what it sees.");
+  page.figures(figures);
+  page.section("The way");
+  page.pictures({{path_file, "Remembered route, fixes, and the true path where it is known"}});
+  if (!chosen.empty()) {
+    draw_lines(folder / "lines.png", route, images, chosen);
+    draw_correlations(folder / "correlations.png", images);
+    page.section("Seen and shown");
+    page.text(
+        "For some pictures, spread over the run, what the robot saw (upper band of each pair) and "
+        "what the route shows from where it believes to be (lower band), put together from the "
+        "lines of many places. Light blue: in this direction the route shows nothing.");
+    page.pictures({{"lines.png", "Lines seen, and lines made from the route"},
+                   {"correlations.png", "Correlation of the two, picture by picture"}});
+  }
+  if (!summary.position_m.empty()) {
+    draw_errors(folder / "errors.png", images);
+    page.section("Errors");
+    page.pictures({{"errors.png", "Distance of each fix from the data set's own pose"}});
+  }
+  const auto stretches = changed_stretches(images);
+  if (!stretches.empty()) {
+    page.section("Changed here");
+    page.text(
+        "Along these stretches some directions stay unexplained picture after picture: the "
+        "scene is not as it was.");
+    std::vector<std::vector<std::string>> rows;
+    for (const auto& [from_m, to_m] : stretches) {
+      rows.push_back({fixed(from_m, 2) + " m", fixed(to_m, 2) + " m"});
+    }
+    page.table({"from", "to"}, rows);
+  }
+  page.write(folder);
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,87 @@
+#include "reports/track_animation.hpp"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+
+#include "panonav/io/atomic_file.hpp"
+#include "reports/track_player.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+// To the millimetre: the page is drawn, not computed with.
+double rounded(double value) {
+  constexpr double steps = 1000.0;
+  return std::round(value * steps) / steps;
+}
+
+ordered_json pose_json(const Pose2& pose) {
+  return {rounded(pose.x_m), rounded(pose.y_m), rounded(pose.heading_rad)};
+}
+
+ordered_json image_json(const TrackedImage& image) {
+  const MonteCarloEstimate& estimate = image.estimate;
+  auto particles = ordered_json::array();
+  for (const Point2& point : image.particles) {
+    particles.push_back(rounded(point.x_m));
+    particles.push_back(rounded(point.y_m));
+  }
+  ordered_json truth;
+  if (image.truth) {
+    truth = {rounded(image.truth->x_m), rounded(image.truth->y_m)};
+    if (image.truth->heading_rad) truth.push_back(rounded(*image.truth->heading_rad));
+  }
+  const auto error = position_error_m(image);
+  return {{"file", image.file},
+          {"state", name_of(estimate.state)},
+          {"pose", estimate.pose ? pose_json(*estimate.pose) : ordered_json()},
+          {"truth", std::move(truth)},
+          {"error", error ? ordered_json(rounded(*error)) : ordered_json()},
+          {"modes", estimate.modes.size()},
+          {"count", estimate.particles},
+          {"redrawn", estimate.redrawn},
+          {"particles", std::move(particles)}};
+}
+
+/// Text that may stand within a script element.
+std::string script_text(const ordered_json& json) {
+  const std::string text = json.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
+  std::string safe;
+  safe.reserve(text.size());
+  for (const char c : text) {
+    if (c == '<') {
+      safe += "\\u003c";
+    } else {
+      safe += c;
+    }
+  }
+  return safe;
+}
+
+}  // namespace
+
+void write_track_animation(const std::filesystem::path& path, const VisualMemory& memory,
+                           double spacing_m, const std::vector<TrackedImage>& images) {
+  auto references = ordered_json::array();
+  for (const ViewId view : memory.views()) {
+    if (const auto& pose = memory.info(view).pose) {
+      references.push_back({rounded(pose->x_m), rounded(pose->y_m)});
+    }
+  }
+  auto played = ordered_json::array();
+  for (const TrackedImage& image : images) played.push_back(image_json(image));
+  const ordered_json run{{"spacing", rounded(spacing_m)},
+                         {"references", std::move(references)},
+                         {"images", std::move(played)}};
+  std::string page(track_player_head);
+  page.append("<script>\nconst run = ").append(script_text(run)).append(";\n");
+  page.append(track_player_script).append("</script>\n</body>\n</html>\n");
+  write_file(path, std::string_view(page));
+}
+
+}  // namespace panonav::command

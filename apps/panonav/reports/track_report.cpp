@@ -1,0 +1,207 @@
+#include "reports/track_report.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "cli/session.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/core/statistics.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "reporting/plot.hpp"
+#include "reports/report_page.hpp"
+#include "reports/track_animation.hpp"
+#include "reports/track_pictures.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+namespace fs = std::filesystem;
+constexpr const char* animation_file = "track.html";
+
+/// The first images, those where the state changes, the last, and evenly between.
+std::set<std::size_t> snapshots(const std::vector<TrackedImage>& images) {
+  constexpr std::size_t most = 6;
+  std::set<std::size_t> shown{0, images.size() - 1};
+  if (images.size() > 1) shown.insert(1);
+  for (std::size_t i = 1; i < images.size() && shown.size() < most; ++i) {
+    if (images[i].estimate.state != images[i - 1].estimate.state) shown.insert(i);
+  }
+  while (shown.size() < std::min(most, images.size())) {
+    std::size_t widest = 0;
+    std::size_t middle = 0;
+    for (auto next = std::next(shown.begin()); next != shown.end(); ++next) {
+      const std::size_t before = *std::prev(next);
+      if (*next - before <= widest) continue;
+      widest = *next - before;
+      middle = before + widest / 2;
+    }
+    shown.insert(middle);
+  }
+  return shown;
+}
+
+void draw_errors(const std::vector<TrackedImage>& images, double spacing_m, const fs::path& path) {
+  Series localised{.label = "error, localised", .style = SeriesStyle::points};
+  Series guessed{.label = "error, ambiguous", .style = SeriesStyle::points};
+  Series spread{.label = "spread of particles", .style = SeriesStyle::lines};
+  Series lost{.label = "lost: no estimate", .style = SeriesStyle::points};
+  Series spacing{.label = "spacing of views", .style = SeriesStyle::lines};
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const TrackedImage& image = images[i];
+    const auto x = static_cast<double>(i + 1);
+    spread.x.push_back(x);
+    spread.y.push_back(image.estimate.spread_m);
+    if (image.estimate.state == LocalisationState::lost) {
+      lost.x.push_back(x);
+      lost.y.push_back(image.estimate.spread_m);
+    } else if (const auto error = position_error_m(image)) {
+      Series& series = is_localised(image) ? localised : guessed;
+      series.x.push_back(x);
+      series.y.push_back(*error);
+    }
+  }
+  spacing.x = {1.0, static_cast<double>(images.size())};
+  spacing.y = {spacing_m, spacing_m};
+  write_plot(path, LinePlot{.title = "How far off, and how sure",
+                            .x_label = "image",
+                            .y_label = "metres",
+                            .series = {localised, guessed, spread, lost, spacing},
+                            .log_y = true});
+}
+
+void draw_particles(const std::vector<TrackedImage>& images, const fs::path& path) {
+  Series all{.label = "particles", .style = SeriesStyle::lines};
+  Series redrawn{.label = "drawn anew", .style = SeriesStyle::points};
+  Series effective{.label = "effective number", .style = SeriesStyle::lines};
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const MonteCarloEstimate& estimate = images[i].estimate;
+    const auto add = [&](Series& series, double value) {
+      series.x.push_back(static_cast<double>(i + 1));
+      series.y.push_back(value);
+    };
+    add(all, estimate.particles);
+    add(effective, estimate.effective_particles);
+    if (estimate.redrawn > 0) add(redrawn, estimate.redrawn);
+  }
+  write_plot(path, LinePlot{.title = "Particles",
+                            .x_label = "image",
+                            .y_label = "number",
+                            .series = {all, redrawn, effective},
+                            .log_y = true});
+}
+
+/// Stretches of images with one state.
+std::vector<std::vector<std::string>> stretches(const std::vector<TrackedImage>& images) {
+  std::vector<std::vector<std::string>> rows;
+  for (std::size_t begin = 0; begin < images.size();) {
+    const auto state = images[begin].estimate.state;
+    std::size_t end = begin;
+    std::vector<double> errors;
+    for (; end < images.size() && images[end].estimate.state == state; ++end) {
+      if (const auto error = position_error_m(images[end])) errors.push_back(*error);
+    }
+    const std::string from = std::to_string(begin + 1);
+    rows.push_back({end == begin + 1 ? from : from + " to " + std::to_string(end),
+                    std::string(name_of(state)),
+                    errors.empty() ? "-" : fixed(median(errors), 3) + " m",
+                    errors.empty() ? "-" : fixed(*std::ranges::max_element(errors), 3) + " m"});
+    begin = end;
+  }
+  return rows;
+}
+
+std::string share_text(std::size_t count, std::size_t total) {
+  return fixed(100.0 * static_cast<double>(count) / static_cast<double>(total), 0) + " %";
+}
+
+std::vector<std::pair<std::string, std::string>> main_figures(const TrackSummary& summary,
+                                                              std::size_t total) {
+  std::vector<std::pair<std::string, std::string>> figures{
+      {share_text(summary.localised, total), "of the images localised"},
+      {summary.first_localised ? std::to_string(*summary.first_localised) : "never",
+       summary.first_localised ? "images until it was first localised" : "localised"}};
+  if (!summary.errors_m.empty()) {
+    figures.emplace_back(fixed(100.0 * median(summary.errors_m), 1) + " cm",
+                         "median error where localised");
+    figures.emplace_back(fixed(100.0 * quantile(summary.errors_m, 0.95), 1) + " cm",
+                         "holds 95 % of these errors");
+  }
+  if (!summary.heading_errors_rad.empty()) {
+    figures.emplace_back(fixed(degrees(median(summary.heading_errors_rad)), 1) + " degrees",
+                         "median error of the heading");
+  }
+  return figures;
+}
+
+}  // namespace
+
+void prepare_track_report(const fs::path& folder) {
+  prepare_report_folder(folder, animation_file, "track");
+}
+
+std::size_t particles_shown(std::size_t images) {
+  constexpr std::size_t most = 300;
+  constexpr std::size_t least = 30;
+  constexpr std::size_t altogether = 300000;
+  return std::clamp(altogether / std::max<std::size_t>(1, images), least, most);
+}
+
+void write_track_report(const fs::path& folder, const VisualMemory& memory, double spacing_m,
+                        const std::vector<TrackedImage>& images, const TrackSummary& summary) {
+  write_track_animation(folder / animation_file, memory, spacing_m, images);
+  draw_track_snapshots(memory, images, snapshots(images), {}, folder / "snapshots.png");
+  draw_track_map(memory, images, {}, folder / "map.png");
+  draw_errors(images, spacing_m, folder / "errors.png");
+  draw_particles(images, folder / "particles.png");
+
+  const bool truth_known =
+      std::ranges::any_of(images, [](const auto& image) { return image.truth.has_value(); });
+  ReportPage page(
+      "Where was the robot?",
+      "A robot moved, with odometry that drifts and a memory of " + std::to_string(memory.size()) +
+          " views, and took " + std::to_string(images.size()) +
+          " pictures. After each one, particles say where it may be: far apart while it does not "
+          "know, close together once it does.");
+  page.figures(main_figures(summary, images.size()));
+  page.link(animation_file, "Play the run, image by image");
+  page.section("Snapshots");
+  page.text(
+      "Red dots are particles: places where the robot may be. Grey circles are the remembered "
+      "views, " +
+      fixed(100.0 * spacing_m, 0) +
+      " cm apart. The black square is the estimate, the mean of the heaviest group of particles; "
+      "it is orange while several places or a large area are possible, and missing when the robot "
+      "is lost. The black line is the estimated path" +
+      std::string(truth_known ? ", the blue line the true one; the blue cross is where the robot "
+                                "truly is."
+                              : "."));
+  page.pictures({{"snapshots.png",
+                  "The first images, images at which the state changes, and others between"}});
+  page.section("The whole run");
+  page.pictures({{"map.png",
+                  truth_known ? "True and estimated path; red crosses: true places where the robot "
+                                "was lost"
+                              : "The estimated path; it breaks off where the robot was not "
+                                "localised"},
+                 {"errors.png",
+                  truth_known ? "Error of each estimate, and how far the particles spread around "
+                                "their mean, on a logarithmic scale"
+                              : "How far the particles spread around their mean, on a logarithmic "
+                                "scale"}});
+  page.section("State by state");
+  page.table({"images", "state", "median error", "largest error"}, stretches(images));
+  page.section("Particles");
+  page.text(
+      "More are used while much is possible, fewer once they lie close together. By those drawn "
+      "anew a robot that was carried away is found again.");
+  page.pictures(
+      {{"particles.png", "Number of particles after each image, on a logarithmic scale"}});
+  page.write(folder);
+}
+
+}  // namespace panonav::command

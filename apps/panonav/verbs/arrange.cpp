@@ -1,0 +1,227 @@
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "cli/arguments.hpp"
+#include "cli/session.hpp"
+#include "cli/verbs.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/io/dataset.hpp"
+#include "panonav/io/graph_file.hpp"
+#include "panonav/io/trajectory_file.hpp"
+#include "panonav/mapping/lattice_map.hpp"
+#include "panonav/storage/memory_file.hpp"
+#include "verbs/stored_lattice.hpp"
+#ifdef PANONAV_COMMAND_SIMULATES
+#include "reports/lattice_picture.hpp"
+#endif
+
+namespace panonav::command {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+struct ArrangeArguments {
+  std::string memory;
+  std::optional<std::string> odometry;
+  std::optional<std::string> tum;
+  std::optional<std::string> graph;
+  std::optional<std::string> picture;
+  bool no_save = false;
+  LatticeOptions lattice;
+  CoarseMotionOptions motion;
+};
+
+/// Motion between consecutive pictures of the data set that the memory knows by name.
+std::vector<CoarseMotion> motions_of(const ArrangeArguments& wanted, const VisualMemory& memory) {
+  std::vector<CoarseMotion> motions;
+  if (!wanted.odometry) return motions;
+  const Dataset recording = read_dataset(*wanted.odometry);
+  std::optional<std::pair<ViewId, Pose2>> before;
+  for (const DatasetEntry& entry : recording.entries) {
+    const auto view = memory.find(entry.file);
+    if (!view || !entry.odometry) continue;
+    if (before && before->first != *view) {
+      motions.push_back(coarse_motion(before->first, *view,
+                                      inverse(before->second) * *entry.odometry, wanted.motion));
+    }
+    before = {*view, *entry.odometry};
+  }
+  if (motions.empty()) {
+    throw FileError(*wanted.odometry,
+                    "has no odometry between pictures that the memory knows by name");
+  }
+  return motions;
+}
+
+/// Poses of the largest part in the order of the views; the stamp is the view's, or its number.
+std::vector<StampedPose> trajectory_of(const Lattice& lattice, const VisualMemory& memory) {
+  const auto has_stamp = [&](const LatticeNode& node) {
+    return memory.info(node.view).stamp_s.has_value();
+  };
+  const bool stamped = std::ranges::all_of(lattice.nodes, has_stamp);
+  std::vector<StampedPose> trajectory;
+  for (const LatticeNode& node : lattice.nodes) {
+    if (node.part != 0) continue;
+    trajectory.push_back(
+        {stamped ? *memory.info(node.view).stamp_s : static_cast<double>(node.view.value),
+         node.pose});
+  }
+  std::ranges::stable_sort(trajectory, {}, &StampedPose::stamp_s);
+  for (std::size_t i = 1; i < trajectory.size(); ++i) {
+    if (trajectory[i].stamp_s > trajectory[i - 1].stamp_s) continue;
+    throw ContractError("stamp_s of a view", to_text(trajectory[i].stamp_s),
+                        "for --tum: different for each view");
+  }
+  return trajectory;
+}
+
+std::size_t number_given_up(const Lattice& lattice) {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      lattice.springs, [](const auto& spring) { return spring.weight < least_spring_weight; }));
+}
+
+#ifdef PANONAV_COMMAND_SIMULATES
+ordered_json as_json(const LatticeComparison& comparison) {
+  return {{"views", comparison.compared},
+          {"shape_difference", comparison.shape_difference},
+          {"shape_difference_with_reflection", comparison.with_reflection},
+          {"rms_m", comparison.rms_m},
+          {"scale", comparison.scale},
+          {"trustworthiness",
+           comparison.trustworthiness ? ordered_json(*comparison.trustworthiness) : ordered_json()},
+          {"continuity",
+           comparison.continuity ? ordered_json(*comparison.continuity) : ordered_json()}};
+}
+#endif
+
+ordered_json as_json(const ArrangeArguments& wanted, const Lattice& lattice,
+                     const VisualMemory& memory) {
+  auto parts = ordered_json::array();
+  for (const LatticePart& part : lattice.parts) {
+    parts.push_back({{"views", part.views}, {"handedness_known", part.handedness_known}});
+  }
+  auto nodes = ordered_json::array();
+  for (const LatticeNode& node : lattice.nodes) {
+    nodes.push_back({{"view", node.view.value},
+                     {"file", memory.info(node.view).name},
+                     {"part", node.part},
+                     {"x", node.pose.x_m},
+                     {"y", node.pose.y_m},
+                     {"heading_rad", wanted.lattice.phases || lattice.metric
+                                         ? ordered_json(node.pose.heading_rad)
+                                         : ordered_json()}});
+  }
+  ordered_json json{{"memory", wanted.memory},
+                    {"views", lattice.nodes.size()},
+                    {"parts", std::move(parts)},
+                    {"springs", lattice.springs.size()},
+                    {"springs_given_up", number_given_up(lattice)},
+                    {"metric", lattice.metric},
+                    {"iterations", lattice.iterations},
+                    {"energy", lattice.energy},
+                    {"nodes", std::move(nodes)},
+                    {"truth", nullptr}};
+#ifdef PANONAV_COMMAND_SIMULATES
+  if (const auto comparison = compare_with_truth(lattice, memory)) {
+    json["truth"] = as_json(*comparison);
+  }
+#endif
+  return json;
+}
+
+void print_result(const Lattice& lattice, const VisualMemory& memory, Session& session) {
+  session.print(session.strong(std::to_string(lattice.nodes.size())) + " views arranged by " +
+                std::to_string(lattice.springs.size()) + " springs, " +
+                std::to_string(number_given_up(lattice)) + " of them given up; unit: " +
+                (lattice.metric ? "metres" : "the distance to the nearest view (median)"));
+  if (lattice.parts.size() > 1) {
+    std::string sizes;
+    for (const auto& part : lattice.parts) {
+      sizes += (sizes.empty() ? "" : ", ") + std::to_string(part.views);
+    }
+    session.print(session.bad("The map is in " + std::to_string(lattice.parts.size()) + " parts") +
+                  " that nothing connects, of so many views: " + sizes);
+  }
+  if (!lattice.parts.front().handedness_known) {
+    session.print("It may as well be the mirror image: nothing tells left from right.");
+  }
+#ifdef PANONAV_COMMAND_SIMULATES
+  if (const auto comparison = compare_with_truth(lattice, memory)) {
+    session.print("beside the true positions: shape difference " +
+                  session.strong(fixed(comparison->shape_difference, 4)) + ", " +
+                  fixed(comparison->rms_m, 2) + " m rms with a free scale of " +
+                  fixed(comparison->scale, 3));
+    if (comparison->trustworthiness) {
+      session.print("neighbours kept: trustworthiness " + fixed(*comparison->trustworthiness, 3) +
+                    ", continuity " + fixed(*comparison->continuity, 3));
+    }
+  }
+#else
+  static_cast<void>(memory);
+#endif
+}
+
+ExitCode arrange_views(const ArrangeArguments& wanted, Session& session) {
+  auto file =
+      MemoryFile::open(wanted.memory, wanted.no_save ? Access::read_only : Access::read_write);
+  const VisualMemory memory = file.load();
+  if (memory.empty()) {
+    session.note("panonav arrange: " + wanted.memory + " holds no views");
+    return ExitCode::no_answer;
+  }
+  const Lattice lattice =
+      arrange(memory, wanted.lattice, motions_of(wanted, memory), session.executor());
+  if (!wanted.no_save) store_lattice(lattice, memory, file);
+  if (wanted.tum) write_trajectory(*wanted.tum, trajectory_of(lattice, memory));
+  if (wanted.graph) {
+    write_graph(*wanted.graph, map_of(lattice),
+                [&](ViewId view) { return memory.info(view).name; });
+  }
+#ifdef PANONAV_COMMAND_SIMULATES
+  if (wanted.picture) write_lattice_picture(*wanted.picture, lattice, memory);
+#endif
+  if (session.json()) {
+    session.print(as_json(wanted, lattice, memory).dump());
+  } else {
+    print_result(lattice, memory, session);
+  }
+  return ExitCode::done;
+}
+
+Run declare(Arguments& arguments) {
+  auto wanted = std::make_shared<ArrangeArguments>();
+  arguments.positional("MEMORY", wanted->memory, "Memory file; its views may be in any order");
+  arguments.option("--odometry", wanted->odometry,
+                   "Take the robot's motion between views from this data set, by file name");
+  arguments.option("--tum", wanted->tum,
+                   "Write the poses of the largest part to this file: TUM text, or CSV for a name "
+                   "that ends in .csv");
+  arguments.option("--graphml", wanted->graph, "Write the map as a graph to this file");
+#ifdef PANONAV_COMMAND_SIMULATES
+  arguments.option("--picture", wanted->picture,
+                   "Draw the map, beside the truth where it is known, into this PNG or SVG file");
+#endif
+  arguments.flag("--no-save", wanted->no_save, "Leave the memory file as it is");
+  arguments.options("lattice", wanted->lattice);
+  arguments.options("coarse_motion", wanted->motion, "motion");
+  return [wanted](Session& session) { return arrange_views(*wanted, session); };
+}
+
+}  // namespace
+
+Verb arrange_verb() {
+  return {
+      "arrange", "Arrange the views of a memory as they lie in space, by their likeness alone",
+      "Views may have been taken in any order; poses in the memory are only compared with. What "
+      "nothing\n"
+      "connects is kept as separate parts. The map is stored in the memory under the name "
+      "lattice.",
+      "  panonav arrange office.panonav --picture lattice.png\n"
+      "  panonav arrange hall.panonav --odometry run --graphml hall.graphml --json",
+      declare};
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,222 @@
+#include <array>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "cli/arguments.hpp"
+#include "cli/session.hpp"
+#include "cli/verbs.hpp"
+#include "panonav/camera/find_mirror.hpp"
+#include "panonav/camera/mirror_camera.hpp"
+#include "panonav/camera/mirror_overlay.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/io/camera_file.hpp"
+#include "panonav/io/image_file.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+/// What no picture shows of a mirror: its profile, and where the robot's forward direction lies.
+struct MirrorOptions {
+  int profile = 0;
+  double inner_elevation_deg = -60.0;
+  double rim_elevation_deg = 20.0;
+  double mirror_a_mm = HyperboloidalModel{}.a_mm;
+  double mirror_b_mm = HyperboloidalModel{}.b_mm;
+  double xi = UnifiedModel{}.xi;
+  int direction = 0;
+  double forward_angle_deg = 0.0;
+};
+
+void visit_options(MirrorOptions& options, OptionVisitor& visitor) {
+  static constexpr std::array<std::string_view, 3> profiles{"equiangular", "hyperboloidal",
+                                                            "unified"};
+  static constexpr std::array<std::string_view, 2> directions{"clockwise", "counter-clockwise"};
+  visitor.visit({.name = "profile", .help = "Shape of the mirror"}, profiles, options.profile);
+  visitor.visit({.name = "inner_elevation_deg",
+                 .help = "Elevation seen at the inner radius (equiangular)",
+                 .low = -90,
+                 .high = 90},
+                options.inner_elevation_deg);
+  visitor.visit({.name = "rim_elevation_deg",
+                 .help = "Elevation seen at the mirror's rim",
+                 .low = -90,
+                 .high = 90},
+                options.rim_elevation_deg);
+  visitor.visit({.name = "mirror_a_mm",
+                 .help = "a of the hyperboloid [Y03 eq. 1]",
+                 .low = 0,
+                 .low_open = true},
+                options.mirror_a_mm);
+  visitor.visit({.name = "mirror_b_mm",
+                 .help = "b of the hyperboloid [Y03 eq. 1]",
+                 .low = 0,
+                 .low_open = true},
+                options.mirror_b_mm);
+  visitor.visit(
+      {.name = "xi", .help = "Mirror parameter of the unified model", .low = 0, .high = 10},
+      options.xi);
+  visitor.visit({.name = "direction",
+                 .help = "How a turn to the left runs in the picture: clockwise where the camera "
+                         "looks up into the "
+                         "mirror, counter-clockwise where it looks down"},
+                directions, options.direction);
+  visitor.visit({.name = "forward_angle_deg",
+                 .help = "Where the robot's forward direction lies in the picture: 0 right, 90 up",
+                 .low = -360,
+                 .high = 360},
+                options.forward_angle_deg);
+}
+
+struct CalibrateArguments {
+  std::vector<std::string> images;
+  std::string out;
+  std::optional<std::string> overlay;
+  std::optional<double> inner_radius_px;
+  MirrorSearchOptions search;
+  MirrorOptions mirror;
+};
+
+std::vector<Image> read_images(const std::vector<std::string>& paths) {
+  std::vector<Image> images;
+  Progress progress("reading", paths.size());
+  for (const auto& path : paths) {
+    images.push_back(read_image(path));
+    const auto size = images.back().size();
+    const auto first = images.front().size();
+    if (size != first) {
+      throw FileError(path, "size is " + std::to_string(size.width) + " x " +
+                                std::to_string(size.height) +
+                                "; allowed: " + std::to_string(first.width) + " x " +
+                                std::to_string(first.height) + ", as in " + paths.front());
+    }
+    progress.advance();
+  }
+  return images;
+}
+
+CameraModel model_of(const MirrorOptions& options, double rim_radius_px) {
+  const double rim_rad = radians(options.rim_elevation_deg);
+  switch (options.profile) {
+    case 1:
+      return with_elevation_at(
+          HyperboloidalModel{.a_mm = options.mirror_a_mm, .b_mm = options.mirror_b_mm},
+          rim_radius_px, rim_rad);
+    case 2:
+      return with_elevation_at(UnifiedModel{.xi = options.xi}, rim_radius_px, rim_rad);
+    default:
+      return EquiangularModel{radians(options.inner_elevation_deg), rim_rad};
+  }
+}
+
+ordered_json as_json(const CalibrateArguments& wanted, const MirrorCircle& mirror,
+                     const Camera& camera) {
+  ordered_json json{{"images", wanted.images.size()},
+                    {"width_px", mirror.image_size.width},
+                    {"height_px", mirror.image_size.height},
+                    {"centre_u_px", mirror.centre.u_px},
+                    {"centre_v_px", mirror.centre.v_px},
+                    {"rim_radius_px", mirror.rim_radius_px},
+                    {"inner_radius_px", camera.inner_radius_px},
+                    {"inner_radius_found", mirror.inner_radius_px.has_value()},
+                    {"quality", mirror.quality},
+                    {"residual_px", mirror.residual_px},
+                    {"deviation_over_images", nullptr},
+                    {"camera", wanted.out}};
+  if (const auto spread = agreement(mirror)) {
+    json["deviation_over_images"] = {{"images", spread->images},
+                                     {"centre_u_px", spread->centre_u_px},
+                                     {"centre_v_px", spread->centre_v_px},
+                                     {"rim_radius_px", spread->rim_radius_px}};
+  }
+  return json;
+}
+
+void print_text(const Arguments& arguments, const CalibrateArguments& wanted,
+                const MirrorCircle& mirror, const Camera& camera, Session& session) {
+  session.print(session.strong("mirror found") + ": centre " + fixed(mirror.centre.u_px, 1) + ", " +
+                fixed(mirror.centre.v_px, 1) + " px, rim radius " + fixed(mirror.rim_radius_px, 1) +
+                " px, inner radius " + fixed(camera.inner_radius_px, 1) + " px" +
+                (mirror.inner_radius_px || wanted.inner_radius_px
+                     ? ""
+                     : " (none found; give --inner-radius-px)"));
+  session.print("quality " + fixed(mirror.quality, 2) + " of 1, edges within " +
+                fixed(mirror.residual_px, 2) + " px of the rim");
+  if (const auto spread = agreement(mirror)) {
+    session.print("over the " + std::to_string(spread->images) +
+                  " images that show the rim alone, the centre varies by " +
+                  fixed(spread->centre_u_px, 2) + ", " + fixed(spread->centre_v_px, 2) +
+                  " px and the radius by " + fixed(spread->rim_radius_px, 2) +
+                  " px (standard deviations)");
+  }
+  if (!arguments.given("mirror")) {
+    session.print(
+        "A picture does not show the mirror's profile: elevations are taken to run evenly from " +
+        short_number(wanted.mirror.inner_elevation_deg) + " degrees at the inner radius to " +
+        short_number(wanted.mirror.rim_elevation_deg) +
+        " at the rim. Say what you know with --profile, --rim-elevation-deg and their companions.");
+  }
+  session.print(
+      "Next: " + (wanted.overlay ? "look at " + *wanted.overlay + ", then " : std::string()) +
+      "panonav unwrap " + wanted.images.front() + " --camera " + wanted.out + " -o panorama.png");
+}
+
+ExitCode calibrate(const Arguments& arguments, const CalibrateArguments& wanted, Session& session) {
+  const auto images = read_images(wanted.images);
+  std::vector<ImageView> views;
+  for (const auto& image : images) views.push_back(image.view());
+  const auto mirror = find_mirror(views, wanted.search);
+  if (!mirror) {
+    session.note("panonav calibrate: no mirror found in " + wanted.images.front() +
+                 (images.size() > 1 ? " and the others" : "") +
+                 "; give more images, or allow a fainter rim with --least-quality");
+    return ExitCode::no_answer;
+  }
+  const double forward_rad = radians(wanted.mirror.forward_angle_deg);
+  const Camera camera = camera_from_mirror(
+      *mirror, {.model = model_of(wanted.mirror, mirror->rim_radius_px),
+                .inner_radius_px = wanted.inner_radius_px,
+                .direction = wanted.mirror.direction == 0 ? ColumnDirection::clockwise
+                                                          : ColumnDirection::counter_clockwise,
+                .forward_angle_rad = forward_rad});
+  if (wanted.overlay) {
+    const Image overlay = draw_mirror(views.front(), *mirror, forward_rad);
+    write_png(*wanted.overlay, overlay.view());
+  }
+  write_camera(wanted.out, {camera, std::nullopt});
+  if (session.json()) {
+    session.print(as_json(wanted, *mirror, camera).dump());
+  } else {
+    print_text(arguments, wanted, *mirror, camera, session);
+  }
+  return ExitCode::done;
+}
+
+Run declare(Arguments& arguments) {
+  auto wanted = std::make_shared<CalibrateArguments>();
+  arguments.positionals("IMAGE", wanted->images,
+                        "Raw images of one mirror camera; more are better");
+  arguments.required_option("-o,--out", wanted->out, "Camera file to write (camera.toml)");
+  arguments.option("--overlay", wanted->overlay,
+                   "PNG picture to write: what was found, drawn over the first image");
+  arguments.option("--inner-radius-px", wanted->inner_radius_px,
+                   "Radius that the camera's own reflection covers, instead of the one found");
+  arguments.options("mirror", wanted->mirror);
+  arguments.options("mirror_search", wanted->search);
+  return [wanted, &arguments](Session& session) { return calibrate(arguments, *wanted, session); };
+}
+
+}  // namespace
+
+Verb calibrate_verb() {
+  return {"calibrate", "Find centre, rim and inner radius of a mirror in raw images",
+          "Ends with 1 when no image shows a mirror's rim. Look at the overlay before you trust "
+          "the file.",
+          "  panonav calibrate mirror1.jpg mirror2.jpg -o camera.toml --overlay overlay.png",
+          declare};
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,307 @@
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "cli/verbs.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "reports/catchment_report.hpp"
+#include "reports/report_page.hpp"
+#include "verbs/catchment_survey.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+using nlohmann::ordered_json;
+namespace fs = std::filesystem;
+
+struct CatchmentArguments {
+  std::string dataset;
+  std::optional<std::string> current;
+  PictureArguments pictures;
+  HomingArguments homing;
+  CatchmentSettings settings;
+  std::optional<std::string> stages;
+  std::optional<std::uint64_t> turn_seed;
+  std::optional<int> ahead;
+  std::optional<std::string> goal;
+  std::optional<std::string> report;
+};
+
+ordered_json number(double value) {
+  return std::isfinite(value) ? ordered_json(value) : ordered_json();
+}
+
+ordered_json as_json(const CatchmentArguments& wanted, const RecordedViews& goals,
+                     const CatchmentResult& result) {
+  ordered_json json{{"dataset", wanted.dataset},
+                    {"current", wanted.current ? ordered_json(*wanted.current) : ordered_json()},
+                    {"goals", result.survey.goals.size()},
+                    {"places", result.survey.places.size()},
+                    {"spacing_m", result.spacing_m},
+                    {"typical_distance_m", result.typical_distance_m},
+                    {"up_to_m", wanted.settings.up_to_m ? ordered_json(*wanted.settings.up_to_m)
+                                                        : ordered_json()},
+                    {"pairs", result.pairs},
+                    {"stages", wanted.stages ? ordered_json(*wanted.stages) : ordered_json()},
+                    {"homeward_component", number(result.component)},
+                    {"orientation_error_rad", number(result.orientation_error_rad)}};
+  auto bins = ordered_json::array();
+  for (const CatchmentBin& bin : result.bins) {
+    bins.push_back({{"distance_m", bin.homeward.distance_m},
+                    {"pairs", bin.homeward.pairs},
+                    {"homeward_component", number(bin.homeward.component)},
+                    {"orientation_error_rad", number(bin.orientation_error_rad)}});
+  }
+  json["bins"] = std::move(bins);
+  auto areas = ordered_json::array();
+  const auto places = static_cast<double>(result.survey.places.size());
+  for (std::size_t i = 0; i < result.areas.size(); ++i) {
+    areas.push_back({{"accepted_m", result.accepted_m[i]},
+                     {"places", result.areas[i]},
+                     {"share", result.areas[i] / places}});
+  }
+  json["catchment_areas"] = std::move(areas);
+  auto views = ordered_json::array();
+  for (std::size_t g = 0; g < goals.files.size(); ++g) {
+    views.push_back(
+        {{"file", goals.files[g]}, {"places", catchment_of(result, g, result.spacing_m)}});
+  }
+  json["views"] = std::move(views);
+  return json;
+}
+
+void print_text(const CatchmentArguments& wanted, const CatchmentResult& result, Session& session) {
+  const std::string range =
+      wanted.settings.up_to_m ? " up to " + short_number(*wanted.settings.up_to_m) + " m" : "";
+  session.print("Average homeward component over " + std::to_string(result.pairs) + " pairs" +
+                range + ": " + session.strong(fixed(result.component, 3)) +
+                " (1: straight home, 0: chance)");
+  session.print("  heading off by " + fixed(degrees(result.orientation_error_rad), 1) +
+                " degrees (circular standard deviation); a home vector of length 1 is worth " +
+                fixed(result.typical_distance_m, 2) + " m");
+  session.print("  distance [m]  pairs     homeward  heading error [degrees]");
+  for (const CatchmentBin& bin : result.bins) {
+    // Rounding of a distance must not take its bin away.
+    if (wanted.settings.up_to_m && bin.homeward.distance_m > 1.001 * *wanted.settings.up_to_m)
+      break;
+    const auto padded = [](std::string text, std::size_t width) {
+      text.resize(std::max(width, text.size()), ' ');
+      return text;
+    };
+    session.print("  " + padded(fixed(bin.homeward.distance_m, 3), 14) +
+                  padded(std::to_string(bin.homeward.pairs), 10) +
+                  padded(fixed(bin.homeward.component, 3), 10) +
+                  fixed(degrees(bin.orientation_error_rad), 1));
+  }
+  session.print("Runs home over the " + std::to_string(result.survey.places.size()) + " places, " +
+                fixed(result.spacing_m, 3) + " m apart; mean catchment area:");
+  const auto places = static_cast<double>(result.survey.places.size());
+  for (std::size_t i = 0; i < result.areas.size(); ++i) {
+    session.print("  ending within " + fixed(result.accepted_m[i], 3) + " m: from " +
+                  fixed(result.areas[i], 1) + " places (" +
+                  fixed(100.0 * result.areas[i] / places, 0) + " %)");
+  }
+}
+
+/// Each view homes to the one so many pictures later.
+ExitCode look_ahead(const CatchmentArguments& wanted, const RecordedViews& views,
+                    const FourierHomingOptions& options, Session& session) {
+  const auto ahead = static_cast<std::size_t>(*wanted.ahead);
+  if (views.files.size() <= ahead) {
+    throw FileError(wanted.dataset, "has " + std::to_string(views.files.size()) +
+                                        " pictures; --ahead allows 1 to " +
+                                        std::to_string(views.files.size() - 1));
+  }
+  std::vector<double> directions;
+  std::size_t sideways = 0;
+  for (std::size_t i = 0; i + ahead < views.files.size(); ++i) {
+    const HomeVector found = home_vector(views.views[i + ahead], views.views[i], options);
+    if (!(found.length() > 0.0)) continue;
+    // As if the robot had not been turned.
+    directions.push_back(wrap_angle(found.direction_rad() + views.turned_rad[i]));
+    sideways += std::abs(directions.back()) > radians(90.0) ? 1 : 0;
+  }
+  const auto mean = circular_mean(directions);
+  if (session.json()) {
+    session.print(ordered_json{
+        {"dataset", wanted.dataset},
+        {"ahead", ahead},
+        {"pairs", directions.size()},
+        {"direction_rad", mean ? ordered_json(mean->direction_rad) : ordered_json()},
+        {"resultant_length", mean ? mean->resultant_length : 0.0},
+        {"backward",
+         sideways}}.dump());
+  } else if (mean) {
+    const double degrees_left = degrees(mean->direction_rad);
+    session.print("From each of " + std::to_string(directions.size()) + " views to the one " +
+                  std::to_string(ahead) + " later: on average " +
+                  session.strong(fixed(std::abs(degrees_left), 1) + " degrees to the " +
+                                 (degrees_left > 0.0 ? "left" : "right")) +
+                  " of straight ahead");
+    session.print("  resultant length " + fixed(mean->resultant_length, 3) +
+                  " (1: all the same), spread " +
+                  fixed(degrees(circular_standard_deviation(*mean)), 1) + " degrees, " +
+                  std::to_string(sideways) + " point backwards");
+  } else {
+    session.print(session.bad("no common direction"));
+  }
+  return mean ? ExitCode::done : ExitCode::no_answer;
+}
+
+void check_posed(const RecordedViews& views, const std::string& name) {
+  for (std::size_t i = 0; i < views.files.size(); ++i) {
+    if (views.poses[i] && views.poses[i]->heading_rad) continue;
+    throw FileError(name, "picture " + views.files[i] + " has no " +
+                              (views.poses[i] ? "heading" : "position") +
+                              ", and directions are judged by both; --ahead N needs neither");
+  }
+}
+
+/// The view asked for, or the one nearest to the middle of all.
+std::size_t shown_goal(const CatchmentArguments& wanted, const RecordedViews& goals) {
+  if (wanted.goal) {
+    const auto found = std::ranges::find(goals.files, *wanted.goal);
+    if (found == goals.files.end()) {
+      throw FileError(wanted.dataset, "has no picture '" + *wanted.goal + "', asked for by --goal");
+    }
+    return static_cast<std::size_t>(found - goals.files.begin());
+  }
+  Point2 middle;
+  for (const auto& pose : goals.poses) {
+    middle.x_m += pose->x_m / static_cast<double>(goals.poses.size());
+    middle.y_m += pose->y_m / static_cast<double>(goals.poses.size());
+  }
+  std::size_t best = 0;
+  for (std::size_t i = 0; i < goals.poses.size(); ++i) {
+    if (distance(goals.poses[i]->position(), middle) <
+        distance(goals.poses[best]->position(), middle)) {
+      best = i;
+    }
+  }
+  return best;
+}
+
+/// Numbers between commas.
+std::vector<int> read_stages(const std::string& text, int most) {
+  std::vector<int> stages;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    int value = 0;
+    const auto [last, error] = std::from_chars(text.data() + begin, text.data() + end, value);
+    if (error != std::errc() || last != text.data() + end || value < 1 || value > most) {
+      throw UsageError("--stages is '" + text + "'; allowed: numbers from 1 to " +
+                       std::to_string(most) + ", components less two, with commas between them");
+    }
+    stages.push_back(value);
+    begin = end + 1;
+  }
+  return stages;
+}
+
+ExitCode catchment(const Arguments& arguments, const CatchmentArguments& wanted, Session& session) {
+  if (wanted.ahead && (wanted.current || wanted.report || wanted.goal)) {
+    throw UsageError(
+        "--ahead compares the pictures of one recording in their order; leave out "
+        "--current, --goal and --report");
+  }
+  if (wanted.settings.up_to_m && !(*wanted.settings.up_to_m > 0.0)) {
+    throw UsageError("--up-to-m is " + short_number(*wanted.settings.up_to_m) + "; allowed: > 0");
+  }
+  if (wanted.settings.bin_m && !(*wanted.settings.bin_m > 0.0)) {
+    throw UsageError("--bin-m is " + short_number(*wanted.settings.bin_m) + "; allowed: > 0");
+  }
+  CatchmentSettings settings = wanted.settings;
+  settings.homing = homing_options(arguments, wanted.homing, wanted.homing.signature.components);
+  if (wanted.stages) {
+    if (wanted.ahead) throw UsageError("--stages are stages of runs, and --ahead makes none");
+    settings.stages =
+        read_stages(*wanted.stages, std::min(62, wanted.homing.signature.components - 2));
+  }
+  settings.typical_distance_given = arguments.given("run", "typical_distance_m");
+  settings.longest_step_given = arguments.given("run", "longest_step_m");
+  settings.obstacle_given = arguments.given("run", "obstacle_m");
+  const auto recording = open_recording(wanted.dataset, wanted.pictures, std::nullopt);
+  std::optional<Dataset> second;
+  if (wanted.current) second = open_recording(*wanted.current, wanted.pictures, recording.source);
+  if (wanted.report) prepare_catchment_report(*wanted.report);
+
+  if (wanted.ahead) {
+    const auto views = read_views(recording, wanted.homing, wanted.turn_seed, session);
+    return look_ahead(wanted, views, settings.homing, session);
+  }
+  const auto goals = read_views(recording, wanted.homing, std::nullopt, session);
+  check_posed(goals, wanted.dataset);
+  const std::size_t goal = shown_goal(wanted, goals);
+  const auto places =
+      read_views(second ? *second : recording, wanted.homing, wanted.turn_seed, session);
+  const std::string& places_name = wanted.current ? *wanted.current : wanted.dataset;
+  check_posed(places, places_name);
+  if (goals.views.front().rows() != places.views.front().rows()) {
+    throw FileError(places_name, "rows is " + std::to_string(places.views.front().rows()) +
+                                     "; allowed: " + std::to_string(goals.views.front().rows()) +
+                                     ", as in " + wanted.dataset);
+  }
+  const auto result = survey_catchment(goals, places, settings, places_name, session);
+  if (session.json()) {
+    session.print(as_json(wanted, goals, result).dump());
+  } else {
+    print_text(wanted, result, session);
+  }
+  if (wanted.report) {
+    write_catchment_report(*wanted.report, goals, places, result, settings.homing, goal);
+    tell_report(*wanted.report, session);
+  }
+  return std::isfinite(result.component) ? ExitCode::done : ExitCode::no_answer;
+}
+
+Run declare(Arguments& arguments) {
+  auto wanted = std::make_shared<CatchmentArguments>();
+  arguments.positional("DATASET", wanted->dataset,
+                       "Data set with positions and headings; each view is a home");
+  arguments.option("--current", wanted->current,
+                   "Data set of the views to go home from; default: the same recording");
+  declare_pictures(arguments, wanted->pictures);
+  arguments.option("--up-to-m", wanted->settings.up_to_m,
+                   "Leave out pairs that are farther apart from the averages");
+  arguments.option("--bin-m", wanted->settings.bin_m,
+                   "Width of a bin of distances; default: the spacing of the places");
+  arguments.option("--turn-randomly", wanted->turn_seed,
+                   "Turn the robot before each current view by a random number of whole columns. "
+                   "SEED");
+  arguments.option(
+      "--stages", wanted->stages,
+      "Runs go from coarse to fine: the highest frequency of each stage, as in 2,4,10");
+  arguments.option("--ahead", wanted->ahead, 1,
+                   "Only compare each view with the one N pictures later: the direction of travel "
+                   "where the camera looks along it. Needs no positions");
+  arguments.option("--goal", wanted->goal,
+                   "Picture whose home vectors the report shows; default: the one in the middle");
+  arguments.option("--report", wanted->report,
+                   "Write curves and maps into this folder: a new one, or that of an earlier "
+                   "report");
+  declare_homing(arguments, wanted->homing);
+  arguments.options("run", wanted->settings.run);
+  return [wanted, &arguments](Session& session) { return catchment(arguments, *wanted, session); };
+}
+
+}  // namespace
+
+Verb catchment_verb() {
+  return {"catchment", "Measure from how far the views of a recording lead home",
+          "Home vectors between all pairs of views, and runs from place to place [S06 section 4].\n"
+          "Where they are not given, the longest step is twice the spacing of the places, a step "
+          "must\n"
+          "end within 0.8 of it, and the typical distance of things is learnt from near pairs.",
+          "  panonav catchment grid_run --up-to-m 0.3 --turn-randomly 1 --report catchment\n"
+          "  panonav catchment monday_run --current tuesday_run --published 5 --json\n"
+          "  panonav catchment grid_run --published 10 --stages 2,4,10\n"
+          "  panonav catchment walk_run --ahead 20",
+          declare};
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,245 @@
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <vector>
+
+#include "cli/arguments.hpp"
+#include "cli/session.hpp"
+#include "cli/verbs.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/alignment.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/io/trajectory_file.hpp"
+#include "panonav/mapping/map_measures.hpp"
+#include "panonav/motion/trajectory_error.hpp"
+#include "panonav/storage/memory_file.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+struct EvaluateArguments {
+  std::string estimate;
+  std::string truth;
+  TrajectoryErrorOptions options;
+};
+
+ordered_json as_json(const ErrorSummary& errors) {
+  return {{"rms", errors.rms},
+          {"mean", errors.mean},
+          {"median", errors.median},
+          {"p95", errors.p95},
+          {"largest", errors.largest}};
+}
+
+/// Closures are right when their views truly are so near.
+constexpr double right_closure_m = 1.0;
+constexpr int neighbours = 8;
+/// Comparing everyone's neighbours takes time with the square of the poses; more are thinned out.
+constexpr std::size_t most_points = 2000;
+
+/// What is compared with the truth: poses over time, and closures where a map was given.
+struct Estimate {
+  Trajectory trajectory;
+  TopologicalMap map;                // empty where a trajectory was given
+  std::map<ViewId, double> stamp_s;  // of the map's views
+};
+
+/// How the estimate compares as a map; what is not defined for so few poses is empty.
+struct MapFigures {
+  std::optional<ShapeDifference> shape;
+  std::optional<NeighbourPreservation> neighbours;
+  std::optional<ClosureCount> closures;
+};
+
+ordered_json as_json(const MapFigures& figures) {
+  ordered_json json{{"shape_difference", nullptr}, {"shape_difference_with_reflection", nullptr},
+                    {"trustworthiness", nullptr},  {"continuity", nullptr},
+                    {"right_closures", nullptr},   {"wrong_closures", nullptr}};
+  if (figures.shape) {
+    json["shape_difference"] = figures.shape->value;
+    json["shape_difference_with_reflection"] = figures.shape->with_reflection;
+  }
+  if (figures.neighbours) {
+    json["trustworthiness"] = figures.neighbours->trustworthiness;
+    json["continuity"] = figures.neighbours->continuity;
+  }
+  if (figures.closures) {
+    json["right_closures"] = figures.closures->right;
+    json["wrong_closures"] = figures.closures->wrong;
+  }
+  return json;
+}
+
+ordered_json as_json(const TrajectoryError& error) {
+  const auto& alignment = error.truth_from_estimate;
+  ordered_json json{{"pairs", error.pairs},
+                    {"left_out", error.left_out},
+                    {"alignment",
+                     {{"scale", alignment.scale},
+                      {"rotation_rad", alignment.rotation_rad},
+                      {"x_m", alignment.translation.x_m},
+                      {"y_m", alignment.translation.y_m},
+                      {"reflected", alignment.reflected}}},
+                    {"position_m", as_json(error.position_m)},
+                    {"heading_rad", as_json(error.heading_rad)},
+                    {"relative_pairs", error.relative_pairs},
+                    {"relative_position_m", nullptr},
+                    {"relative_heading_rad", nullptr}};
+  if (error.relative_pairs > 0) {
+    json["relative_position_m"] = as_json(error.relative_position_m);
+    json["relative_heading_rad"] = as_json(error.relative_heading_rad);
+  }
+  return json;
+}
+
+std::string line_of(const std::string& label, const ErrorSummary& errors, double unit, int digits) {
+  return label + "  rms " + fixed(errors.rms * unit, digits) + "  median " +
+         fixed(errors.median * unit, digits) + "  95 % within " + fixed(errors.p95 * unit, digits) +
+         "  largest " + fixed(errors.largest * unit, digits);
+}
+
+Trajectory read(const std::string& path) {
+  return Trajectory(read_trajectory(path));
+}
+
+/// The map that `panonav map` made: poses of its first part over time.
+Estimate read_map(const std::string& path) {
+  const MemoryFile file = MemoryFile::open(path, Access::read_only);
+  const auto map = file.map("map");
+  if (!map || map->nodes.empty()) {
+    throw FileError(path, "holds no map; allowed: a memory file that panonav map made");
+  }
+  const VisualMemory memory = file.load();
+  Estimate estimate{.map = *map};
+  std::vector<StampedPose> poses;
+  for (const MapNode& node : map->nodes) {
+    const auto& stamp_s = memory.info(node.view).stamp_s;
+    if (!stamp_s) {
+      throw FileError(path, "view " + memory.info(node.view).name +
+                                " has no stamp; allowed: a recording with the column 'stamp_s'");
+    }
+    estimate.stamp_s.emplace(node.view, *stamp_s);
+    if (node.part == map->nodes.front().part) poses.push_back({*stamp_s, node.pose});
+  }
+  std::ranges::sort(poses, {}, &StampedPose::stamp_s);
+  estimate.trajectory = Trajectory(poses);
+  return estimate;
+}
+
+Estimate read_estimate(const std::string& path) {
+  if (std::filesystem::path(path).extension() == ".panonav") return read_map(path);
+  return {.trajectory = read(path)};
+}
+
+MapFigures compare_as_map(const Estimate& estimate, const Trajectory& truth, double longest_gap_s) {
+  std::vector<Point2> map;
+  std::vector<Point2> known;
+  for (const StampedPose& pose : estimate.trajectory.poses()) {
+    const auto there = truth.at(pose.stamp_s, longest_gap_s);
+    if (!there) continue;
+    map.push_back(pose.pose.position());
+    known.push_back(there->position());
+  }
+  MapFigures figures;
+  const auto is_one_place = [](const std::vector<Point2>& points) {
+    return std::ranges::all_of(points, [&](const Point2& p) { return p == points.front(); });
+  };
+  if (map.size() >= 2 && !is_one_place(map) && !is_one_place(known)) {
+    figures.shape = shape_difference(map, known);
+  }
+  const std::size_t every = (map.size() + most_points - 1) / most_points;
+  std::vector<Point2> few;
+  std::vector<Point2> few_known;
+  for (std::size_t i = 0; every > 0 && i < map.size(); i += every) {
+    few.push_back(map[i]);
+    few_known.push_back(known[i]);
+  }
+  if (3 * neighbours + 1 < 2 * static_cast<int>(few.size())) {
+    figures.neighbours = neighbour_preservation(few, few_known, neighbours);
+  }
+  if (!estimate.map.nodes.empty()) {
+    figures.closures = count_closures(
+        estimate.map,
+        [&](ViewId view) -> std::optional<Point2> {
+          const auto there = truth.at(estimate.stamp_s.at(view), longest_gap_s);
+          return there ? std::optional(there->position()) : std::nullopt;
+        },
+        right_closure_m);
+  }
+  return figures;
+}
+
+void print_figures(const MapFigures& figures, Session& session) {
+  if (figures.shape) {
+    session.print("shape difference     " + fixed(figures.shape->value, 4) +
+                  "  with a reflection allowed " + fixed(figures.shape->with_reflection, 4));
+  }
+  if (figures.neighbours) {
+    session.print("neighbours kept      trustworthiness " +
+                  fixed(figures.neighbours->trustworthiness, 3) + "  continuity " +
+                  fixed(figures.neighbours->continuity, 3));
+  }
+  if (figures.closures) {
+    session.print("loop closures        right " + std::to_string(figures.closures->right) +
+                  "  wrong " + std::to_string(figures.closures->wrong));
+  }
+}
+
+ExitCode evaluate(const EvaluateArguments& wanted, Session& session) {
+  const Estimate estimate = read_estimate(wanted.estimate);
+  const Trajectory truth = read(wanted.truth);
+  const auto error = trajectory_error(estimate.trajectory, truth, wanted.options);
+  if (!error) {
+    session.note("panonav evaluate: fewer than two poses of " + wanted.estimate +
+                 " have a stamp within " + wanted.truth + "; do both count the same seconds?");
+    return ExitCode::no_answer;
+  }
+  const MapFigures figures = compare_as_map(estimate, truth, wanted.options.longest_gap_s);
+  if (session.json()) {
+    ordered_json json = as_json(*error);
+    json.update(as_json(figures));
+    session.print(json.dump());
+    return ExitCode::done;
+  }
+  session.print(std::to_string(error->pairs) + " poses compared, " +
+                std::to_string(error->left_out) + " without a true pose");
+  session.print(line_of("position [m]       ", error->position_m, 1.0, 3));
+  session.print(line_of("heading [degrees]  ", error->heading_rad, degrees(1.0), 2));
+  if (error->relative_pairs > 0) {
+    session.print("over " + to_text(wanted.options.relative_distance_m) + " m of path:");
+    session.print(line_of("position [m]       ", error->relative_position_m, 1.0, 3));
+    session.print(line_of("heading [degrees]  ", error->relative_heading_rad, degrees(1.0), 2));
+  }
+  print_figures(figures, session);
+  return ExitCode::done;
+}
+
+Run declare(Arguments& arguments) {
+  auto wanted = std::make_shared<EvaluateArguments>();
+  arguments.positional("ESTIMATE", wanted->estimate,
+                       "Trajectory as TUM text or CSV, or a memory file (NAME.panonav) with a map");
+  arguments.positional("TRUTH", wanted->truth, "Trajectory as TUM text or CSV");
+  arguments.options("evaluation", wanted->options);
+  return [wanted](Session& session) { return evaluate(*wanted, session); };
+}
+
+}  // namespace
+
+Verb evaluate_verb() {
+  return {"evaluate", "Compare an estimated trajectory or map with the truth",
+          "Poses are associated by stamp and aligned by least squares unless --align false. Ends "
+          "with 1\n"
+          "when the two have no time in common.",
+          "  panonav evaluate estimate.tum truth.tum\n"
+          "  panonav evaluate estimate.csv truth.csv --align-scale true --json\n"
+          "  panonav evaluate office.panonav run/poses.csv",
+          declare};
+}
+
+}  // namespace panonav::command

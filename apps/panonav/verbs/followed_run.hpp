@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "panonav/core/executor.hpp"
+#include "panonav/io/dataset.hpp"
+#include "panonav/route/route_changes.hpp"
+#include "panonav/route/route_place.hpp"
+#include "panonav/route/route_tracker.hpp"
+#include "verbs/route_reading.hpp"
+
+namespace panonav::command {
+
+/// One picture of a run beside a route.
+struct FollowedImage {
+  std::size_t index = 0;  ///< in the data set, from 0
+  std::string file;
+  std::optional<double> stamp_s;
+  std::vector<float> line;             ///< what was seen
+  std::optional<TrackedRouteFix> fix;  ///< empty: not on this route
+  std::vector<AzimuthRange> changed;   ///< where the scene is not as remembered
+  std::optional<Pose2> truth;          ///< in the route's frame, where it is known
+  std::optional<RoutePlace> true_place;
+};
+
+struct FollowSettings {
+  int every = 1;             ///< pictures between those that are looked at, plus one
+  bool use_odometry = true;  ///< where the run has it; else each picture alone
+};
+
+/// Follows a run along a route. Lines are read on all threads, the tracker runs in order; the same
+/// on any number of threads. `truth`: poses of all entries, or empty. `report` is called after each
+/// picture, in order. Throws FileError on a picture that cannot be read.
+void follow(RouteTracker& tracker, const LineReader& reader, const Dataset& run,
+            const std::vector<Pose2>& truth, const FollowSettings& settings, Executor& executor,
+            const std::function<void(FollowedImage&&)>& report);
+
+struct FollowSummary {
+  std::size_t images = 0;
+  std::size_t on_route = 0;
+  std::size_t predicted = 0;
+  std::size_t recovered = 0;
+  std::size_t searched = 0;
+  // Absolute errors where the truth is known.
+  std::vector<double> position_m;
+  std::vector<double> along_m;
+  std::vector<double> lateral_m;
+  std::vector<double> heading_rad;
+};
+[[nodiscard]] FollowSummary summarise_follow(const std::vector<FollowedImage>& images,
+                                             bool headings_known);
+
+/// Stretches of way along which something is changed: from, to, in metres.
+[[nodiscard]] std::vector<std::pair<double, double>> changed_stretches(
+    const std::vector<FollowedImage>& images);
+
+[[nodiscard]] std::string_view name_of(RouteFixOrigin origin);
+
+}  // namespace panonav::command

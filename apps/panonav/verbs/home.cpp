@@ -1,0 +1,215 @@
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "cli/session.hpp"
+#include "cli/verbs.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav/storage/memory_file.hpp"
+#include "reports/home_answer.hpp"
+#include "verbs/homing_pictures.hpp"
+#include "verbs/named_view.hpp"
+#ifdef PANONAV_COMMAND_SIMULATES
+#include "reports/home_report.hpp"
+#include "reports/report_page.hpp"
+#endif
+
+namespace panonav::command {
+
+namespace {
+
+using nlohmann::ordered_json;
+namespace fs = std::filesystem;
+
+struct HomeArguments {
+  std::string goal;
+  std::string current;
+  std::optional<std::string> memory;
+  PictureArguments pictures;
+  HomingArguments homing;
+  std::optional<std::string> report;
+};
+
+ordered_json as_json(const std::string& goal, const HomeAnswer& answer) {
+  const HomeVector& found = answer.vector;
+  const bool points = points_home(found);
+  return {{"goal", goal},
+          {"current", answer.file},
+          {"direction_rad", points ? ordered_json(found.direction_rad()) : ordered_json()},
+          {"length", found.length()},
+          {"xi", found.xi},
+          {"eta", found.eta},
+          {"heading_rad", found.heading_rad},
+          {"correlation", found.correlation},
+          {"residual", found.residual},
+          {"confidence", found.confidence},
+          {"frequencies", found.frequencies}};
+}
+
+std::string as_text(const HomeAnswer& answer, Session& session) {
+  const HomeVector& found = answer.vector;
+  const std::string sure = "; confidence " + fixed(found.confidence, 2);
+  if (points_home(found)) {
+    return answer.file + "  home is " + session.good(in_words(found.direction_rad())) + ", about " +
+           fixed(found.length(), 2) + " R away; " + turn_in_words(found.heading_rad) + sure;
+  }
+  return answer.file + "  " + session.bad("no direction home") + ": " + why_none(found) + sure;
+}
+
+/// A picture beside a dataset.toml lies as that says.
+std::optional<PictureSource> source_beside(const std::string& picture) {
+  const fs::path folder = fs::path(picture).parent_path();
+  std::error_code ignored;
+  if (!fs::is_regular_file(picture, ignored) || !fs::exists(folder / "dataset.toml", ignored)) {
+    return std::nullopt;
+  }
+  return read_dataset(folder.empty() ? fs::path(".") : folder).source;
+}
+
+/// For people: the small picture that the memory keeps.
+std::optional<Panorama> thumbnail_of(const MemoryFile& file, ViewId view) {
+  const auto bytes = file.thumbnail(view);
+  if (!bytes) return std::nullopt;
+  const Image picture = decode_image(*bytes, file.path().string());
+  return panorama_from_picture(picture.view(),
+                               {.forward_column = picture_forward_column(picture.width())});
+}
+
+ExitCode answer_all(const HomeArguments& wanted, const Goal& goal, const Dataset& recording,
+                    const std::function<Panorama(const DatasetEntry&)>& read,
+                    const std::function<HomingView(const Panorama&)>& view_of,
+                    const FourierHomingOptions& options, Session& session) {
+  const std::size_t total = recording.entries.size();
+  std::vector<HomeAnswer> answers;
+  std::size_t pointing = 0;
+  Progress progress("homing", total);
+  constexpr std::size_t batch = 32;
+  for (std::size_t begin = 0; begin < total; begin += batch) {
+    const std::size_t count = std::min(batch, total - begin);
+    std::vector<HomeAnswer> some(count);
+    for_each_entry(session.executor(), count, [&](std::size_t i) {
+      const DatasetEntry& entry = recording.entries[begin + i];
+      const HomingView view = view_of(read(entry));
+      check_same_rows(view, entry, goal.view, goal.name);
+      some[i] = {entry.file, entry.pose, home_vector(goal.view, view, options)};
+    });
+    progress.clear();
+    for (HomeAnswer& answer : some) {
+      pointing += points_home(answer.vector) ? 1 : 0;
+      session.print(session.json() ? as_json(goal.name, answer).dump() : as_text(answer, session));
+      answers.push_back(std::move(answer));
+    }
+    progress.advance(count);
+  }
+  progress.clear();
+  if (!session.json() && total > 1) {
+    session.print(session.strong(std::to_string(pointing) + " of " + std::to_string(total)) +
+                  " views tell the way to " + goal.name);
+  }
+#ifdef PANONAV_COMMAND_SIMULATES
+  if (wanted.report) {
+    write_home_report(*wanted.report, goal, answers,
+                      [&](std::size_t i) { return read(recording.entries[i]); });
+    tell_report(*wanted.report, session);
+  }
+#else
+  (void)wanted;
+#endif
+  return pointing > 0 ? ExitCode::done : ExitCode::no_answer;
+}
+
+ExitCode home_from_memory(const Arguments& arguments, const HomeArguments& wanted,
+                          Session& session) {
+  const auto file = MemoryFile::open(*wanted.memory, Access::read_only);
+  const auto& header = file.header();
+  if (arguments.given("signature", "rows") || arguments.given("signature", "columns") ||
+      arguments.given("preprocessing")) {
+    throw UsageError(
+        "the memory says how pictures become views; leave out --rows, --columns and "
+        "the options of preprocessing");
+  }
+  int components = header.shape.components;
+  if (arguments.given("signature", "components")) {
+    components = wanted.homing.signature.components;
+    if (components < 3 || components > header.shape.components) {
+      throw ContractError("components", components,
+                          "3 to " + std::to_string(header.shape.components) + ", the memory's");
+    }
+  }
+  const auto options = homing_options(arguments, wanted.homing, components);
+  const auto memory = file.load();
+  const ViewId view = named_view(memory, wanted.goal, *wanted.memory);
+  const auto recording = open_recording(wanted.current, wanted.pictures, header.source);
+  const ViewEncoder pipeline(header, recording.source);
+  const auto view_of = [&](const FourierSignature& signature) {
+    return first_components(view_to_home_with(signature, wanted.homing.horizon), components);
+  };
+  const Goal goal{memory.info(view).name, memory.info(view).pose, view_of(memory.signature(view)),
+                  wanted.report ? thumbnail_of(file, view) : std::nullopt};
+  return answer_all(
+      wanted, goal, recording, [&](const DatasetEntry& entry) { return pipeline.read(entry); },
+      [&](const Panorama& panorama) { return view_of(pipeline.signature(panorama)); }, options,
+      session);
+}
+
+ExitCode home(const Arguments& arguments, const HomeArguments& wanted, Session& session) {
+#ifdef PANONAV_COMMAND_SIMULATES
+  if (wanted.report) prepare_home_report(*wanted.report);
+#endif
+  if (wanted.memory) return home_from_memory(arguments, wanted, session);
+  const auto options = homing_options(arguments, wanted.homing, wanted.homing.signature.components);
+  std::error_code ignored;
+  if (fs::is_directory(wanted.goal, ignored)) {
+    throw FileError(wanted.goal, "is a folder; the goal is one picture, or a view of --memory");
+  }
+  // Either picture may be the one whose folder says how both lie.
+  std::optional<PictureSource> known = source_beside(wanted.current);
+  if (!known) known = source_beside(wanted.goal);
+  const auto recording = open_recording(wanted.current, wanted.pictures, known);
+  std::optional<PictureSource> goal_source = source_beside(wanted.goal);
+  if (!goal_source) goal_source = recording.source;
+  const auto goals = open_recording(wanted.goal, wanted.pictures, goal_source);
+  const HomingReader goal_reader(goals, wanted.homing);
+  const HomingReader reader(recording, wanted.homing);
+  const Panorama picture = goal_reader.read(goals.entries.front());
+  const Goal goal{wanted.goal, std::nullopt, goal_reader.view(picture), picture};
+  return answer_all(
+      wanted, goal, recording, [&](const DatasetEntry& entry) { return reader.read(entry); },
+      [&](const Panorama& panorama) { return reader.view(panorama); }, options, session);
+}
+
+Run declare(Arguments& arguments) {
+  auto wanted = std::make_shared<HomeArguments>();
+  arguments.positional("GOAL", wanted->goal,
+                       "Picture of the place to return to; with --memory the name or id of a view");
+  arguments.positional("CURRENT", wanted->current,
+                       "What the robot sees now: a picture, or a data set (an answer for each)");
+  arguments.option("--memory", wanted->memory, "Take GOAL from this memory file");
+  declare_pictures(arguments, wanted->pictures);
+#ifdef PANONAV_COMMAND_SIMULATES
+  arguments.option("--report", wanted->report,
+                   "Write pictures of both views and the way home into this folder: a new one, or "
+                   "that of an earlier report");
+#endif
+  declare_homing(arguments, wanted->homing);
+  return [wanted, &arguments](Session& session) { return home(arguments, *wanted, session); };
+}
+
+}  // namespace
+
+Verb home_verb() {
+  return {
+      "home", "Tell the direction back to a place from one view of it",
+      "Directions are seen from the robot as it stands now; the heading need not be known. The\n"
+      "distance is in units of R, the typical distance of the things around. A picture in the\n"
+      "folder of a data set lies as its dataset.toml says. Ends with 1 when no view tells the "
+      "way.",
+      "  panonav home door.png now.png --kind panorama --elevation-deg -30 40\n"
+      "  panonav home view_00012.png now.png --memory office.panonav --report way_home\n"
+      "  panonav home office_run/view_00012.png office_run --json",
+      declare};
+}
+
+}  // namespace panonav::command

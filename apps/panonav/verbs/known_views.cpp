@@ -1,0 +1,146 @@
+#include "verbs/known_views.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <iomanip>
+#include <optional>
+#include <span>
+#include <sstream>
+#include <variant>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+#include "panonav/storage/checksum.hpp"
+#include "panonav/storage/memory_header.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view recordings_parameter = "recordings";
+
+void add_optional(RecordBytes& bytes, const std::optional<double>& value) {
+  if (value) {
+    bytes.add(*value);
+  } else {
+    bytes.add_null();
+  }
+}
+
+void add_setting(RecordBytes& bytes, const std::string& value) {
+  bytes.add(std::string_view(value));
+}
+void add_setting(RecordBytes& bytes, const std::vector<std::uint8_t>& value) {
+  bytes.add(std::span<const std::uint8_t>(value));
+}
+void add_setting(RecordBytes& bytes, std::int64_t value) {
+  bytes.add(value);
+}
+void add_setting(RecordBytes& bytes, double value) {
+  bytes.add(value);
+}
+
+/// Changes with every change of a name, a pose, a file's size or time, or of how the pictures lie.
+std::string fingerprint(const Dataset& recording, const MemoryFile& memory) {
+  RecordBytes bytes;
+  MemoryHeader read_as = memory.header();
+  read_as.source = recording.source;
+  for (const auto& [key, value] : settings_of(read_as)) {
+    bytes.add(std::string_view(key));
+    std::visit([&](const auto& typed) { add_setting(bytes, typed); }, value);
+  }
+  for (const auto& entry : recording.entries) {
+    bytes.add(std::string_view(entry.file));
+    add_optional(bytes, entry.stamp_s);
+    if (entry.pose) {
+      bytes.add(entry.pose->x_m);
+      bytes.add(entry.pose->y_m);
+      add_optional(bytes, entry.pose->heading_rad);
+    } else {
+      bytes.add_null();
+    }
+    std::error_code ignored;
+    bytes.add(static_cast<std::int64_t>(fs::file_size(entry.path, ignored)));
+    const auto changed = fs::last_write_time(entry.path, ignored).time_since_epoch();
+    bytes.add(static_cast<std::int64_t>(changed.count()));
+  }
+  std::ostringstream text;
+  text << std::hex << std::setfill('0') << std::setw(16) << checksum(bytes.bytes());
+  return text.str();
+}
+
+bool met_before(const MemoryFile& memory, const std::string& mark) {
+  std::istringstream marks(memory.parameter(recordings_parameter).value_or(""));
+  for (std::string met; marks >> met;) {
+    if (met == mark) return true;
+  }
+  return false;
+}
+
+/// Equal but for rounding: another processor's instructions may round a value the other way. The
+/// phase of a magnitude near 0 is rounding itself.
+bool same_picture(const PackedSignature& a, const PackedSignature& b) {
+  constexpr int clear_magnitude = 8;
+  for (std::size_t i = 0; i < a.magnitudes.size(); ++i) {
+    if (std::abs(a.magnitudes[i] - b.magnitudes[i]) > 1) return false;
+    if (a.magnitudes[i] < clear_magnitude) continue;
+    const int steps = std::abs(a.phases[i] - b.phases[i]);
+    if (std::min(steps, 256 - steps) > 1) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+void check_known_views(const Dataset& recording, const MemoryFile& memory,
+                       const ViewEncoder& pipeline, Session& session) {
+  const auto refuse = [&](const DatasetEntry& entry, const std::string& what) {
+    throw FileError(memory.path().string(),
+                    "holds " + what + " " + entry.file + "; names must be unique within a memory");
+  };
+  const VisualMemory views = memory.load();
+  std::vector<const DatasetEntry*> known;
+  for (const auto& entry : recording.entries) {
+    const auto view = views.find(entry.file);
+    if (!view) continue;
+    known.push_back(&entry);
+    const auto& info = views.info(*view);
+    if (info.pose != entry.pose || info.stamp_s != entry.stamp_s) {
+      refuse(entry, "a view with another pose or stamp under the name");
+    }
+  }
+  if (known.empty() || met_before(memory, fingerprint(recording, memory))) return;
+
+  Progress progress("comparing", known.size());
+  constexpr std::size_t batch = 32;
+  for (std::size_t begin = 0; begin < known.size(); begin += batch) {
+    const std::size_t count = std::min(batch, known.size() - begin);
+    std::vector<std::optional<PackedSignature>> seen(count);
+    for_each_entry(session.executor(), count, [&](std::size_t i) {
+      seen[i] = pipeline.packed(pipeline.read(*known[begin + i]));
+    });
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto& entry = *known[begin + i];
+      if (!same_picture(*seen[i], views.packed(*views.find(entry.file)))) {
+        refuse(entry, "another picture under the name");
+      }
+    }
+    progress.advance(count);
+  }
+}
+
+void remember_recording(const Dataset& recording, MemoryFile& memory) {
+  const std::string mark = fingerprint(recording, memory);
+  if (met_before(memory, mark)) return;
+  const std::string before = memory.parameter(recordings_parameter).value_or("");
+  memory.set_parameter(recordings_parameter, before.empty() ? mark : before + " " + mark);
+}
+
+void forget_recordings(MemoryFile& memory) {
+  if (memory.parameter(recordings_parameter)) memory.set_parameter(recordings_parameter, "");
+}
+
+}  // namespace panonav::command

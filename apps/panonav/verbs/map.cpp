@@ -1,0 +1,245 @@
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "cli/session.hpp"
+#include "cli/verbs.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/io/graph_file.hpp"
+#include "panonav/io/trajectory_file.hpp"
+#include "verbs/known_views.hpp"
+#include "verbs/mapped_run.hpp"
+#include "verbs/memorising.hpp"
+#include "verbs/recording.hpp"
+#ifdef PANONAV_COMMAND_SIMULATES
+#include "reports/map_picture.hpp"
+#endif
+
+namespace panonav::command {
+
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+/// The name under which a memory file keeps the map of this verb.
+constexpr const char* map_name = "map";
+
+struct MapArguments {
+  std::string dataset;
+  std::string memory;
+  std::optional<std::string> tum;
+  std::optional<std::string> graph;
+  std::optional<std::string> picture;
+  PictureArguments pictures;
+  SignatureOptions signature;
+  MapSettings settings;
+  bool no_thumbnails = false;
+};
+
+/// Poses of the largest part over time. The stamp is the number of the picture where the recording
+/// has none.
+std::vector<StampedPose> trajectory_of(const Dataset& recording, const MappedRun& run,
+                                       const std::string& dataset) {
+  std::vector<StampedPose> trajectory;
+  const std::size_t part = largest_part(run.map);
+  for (std::size_t i = 0; i < run.map.nodes.size(); ++i) {
+    if (run.map.nodes[i].part != part) continue;
+    const DatasetEntry& entry = recording.entries[run.entries[i]];
+    const double stamp_s = entry.stamp_s.value_or(static_cast<double>(run.entries[i]));
+    if (!trajectory.empty() && !(stamp_s > trajectory.back().stamp_s)) {
+      throw FileError(dataset, "stamp_s of " + entry.file + " is " + to_text(stamp_s) +
+                                   "; allowed for --tum: > " + to_text(trajectory.back().stamp_s) +
+                                   ", the stamp before it");
+    }
+    trajectory.push_back({stamp_s, run.map.nodes[i].pose});
+  }
+  return trajectory;
+}
+
+/// Links of all edges, and poses for views that have none, in the frame of the largest part.
+void store(const Dataset& recording, const MappedRun& run, MemoryFile& memory) {
+  std::vector<Link> links;
+  for (const MapEdge& edge : run.map.edges) links.push_back({edge.a, edge.b, edge.kind});
+  memory.link(links);
+  memory.save_map(map_name, run.map);
+  const bool posed = std::ranges::any_of(recording.entries,
+                                         [](const auto& entry) { return entry.pose.has_value(); });
+  if (posed) return;
+  const std::size_t part = largest_part(run.map);
+  for (const MapNode& node : run.map.nodes) {
+    if (node.part != part) continue;
+    memory.set_pose(node.view, ReferencePose{node.pose.x_m, node.pose.y_m, node.pose.heading_rad});
+  }
+}
+
+std::vector<std::size_t> part_sizes(const TopologicalMap& map) {
+  std::vector<std::size_t> sizes(number_of_parts(map), 0);
+  for (const MapNode& node : map.nodes) ++sizes[node.part];
+  return sizes;
+}
+
+std::size_t number_of_closures(const TopologicalMap& map) {
+  return static_cast<std::size_t>(std::ranges::count(map.edges, LinkKind::closure, &MapEdge::kind));
+}
+
+#ifdef PANONAV_COMMAND_SIMULATES
+ordered_json as_json(const MapComparison& comparison) {
+  ordered_json json{{"nodes", comparison.compared},
+                    {"shape_difference", comparison.shape_difference},
+                    {"rms_m", comparison.rms_m},
+                    {"scale", comparison.scale},
+                    {"trustworthiness", comparison.trustworthiness},
+                    {"continuity", comparison.continuity},
+                    {"right_closures", comparison.right_closures},
+                    {"wrong_closures", comparison.wrong_closures},
+                    {"odometry_shape_difference", nullptr}};
+  if (comparison.odometry_shape_difference) {
+    json["odometry_shape_difference"] = *comparison.odometry_shape_difference;
+  }
+  return json;
+}
+
+void print_comparison(const MapComparison& comparison, const MappedRun& run, Session& session) {
+  session.print("beside the true positions: shape difference " +
+                session.strong(fixed(comparison.shape_difference, 4)) + ", " +
+                fixed(comparison.rms_m, 2) + " m rms" +
+                (run.wheels ? "" : " with a free scale of " + fixed(comparison.scale, 2)));
+  if (comparison.odometry_shape_difference) {
+    session.print("the wheels alone: shape difference " +
+                  fixed(*comparison.odometry_shape_difference, 4));
+  }
+  session.print("neighbours kept: trustworthiness " + fixed(comparison.trustworthiness, 3) +
+                ", continuity " + fixed(comparison.continuity, 3) + "; closures right " +
+                std::to_string(comparison.right_closures) + ", wrong " +
+                std::to_string(comparison.wrong_closures));
+}
+#endif
+
+void print_result(const MapArguments& wanted, const Dataset& recording, const MappedRun& run,
+                  Session& session) {
+  const std::size_t nodes = run.map.nodes.size();
+  const double step_ms =
+      1e3 * run.mapping_s / static_cast<double>(std::max<std::size_t>(1, recording.entries.size()));
+  const auto sizes = part_sizes(run.map);
+#ifdef PANONAV_COMMAND_SIMULATES
+  const auto comparison = compare_with_truth(recording, run);
+#endif
+  if (session.json()) {
+    ordered_json json{{"memory", wanted.memory}, {"pictures", recording.entries.size()},
+                      {"nodes", nodes},          {"skipped", run.skipped},
+                      {"parts", sizes},          {"closures", number_of_closures(run.map)},
+                      {"scale_m", run.scale_m},  {"wheel_lengths", run.wheels},
+                      {"step_ms", step_ms},      {"truth", nullptr}};
+#ifdef PANONAV_COMMAND_SIMULATES
+    if (comparison) json["truth"] = as_json(*comparison);
+#endif
+    session.print(json.dump());
+    return;
+  }
+  session.print(session.strong(std::to_string(nodes)) + " places from " +
+                std::to_string(recording.entries.size()) + " pictures, " +
+                std::to_string(number_of_closures(run.map)) + " closures; " + fixed(step_ms, 2) +
+                " ms a picture");
+  if (sizes.size() > 1) {
+    std::string text;
+    for (const std::size_t size : sizes) text += (text.empty() ? "" : ", ") + std::to_string(size);
+    session.print(session.bad("The map is in " + std::to_string(sizes.size()) + " parts") +
+                  " that nothing connects, of so many places: " + text);
+  }
+  const double height_m = wanted.settings.odometry.camera_height_m;
+  if (!run.wheels && height_m > 0.0) {
+    session.print("Lengths are read from the ground, " + short_number(height_m) +
+                  " m below the camera.");
+  } else if (!run.wheels) {
+    session.print("Lengths are read from the views: one unit counts as " +
+                  short_number(run.scale_m) + " m (--scale-m, --camera-height-m).");
+  }
+#ifdef PANONAV_COMMAND_SIMULATES
+  if (comparison) print_comparison(*comparison, run, session);
+#endif
+}
+
+ExitCode map(const Arguments& arguments, const MapArguments& wanted, Session& session) {
+  const bool there = fs::exists(wanted.memory);
+  std::optional<MemoryFile> memory;
+  if (there) memory = MemoryFile::open(wanted.memory, Access::read_write);
+  const Dataset recording =
+      open_recording(wanted.dataset, wanted.pictures,
+                     memory ? std::optional(memory->header().source) : std::nullopt);
+  if (memory) {
+    if (arguments.given("signature")) {
+      throw FileError(wanted.memory,
+                      "is there already and keeps its shape of signatures; leave "
+                      "these options out or start a new memory");
+    }
+  } else {
+    memory = MemoryFile::create(wanted.memory, header_from_first_views(recording, wanted.signature,
+                                                                       {}, session.executor()));
+  }
+  const ViewEncoder pipeline(memory->header(), recording.source);
+  if (there) check_known_views(recording, *memory, pipeline, session);
+  MapSettings settings = wanted.settings;
+  settings.thumbnails = !wanted.no_thumbnails;
+  const MappedRun run = map_recording(recording, pipeline, settings, *memory, session);
+  store(recording, run, *memory);
+  if (wanted.tum) write_trajectory(*wanted.tum, trajectory_of(recording, run, wanted.dataset));
+  if (wanted.graph) {
+    write_graph(*wanted.graph, run.map, [&](ViewId view) {
+      const auto found = std::ranges::lower_bound(run.map.nodes, view, {}, &MapNode::view);
+      const auto number = static_cast<std::size_t>(found - run.map.nodes.begin());
+      return recording.entries[run.entries[number]].file;
+    });
+  }
+#ifdef PANONAV_COMMAND_SIMULATES
+  if (wanted.picture) write_map_picture(*wanted.picture, recording, run);
+#endif
+  print_result(wanted, recording, run, session);
+  return ExitCode::done;
+}
+
+Run declare(Arguments& arguments) {
+  auto wanted = std::make_shared<MapArguments>();
+  arguments.positional("DATASET", wanted->dataset,
+                       "Data set or folder of pictures, in the order in which they were taken");
+  arguments.positional("MEMORY", wanted->memory,
+                       "Memory file (NAME.panonav); views that it does not know are appended");
+  declare_pictures(arguments, wanted->pictures);
+  arguments.option("--tum", wanted->tum,
+                   "Write the poses of the largest part to this file: TUM text, or CSV for a name "
+                   "that ends in .csv");
+  arguments.option("--graphml", wanted->graph, "Write the map as a graph to this file");
+#ifdef PANONAV_COMMAND_SIMULATES
+  arguments.option("--picture", wanted->picture,
+                   "Draw the map, beside the truth where it is known, into this PNG or SVG file");
+#endif
+  arguments.flag("--no-thumbnails", wanted->no_thumbnails,
+                 "Do not keep small pictures of the views");
+  arguments.options("signature", wanted->signature);
+  arguments.options("mapping", wanted->settings.mapping);
+  arguments.options("visual_odometry", wanted->settings.odometry);
+  arguments.options("loop_closure", wanted->settings.closure, "closure");
+  arguments.options("pose_graph", wanted->settings.graph, "graph");
+  return [wanted, &arguments](Session& session) { return map(arguments, *wanted, session); };
+}
+
+}  // namespace
+
+Verb map_verb() {
+  return {"map", "Make a map from pictures in the order in which they were taken",
+          "Each picture is placed by what its view shows of the step from the one before; places "
+          "that are\n"
+          "passed again close the loop. Where the data set has odometry, the lengths of steps are "
+          "its; all\n"
+          "else comes from the views. Without odometry, --camera-height-m makes metres of lengths. "
+          "What\n"
+          "nothing connects is kept as separate parts.",
+          "  panonav map run office.panonav\n"
+          "  panonav map run office.panonav --picture map.png --graphml map.graphml --tum map.tum\n"
+          "  panonav map walk walk.panonav --camera-height-m 0.6\n"
+          "  panonav map walk walk.panonav --capture-difference 0.1 --json",
+          declare};
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstddef>
+
+#include "cli/session.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
+#include "verbs/recording.hpp"
+
+namespace panonav::command {
+
+/// What a new memory says of its views. The first views of the recording decide the scale of the
+/// whole memory, so nothing about light or scene need be known beforehand. Throws FileError on
+/// pictures that cannot be read or show nothing, ContractError on a shape that they do not allow.
+[[nodiscard]] MemoryHeader header_from_first_views(const Dataset& recording,
+                                                   const SignatureOptions& wanted,
+                                                   const PreprocessingOptions& preprocessing,
+                                                   Executor& executor);
+
+struct AppendCounts {
+  std::size_t appended = 0;
+  std::size_t known_before = 0;
+};
+
+/// Appends the views whose names the memory does not know. Signatures are computed side by side,
+/// appended one by one in the order of the recording; what was appended stays, whatever happens
+/// later. Throws FileError.
+AppendCounts append_views(const Dataset& recording, const ViewEncoder& pipeline, bool thumbnails,
+                          MemoryFile& memory, Session& session);
+
+}  // namespace panonav::command

@@ -1,0 +1,347 @@
+#include <array>
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "cli/option_values.hpp"
+#include "cli/session.hpp"
+#include "cli/verbs.hpp"
+#include "experiments/runs/mission_picture.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/io/atomic_file.hpp"
+#include "panonav/storage/memory_file_views.hpp"
+#include "verbs/named_view.hpp"
+#include "verbs/navigated_run.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+struct NavigateArguments {
+  std::string memory;
+  std::string goal;
+  std::string scene;
+  std::optional<std::string> start;
+  std::optional<std::string> kidnap;
+  std::optional<std::string> passages;
+  std::optional<std::string> route;
+  std::optional<std::string> log;
+  std::optional<std::string> picture;
+  SimulationArguments simulation;
+  MissionOptions mission;
+  KnownRouteOptions known_route;
+};
+
+/// "X,Y,HEADING_DEG".
+Pose2 pose_from_text(const std::string& flag, const std::string& text) {
+  const std::size_t first = text.find(',');
+  const std::size_t second = first == std::string::npos ? first : text.find(',', first + 1);
+  if (second == std::string::npos) {
+    throw UsageError(flag + " is '" + text +
+                     "'; allowed: X,Y,HEADING_DEG in metres, metres and degrees");
+  }
+  return {number_from_text(flag, text.substr(0, first)),
+          number_from_text(flag, text.substr(first + 1, second - first - 1)),
+          wrap_angle(radians(number_from_text(flag, text.substr(second + 1))))};
+}
+
+Pose2 free_pose(const std::string& flag, const std::string& text, const FreeSpace& space) {
+  const Pose2 pose = pose_from_text(flag, text);
+  if (!space.is_free(pose.position())) {
+    throw UsageError(
+        flag + " is at x " + short_number(pose.x_m) + " m, y " + short_number(pose.y_m) +
+        " m, where the robot cannot stand; allowed: free places between x " +
+        short_number(space.low().x_m) + " to " + short_number(space.high().x_m) + " m and y " +
+        short_number(space.low().y_m) + " to " + short_number(space.high().y_m) + " m");
+  }
+  return pose;
+}
+
+/// null where nobody knows.
+ordered_json number_or_null(double value) {
+  return std::isfinite(value) ? ordered_json(value) : ordered_json();
+}
+
+ordered_json as_json(const Pose2& pose) {
+  return {{"x_m", pose.x_m}, {"y_m", pose.y_m}, {"heading_rad", pose.heading_rad}};
+}
+
+std::string file_of(ViewId view, const VisualMemory& memory) {
+  return memory.info(view).name;
+}
+
+ordered_json file_or_null(const std::optional<ViewId>& view, const VisualMemory& memory) {
+  return view ? ordered_json(file_of(*view, memory)) : ordered_json();
+}
+
+ordered_json as_json(const NavigationDecision& decision, const Pose2& pose,
+                     const VisualMemory& memory) {
+  auto events = ordered_json::array();
+  for (const NavigationEvent event : decision.events) events.push_back(name_of(event));
+  return {{"look", decision.look},
+          {"state", name_of(decision.state)},
+          {"direction_rad", decision.direction_rad},
+          {"advance_m", decision.advance_m},
+          {"homing", decision.homing},
+          {"on_route", decision.on_route},
+          {"nearest", file_or_null(decision.nearest, memory)},
+          {"next", file_or_null(decision.next, memory)},
+          {"area", decision.area},
+          {"difference", decision.difference},
+          {"way", number_or_null(decision.way)},
+          {"components", decision.components},
+          {"bytes_read", decision.bytes_read},
+          {"events", std::move(events)},
+          {"pose", as_json(pose)}};
+}
+
+std::string in_words(NavigationEvent event) {
+  switch (event) {
+    case NavigationEvent::relocalised:
+      return "looks for its place in the whole memory";
+    case NavigationEvent::kidnapped:
+      return "finds itself at another place than expected";
+    case NavigationEvent::entered_area:
+      return "enters an area";
+    case NavigationEvent::unknown_place:
+      return "does not know this place";
+    case NavigationEvent::obstructed:
+      return "was stopped by something in its way";
+    case NavigationEvent::closed:
+      return "takes a passage for blocked and plans anew";
+    case NavigationEvent::reopened:
+      return "tries blocked passages again";
+    case NavigationEvent::homing:
+      return "goes home to the goal's view";
+    case NavigationEvent::homing_failed:
+      return "came home to another place";
+    case NavigationEvent::route:
+      return "follows the recorded route";
+    case NavigationEvent::route_left:
+      return "leaves the recorded route before the end of its leg";
+  }
+  return std::string(name_of(event));
+}
+
+std::string as_text(const NavigationDecision& decision, const VisualMemory& memory) {
+  std::string line = "look " + std::to_string(decision.look) + "  ";
+  if (decision.nearest) line += "at " + file_of(*decision.nearest, memory) + "  ";
+  for (std::size_t i = 0; i < decision.events.size(); ++i) {
+    line += (i > 0 ? ", " : "") + in_words(decision.events[i]);
+    if (decision.events[i] == NavigationEvent::entered_area) {
+      line += " (" + std::to_string(decision.area) + ")";
+    }
+  }
+  return line;
+}
+
+std::string_view reason_of(NavigationState state) {
+  switch (state) {
+    case NavigationState::arrived:
+      return "what the robot sees is the goal's view";
+    case NavigationState::blocked:
+      return "the robot cannot get on, though the memory has a way";
+    case NavigationState::lost:
+      return "what the robot sees is nowhere in the memory, or not where it should be";
+    case NavigationState::unreachable:
+      return "no way in the memory leads to the goal, or all of them are blocked";
+    case NavigationState::moving:
+      break;
+  }
+  return "";
+}
+
+ordered_json summary_json(const NavigateArguments& wanted, const Remembered& remembered,
+                          const AreaPlanner& planner, const std::string& goal, const Pose2& start,
+                          const MissionRun& run) {
+  const NavigationGraph& graph = remembered.place.graph;
+  return {
+      {"memory", wanted.memory},
+      {"goal", goal},
+      {"scene", wanted.scene},
+      {"passages_from", name_of(remembered.origin)},
+      {"route", wanted.route ? ordered_json(*wanted.route) : ordered_json()},
+      {"views", graph.size()},
+      {"passages", graph.passages().size()},
+      {"areas", planner.areas().nodes.size()},
+      {"end", name_of(run.end)},
+      {"reason", reason_of(run.end)},
+      {"looks", run.decisions.size()},
+      {"closed_passages", planner.closed()},
+      {"start", as_json(start)},
+      {"pose", as_json(run.path.back())},
+      {"goal_distance_m", number_or_null(run.end_distance_m)},
+      {"travelled_m", run.travelled_m},
+      {"shortest_m", number_or_null(run.shortest_m)},
+      {"carried_after_look", run.carried_at ? ordered_json(*run.carried_at + 1) : ordered_json()}};
+}
+
+void print_summary(const MissionRun& run, Session& session) {
+  const std::string name(name_of(run.end));
+  session.print((run.end == NavigationState::arrived ? session.good(name) : session.bad(name)) +
+                " after " + std::to_string(run.decisions.size()) +
+                " looks: " + std::string(reason_of(run.end)));
+  if (std::isfinite(run.end_distance_m)) {
+    session.print("from where the goal's view was taken: " +
+                  session.strong(fixed(run.end_distance_m, 3) + " m"));
+  }
+  std::string way = "driven " + fixed(run.travelled_m, 2) + " m";
+  if (std::isfinite(run.shortest_m)) {
+    way += "; the shortest way is " + fixed(run.shortest_m, 2) + " m long";
+  }
+  session.print(way);
+  if (run.carried_at) {
+    session.print("carried away after look " + std::to_string(*run.carried_at + 1));
+  }
+}
+
+void write_log(const std::string& path, const MissionRun& run) {
+  std::string text;
+  for (const NavigationDecision& decision : run.decisions) text += describe(decision) + "\n";
+  write_file(path, text);
+}
+
+/// Where the run begins, who is carried where.
+Mission mission_of(const NavigateArguments& wanted, ViewId goal, const MissionPlace& place,
+                   std::uint64_t seed) {
+  constexpr std::uint64_t stream_of_starts = 4;
+  Random random(seed, stream_of_starts);
+  Mission mission{goal, place.free_space->random_pose(random), std::nullopt};
+  if (wanted.start) mission.start = free_pose("--start", *wanted.start, *place.free_space);
+  if (wanted.kidnap) mission.carried_to = free_pose("--kidnap", *wanted.kidnap, *place.free_space);
+  return mission;
+}
+
+void check_goal(const NavigateArguments& wanted, const RememberedPlace& remembered, ViewId goal,
+                const std::string& name) {
+  const auto node = remembered.graph.node_of(goal);
+  if (!node || remembered.graph.exits(*node).empty()) {
+    throw FileError(wanted.memory, "no passage leads to the view " + name +
+                                       "; take another goal, or arrange the memory anew");
+  }
+  if (wanted.kidnap && !std::isfinite(remembered.truth[*node].x_m)) {
+    throw FileError(wanted.memory, "does not know where the view " + name +
+                                       " was taken, so half of the way neither; leave out "
+                                       "--kidnap");
+  }
+}
+
+ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, Session& session) {
+  const auto given = [&](const std::string& section, const std::string& name) {
+    return arguments.given(section, name);
+  };
+  if (given("odometry", "drive")) {
+    throw UsageError("--odometry-drive: the robot's drive is --drive here; leave it out");
+  }
+  const MemoryFileViews source(wanted.memory);
+  std::optional<GraphOrigin> origin;
+  if (wanted.passages) origin = graph_origin(*wanted.passages);
+  Remembered remembered = remember(source.file(), origin, session.executor());
+  const VisualMemory& memory = remembered.place.memory;
+  const ViewId goal = named_view(memory, wanted.goal, wanted.memory);
+  const std::string goal_file = file_of(goal, memory);
+  check_goal(wanted, remembered.place, goal, goal_file);
+  std::optional<RouteSource> route;
+  if (wanted.route) {
+    remembered.place.routes.push_back(
+        route_among_views(source.file(), *wanted.route, memory, wanted.known_route));
+    const int columns = remembered.place.routes.front().tracker.lines().columns();
+    route = route_source(source.file(), *wanted.route, columns);
+  }
+  const MissionPlace place =
+      place_as_remembered(wanted.scene, wanted.simulation, source.file(), route, given, session);
+  const auto seed = static_cast<std::uint64_t>(wanted.simulation.simulation.scene.seed);
+  const Mission mission = mission_of(wanted, goal, place, seed);
+  if (!session.json()) {
+    session.print(std::to_string(remembered.place.graph.size()) + " views, " +
+                  std::to_string(remembered.place.graph.passages().size()) + " passages from " +
+                  (remembered.origin == GraphOrigin::arrangement
+                       ? "an arrangement made now (panonav arrange would keep one)"
+                       : "the memory's " + std::string(name_of(remembered.origin))));
+  }
+  Navigator navigator(source, AreaPlanner(remembered.place.graph, wanted.mission.planner),
+                      wanted.mission.navigator);
+  navigator.set_routes(remembered.place.routes);
+  const MissionRun run =
+      run_mission(place, remembered.place, navigator, mission, wanted.mission, seed,
+                  [&](const NavigationDecision& decision, const Pose2& pose) {
+                    if (session.json()) {
+                      session.print(as_json(decision, pose, memory).dump());
+                    } else if (!decision.events.empty()) {
+                      session.print(as_text(decision, memory));
+                    }
+                  });
+  if (wanted.log) write_log(*wanted.log, run);
+  if (wanted.picture) {
+    write_mission_picture(
+        *wanted.picture,
+        "to " + goal_file + " in " + place.scene.name + ": " + std::string(name_of(run.end)), place,
+        remembered.place, wanted.mission.planner, goal, run);
+  }
+  if (session.json()) {
+    session.print(
+        summary_json(wanted, remembered, navigator.planner(), goal_file, mission.start, run)
+            .dump());
+  } else {
+    print_summary(run, session);
+  }
+  return run.end == NavigationState::arrived ? ExitCode::done : ExitCode::no_answer;
+}
+
+Run declare(Arguments& arguments) {
+  auto wanted = std::make_shared<NavigateArguments>();
+  arguments.positional("MEMORY", wanted->memory, "Memory file of a simulated data set");
+  arguments.required_option("--goal", wanted->goal, "Name or id of the view to go to");
+  arguments.required_option("--scene", wanted->scene,
+                            "Where the robot is: a scene as of panonav simulate");
+  arguments.option("--start", wanted->start,
+                   "Where it starts: X,Y,HEADING_DEG; else a free place at random");
+  arguments.option("--kidnap", wanted->kidnap,
+                   "Carry it to X,Y,HEADING_DEG once half of the way is driven");
+  arguments.choice("--passages", wanted->passages, {"map", "lattice", "links", "arrangement"},
+                   "What to plan over: a stored map, the memory's links, or an arrangement made "
+                   "now (default: the first that is there)");
+  arguments.option("--route", wanted->route,
+                   "Go along this recorded route of the memory where the way leads along it; views "
+                   "and route have the poses of one data set");
+  arguments.option("--log", wanted->log, "Write each decision as a line of text into this file");
+  arguments.option("--picture", wanted->picture,
+                   "Draw the directions to the goal, the way planned and the way driven into this "
+                   "PNG or SVG file");
+  arguments.options("simulation", wanted->simulation.simulation.scene);
+  arguments.options("navigator", wanted->mission.navigator);
+  arguments.options("planner", wanted->mission.planner);
+  arguments.options("known_route", wanted->known_route, "route");
+  arguments.options("base", wanted->mission.base);
+  arguments.options("odometry", wanted->mission.motion, "odometry");
+  arguments.options("frame", wanted->simulation.frame);
+  arguments.options("sensor", wanted->simulation.sensor);
+  arguments.options("free_space", wanted->simulation.free_space);
+  return [wanted, &arguments](Session& session) { return navigate(arguments, *wanted, session); };
+}
+
+}  // namespace
+
+Verb navigate_verb() {
+  return {"navigate", "Send a simulated robot to a remembered view, by what it sees alone",
+          "The robot sees as the memory's views were seen. Poses in the memory only say how far "
+          "from the\n"
+          "goal it ended, and which views lie beside a --route. Ends with 1 unless it arrives: "
+          "blocked, lost or\n"
+          "unreachable.",
+          "  panonav simulate office memory_run --grid 0.5 && panonav memorise memory_run "
+          "office.panonav\n"
+          "  panonav navigate office.panonav --goal view_00012.png --scene office --picture "
+          "way.png\n"
+          "  panonav navigate office.panonav --goal 3 --scene office --light 0.7 --moved-objects "
+          "0.1 --json\n"
+          "  panonav navigate drive.panonav --goal 60 --scene loop --route route",
+          declare};
+}
+
+}  // namespace panonav::command

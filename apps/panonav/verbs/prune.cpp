@@ -1,0 +1,110 @@
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "cli/arguments.hpp"
+#include "cli/session.hpp"
+#include "cli/verbs.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/mapping/sparse_memory.hpp"
+#include "panonav/storage/memory_file.hpp"
+#include "verbs/known_views.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+struct PruneArguments {
+  std::string memory;
+  SparseMemoryOptions options;
+  bool dry_run = false;
+};
+
+ordered_json as_json(const std::optional<SparseLoss::Positions>& positions) {
+  if (!positions) return nullptr;
+  return {{"median_before_m", positions->median_before_m},
+          {"p95_before_m", positions->p95_before_m},
+          {"median_after_m", positions->median_after_m},
+          {"p95_after_m", positions->p95_after_m}};
+}
+
+ExitCode prune(const PruneArguments& wanted, Session& session) {
+  auto file =
+      MemoryFile::open(wanted.memory, wanted.dry_run ? Access::read_only : Access::read_write);
+  const VisualMemory memory = file.load();
+  const SparseSelection selection = select_references(memory, wanted.options);
+  const SparseLoss loss = measure_loss(memory, selection);
+  std::vector<ViewId> dropped;
+  std::size_t outdated = 0;
+  for (const RedundantView& redundant : selection.redundant) {
+    dropped.push_back(redundant.view);
+    outdated += redundant.outdated ? 1 : 0;
+  }
+  if (!wanted.dry_run && !dropped.empty()) {
+    std::map<std::string, TopologicalMap> maps;
+    for (const std::string& name : file.map_names()) {
+      if (const auto map = file.map(name)) maps.emplace(name, contract_map(*map, selection));
+    }
+    forget_recordings(file);
+    file.remove(dropped);
+    file.link(contract_links(memory.links(), selection));
+    for (const auto& [name, map] : maps) file.save_map(name, map);
+  }
+  const double factor = selection.kept.empty() ? 1.0
+                                               : static_cast<double>(memory.size()) /
+                                                     static_cast<double>(selection.kept.size());
+  if (session.json()) {
+    session.print(ordered_json{{"memory", wanted.memory},
+                               {"dry_run", wanted.dry_run},
+                               {"views_before", memory.size()},
+                               {"views", selection.kept.size()},
+                               {"outdated", outdated},
+                               {"factor", factor},
+                               {"median_difference", loss.median_difference},
+                               {"asked", loss.asked},
+                               {"position_error", as_json(loss.positions)}}
+                      .dump());
+    return ExitCode::done;
+  }
+  session.print(std::string(wanted.dry_run ? "would keep " : "kept ") +
+                session.strong(std::to_string(selection.kept.size())) + " of " +
+                std::to_string(memory.size()) + " views: " + fixed(factor, 1) + " times fewer" +
+                (outdated > 0 ? "; " + std::to_string(outdated) + " were outdated" : ""));
+  if (loss.positions) {
+    session.print("nearest reference of a dropped view  median " +
+                  fixed(loss.positions->median_after_m, 3) + " m (before " +
+                  fixed(loss.positions->median_before_m, 3) + ")  95 % within " +
+                  fixed(loss.positions->p95_after_m, 3) + " m (before " +
+                  fixed(loss.positions->p95_before_m, 3) + ")");
+  } else if (loss.asked > 0) {
+    session.print("dropped views differ from those that stand for them by " +
+                  fixed(loss.median_difference, 3) + " (median)");
+  }
+  return ExitCode::done;
+}
+
+Run declare(Arguments& arguments) {
+  auto wanted = std::make_shared<PruneArguments>();
+  arguments.positional("MEMORY", wanted->memory, "Memory file");
+  arguments.flag("--dry-run", wanted->dry_run, "Say what would be dropped, and drop nothing");
+  arguments.options("prune", wanted->options);
+  return [wanted](Session& session) { return prune(*wanted, session); };
+}
+
+}  // namespace
+
+Verb prune_verb() {
+  return {"prune", "Keep one view of places where views hardly change",
+          "A view is dropped when a newer one that is kept differs from it by no more than\n"
+          "--most-difference and was taken near it. Says by how much the memory shrinks and how "
+          "far the\n"
+          "reference that is found for a dropped view is from it, before and after.",
+          "  panonav prune office.panonav --dry-run\n"
+          "  panonav prune office.panonav --most-difference 0.02\n"
+          "  panonav prune office.panonav --outdated-within-m 0.3",
+          declare};
+}
+
+}  // namespace panonav::command

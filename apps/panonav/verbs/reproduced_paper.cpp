@@ -1,0 +1,205 @@
+#include "verbs/reproduced_paper.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+// Where they are to begin and how many variants, as wanted.
+template <typename Options>
+void set_scenes(const ReproduceArguments& wanted, Options& options) {
+  if (wanted.quick) options = quick_run(options);
+  if (wanted.seed) options.seed = *wanted.seed;
+  check_scenes(wanted);
+  if (wanted.scenes) options.scenes = *wanted.scenes;
+}
+
+PaperReproduction run_f11(const ReproduceArguments& wanted, const std::filesystem::path& out,
+                          Executor& executor, const ReproductionProgress& progress) {
+  MappingReproductionOptions options{.out = out, .data = data_folder(wanted)};
+  set_scenes(wanted, options);
+  if (wanted.runs) options.runs = *wanted.runs;
+  std::string lead =
+      "Fernandez, Paya, Reinoso, Amoros 2011, run in " + std::to_string(options.scenes) +
+      " variants of two simulated places; loops closed, which its authors left to later work; "
+      "a corridor of identical doors, Gazebo worlds and recordings where they are at hand, "
+      "maps of up to " +
+      std::to_string(options.most_views) + " views. Published figures beside ours.";
+  return {std::move(lead), reproduce_f11(options, executor, progress)};
+}
+
+PaperReproduction run_m03(const ReproduceArguments& wanted, const std::filesystem::path& out,
+                          Executor& executor, const ReproductionProgress& progress) {
+  TrackingReproductionOptions options{.out = out, .data = data_folder(wanted)};
+  if (wanted.quick) options = quick_run(options);
+  if (wanted.seed) options.seed = *wanted.seed;
+  if (wanted.scenes) options.scenes = *wanted.scenes;
+  if (wanted.runs) options.runs = *wanted.runs;
+  if (wanted.only) options.only = *wanted.only;
+  if (wanted.rows) options.rows = *wanted.rows;
+  std::string lead =
+      "Menegatti, Zoccarato, Pagello, Ishiguro 2003, run in " + std::to_string(options.scenes) +
+      " simulated offices with a 25 cm grid of reference views, " +
+      std::to_string(options.variants * options.runs) +
+      " runs in each, and what its authors announced: a corridor of identical doors and "
+      "the open air; Gazebo worlds and recordings where they are at hand. Published figures "
+      "beside ours. Few runs give wide intervals, and rows may then miss their target by "
+      "chance.";
+  return {std::move(lead), reproduce_m03(options, executor, progress)};
+}
+
+PaperReproduction run_m04(const ReproduceArguments& wanted, const std::filesystem::path& out,
+                          Executor& executor, const ReproductionProgress& progress) {
+  ReproductionOptions options{.out = out};
+  set_scenes(wanted, options);
+  if (wanted.queries) options.queries = *wanted.queries;
+  if (wanted.rows) options.rows = *wanted.rows;
+  if (wanted.runs) options.missions = *wanted.runs;
+  options.mission_scenes = std::min({options.mission_scenes, options.scenes, options.missions});
+  std::string places;
+  for (const MissionGrid& grid : options.mission_grids) {
+    places += (places.empty() ? "" : ", ") + grid.scene;
+  }
+  std::string lead =
+      "Menegatti, Maeda, Ishiguro 2004, run on " + std::to_string(options.scenes) +
+      " simulated offices with a 25 cm grid of reference views, " +
+      std::to_string(options.queries) + " questions in each; views that arrange themselves, and " +
+      std::to_string(options.missions) + " missions over such maps in each kind of place (" +
+      places +
+      "). Published figures beside "
+      "ours. Few offices and questions give wide intervals, and rows may then miss their "
+      "target by chance.";
+  return {std::move(lead), reproduce_m04(options, executor, progress)};
+}
+
+PaperReproduction run_navigation(const ReproduceArguments& wanted, const std::filesystem::path& out,
+                                 Executor& executor, const ReproductionProgress& progress) {
+  NavigationReproductionOptions options{.out = out, .data = data_folder(wanted)};
+  set_scenes(wanted, options);
+  if (wanted.runs) options.runs = *wanted.runs;
+  options.scenes = std::min(options.scenes, options.runs);
+  std::string lead =
+      "What Menegatti, Maeda, Ishiguro 2004, section 3.5, leave to later work: maps of drives, "
+      "changes, a robot that is carried away, blocked passages. " +
+      std::to_string(options.runs) +
+      " missions from random starts to random goals in each kind of place, " +
+      std::to_string(options.scenes) +
+      " variants of each. The robot sees pictures and feels what is in its way; it knows "
+      "neither where it is nor where its references were taken.";
+  return {std::move(lead), reproduce_navigation(options, executor, progress)};
+}
+
+PaperReproduction run_s06(const ReproduceArguments& wanted, const std::filesystem::path& out,
+                          Executor& executor, const ReproductionProgress& progress) {
+  HomingReproductionOptions options{.out = out, .data = data_folder(wanted)};
+  set_scenes(wanted, options);
+  std::string lead =
+      "Stürzl, Mallot 2006, run in " + std::to_string(options.scenes) +
+      " simulated toy house arenas, each recorded twice with different noise and slightly "
+      "different light, headings at random; pictures are of the first arena. Runs home and "
+      "chains of "
+      "snapshots in rooms and Gazebo worlds. Published figures beside ours.";
+  return {std::move(lead), reproduce_s06(options, executor, progress)};
+}
+
+PaperReproduction run_y03(const ReproduceArguments& wanted, const std::filesystem::path& out,
+                          Executor& executor, const ReproductionProgress& progress) {
+  RouteReproductionOptions options{.out = out, .data = data_folder(wanted)};
+  set_scenes(wanted, options);
+  if (wanted.runs) options.runs = *wanted.runs;
+  options.swept = std::min(options.swept, options.scenes);
+  std::string lead =
+      "Yagi, Imai, Yachida 2003, run in " + std::to_string(options.scenes) +
+      " variants of a simulated lab seen through a mirror camera with its noise; pictures are "
+      "of the first. Then routes of 60 m, each recorded once and repeated in closed loop, " +
+      std::to_string(options.runs) +
+      " runs in each place, and a real route; Gazebo worlds and the recording where they are "
+      "at hand. Published figures beside ours.";
+  return {std::move(lead), reproduce_y03(options, executor, progress)};
+}
+
+constexpr std::array<ReproducedPaper, 6> papers{{
+    {.name = "f11",
+     .title = "Visual odometry and topological maps: the experiments of [F11]",
+     .subject = "visual odometry and maps",
+     .runs = true,
+     .data = true,
+     .run = run_f11},
+    {.name = "m03",
+     .title = "Monte-Carlo localisation: the experiments of [M03]",
+     .subject = "Monte-Carlo localisation",
+     .runs = true,
+     .rows = true,
+     .data = true,
+     .only = true,
+     .run = run_m03},
+    {.name = "m04",
+     .title = "Image-based memory: the experiments of [M04]",
+     .subject = "localisation and views that arrange themselves",
+     .queries = true,
+     .runs = true,
+     .rows = true,
+     .run = run_m04},
+    {.name = "navigation",
+     .title = "Going somewhere: what [M04] leaves to later work",
+     .subject = "what m04 leaves to later work",
+     .runs = true,
+     .data = true,
+     .run = run_navigation},
+    {.name = "s06",
+     .title = "Visual homing: the experiments of [S06]",
+     .subject = "homing",
+     .data = true,
+     .run = run_s06},
+    {.name = "y03",
+     .title = "Route panoramas: the experiments of [Y03]",
+     .subject = "routes",
+     .runs = true,
+     .data = true,
+     .run = run_y03},
+}};
+
+}  // namespace
+
+std::span<const ReproducedPaper> reproduced_papers() {
+  return papers;
+}
+
+std::filesystem::path data_folder(const ReproduceArguments& wanted) {
+  if (wanted.data) {
+    if (!std::filesystem::is_directory(*wanted.data)) {
+      throw FileError(*wanted.data, "there is no such folder");
+    }
+    return *wanted.data;
+  }
+  const char* const folder = std::getenv("PANONAV_DATA");
+  return folder == nullptr ? "" : folder;
+}
+void check_scenes(const ReproduceArguments& wanted) {
+  if (wanted.scenes && *wanted.scenes < 2) {
+    throw OptionError("--scenes is '" + std::to_string(*wanted.scenes) + "'; allowed for " +
+                      wanted.paper + ": from 2");
+  }
+}
+
+void refuse_meaningless(const ReproducedPaper& paper, const ReproduceArguments& wanted) {
+  const auto refuse = [&](bool given, bool known, const std::string& flag) {
+    if (given && !known) {
+      throw OptionError(flag + " has no meaning for " + std::string(paper.name));
+    }
+  };
+  refuse(wanted.queries.has_value(), paper.queries, "--queries");
+  refuse(wanted.runs.has_value(), paper.runs, "--runs");
+  refuse(wanted.rows.has_value(), paper.rows, "--rows");
+  refuse(wanted.data.has_value(), paper.data, "--data");
+  refuse(wanted.only.has_value(), paper.only, "--only");
+  refuse(wanted.continues, false, "--continue");
+}
+
+}  // namespace panonav::command

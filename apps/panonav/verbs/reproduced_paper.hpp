@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "experiments/reproduction.hpp"
+#include "panonav/core/executor.hpp"
+
+namespace panonav::command {
+
+/// What the caller of `reproduce` wants; what is not given is as the paper has it.
+struct ReproduceArguments {
+  std::string paper;
+  std::string out = "reproduction";
+  bool quick = false;
+  bool continues = false;
+  std::optional<std::uint64_t> seed;
+  std::optional<int> scenes;
+  std::optional<int> queries;
+  std::optional<int> runs;
+  std::optional<int> rows;
+  std::optional<std::string> data;
+  std::optional<std::string> only;
+};
+
+struct PaperReproduction {
+  std::string lead;  ///< what the report says first: how much was run
+  Reproduction result;
+};
+
+/// The experiments of a paper, and which options mean something to them.
+struct ReproducedPaper {
+  std::string_view name;
+  std::string_view title;
+  std::string_view subject;  ///< in a few words
+  bool queries = false;
+  bool runs = false;
+  bool rows = false;
+  bool data = false;
+  bool only = false;
+  PaperReproduction (*run)(const ReproduceArguments& wanted, const std::filesystem::path& out,
+                           Executor& executor, const ReproductionProgress& progress) = nullptr;
+};
+
+/// All, in the order in which `all` runs them.
+[[nodiscard]] std::span<const ReproducedPaper> reproduced_papers();
+
+/// The folder with recordings and worlds: as asked for, else where the environment says; empty:
+/// none. Throws FileError when there is no such folder.
+[[nodiscard]] std::filesystem::path data_folder(const ReproduceArguments& wanted);
+
+/// Throws OptionError when there are too few variants for `wanted.paper`: intervals need two.
+void check_scenes(const ReproduceArguments& wanted);
+
+/// Throws OptionError when an option is given that means nothing to the paper.
+void refuse_meaningless(const ReproducedPaper& paper, const ReproduceArguments& wanted);
+
+}  // namespace panonav::command

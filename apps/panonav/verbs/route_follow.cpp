@@ -1,0 +1,229 @@
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "cli/session.hpp"
+#include "cli/verbs.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/io/trajectory_file.hpp"
+#include "panonav/localisation/sample.hpp"
+#include "panonav/storage/memory_file.hpp"
+#include "verbs/followed_run.hpp"
+#include "verbs/route_reading.hpp"
+#ifdef PANONAV_COMMAND_SIMULATES
+#include "reports/report_page.hpp"
+#include "reports/route_report.hpp"
+#endif
+
+namespace panonav::command {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+struct FollowArguments {
+  std::string memory;
+  std::string dataset;
+  std::optional<std::string> name;
+  int every = 1;
+  bool no_odometry = false;
+  std::optional<std::string> tum;
+  std::optional<std::string> report;
+  RouteTrackerOptions tracker;
+  RouteFitOptions fit;
+};
+
+ordered_json as_json(const Pose2& pose) {
+  return {{"x_m", pose.x_m}, {"y_m", pose.y_m}, {"heading_rad", pose.heading_rad}};
+}
+
+ordered_json as_json(const FollowedImage& image, bool headings_known) {
+  ordered_json json{{"file", image.file},
+                    {"stamp_s", image.stamp_s ? ordered_json(*image.stamp_s) : ordered_json()},
+                    {"on_route", image.fix.has_value()},
+                    {"pose", nullptr},
+                    {"origin", nullptr},
+                    {"along_m", nullptr},
+                    {"lateral_m", nullptr},
+                    {"correlation", nullptr},
+                    {"residual", nullptr},
+                    {"covariance", nullptr},
+                    {"columns", 0},
+                    {"changed", ordered_json::array()},
+                    {"truth", nullptr}};
+  if (image.fix) {
+    const RouteFix& fix = image.fix->fix;
+    json["pose"] = as_json(fix.pose);
+    json["origin"] = name_of(image.fix->origin);
+    json["along_m"] = image.fix->along_m;
+    json["lateral_m"] = image.fix->lateral_m;
+    json["correlation"] = fix.correlation;
+    json["residual"] = fix.residual;
+    json["covariance"] = fix.covariance;
+    json["columns"] = fix.columns;
+  }
+  for (const AzimuthRange& range : image.changed) {
+    json["changed"].push_back({{"from_rad", range.from_rad}, {"to_rad", range.to_rad}});
+  }
+  if (image.truth) {
+    json["truth"] = {{"x_m", image.truth->x_m},
+                     {"y_m", image.truth->y_m},
+                     {"heading_rad", nullptr},
+                     {"along_m", image.true_place->along_m},
+                     {"lateral_m", image.true_place->lateral_m}};
+    if (headings_known) json["truth"]["heading_rad"] = image.truth->heading_rad;
+  }
+  return json;
+}
+
+std::string as_text(const FollowedImage& image, Session& session) {
+  if (!image.fix) return image.file + "  " + session.bad("not on this route");
+  const RouteFix& fix = image.fix->fix;
+  std::string line = image.file + "  " + session.good(name_of(image.fix->origin)) + "  x " +
+                     fixed(fix.pose.x_m, 3) + " m  y " + fixed(fix.pose.y_m, 3) + " m  heading " +
+                     fixed(degrees(fix.pose.heading_rad), 1) + " degrees  along " +
+                     fixed(image.fix->along_m, 3) + " m  beside " + fixed(image.fix->lateral_m, 3) +
+                     " m  correlation " + fixed(fix.correlation, 3);
+  for (const AzimuthRange& range : image.changed) {
+    line += "  changed at " + fixed(degrees(range.from_rad), 0) + " to " +
+            fixed(degrees(range.to_rad), 0) + " degrees";
+  }
+  return line;
+}
+
+void print_error(const std::string& what, const std::vector<double>& errors, double scale,
+                 int digits, const std::string& unit, Session& session) {
+  if (errors.empty()) return;
+  session.print(what + "  median " + fixed(scale * quantile(errors, 0.5), digits) + unit +
+                "  95 % within " + fixed(scale * quantile(errors, 0.95), digits) + unit);
+}
+
+void print_summary(const FollowSummary& summary, const std::vector<FollowedImage>& images,
+                   Session& session) {
+  session.print(
+      "on the route at " +
+      session.strong(std::to_string(summary.on_route) + " of " + std::to_string(summary.images)) +
+      " images: " + std::to_string(summary.predicted) + " as predicted, " +
+      std::to_string(summary.recovered) + " recovered, " + std::to_string(summary.searched) +
+      " found by search");
+  print_error("error of position      ", summary.position_m, 1.0, 4, " m", session);
+  print_error("error along the route  ", summary.along_m, 1.0, 4, " m", session);
+  print_error("error beside the route ", summary.lateral_m, 1.0, 4, " m", session);
+  print_error("error of heading       ", summary.heading_rad, degrees(1.0), 2, " degrees", session);
+  for (const auto& [from_m, to_m] : changed_stretches(images)) {
+    session.print("changed here: something seen from " + fixed(from_m, 2) + " to " +
+                  fixed(to_m, 2) + " m along the route");
+  }
+}
+
+/// Seconds of each entry: its stamp, or its number where there are no stamps.
+std::vector<double> seconds_of(const Dataset& run, const FollowArguments& wanted,
+                               Session& session) {
+  std::vector<double> seconds;
+  for (std::size_t i = 0; i < run.entries.size(); ++i) {
+    seconds.push_back(run.entries[i].stamp_s.value_or(static_cast<double>(i)));
+    if (i > 0 && !(seconds[i] > seconds[i - 1])) {
+      throw FileError(wanted.dataset, "stamp_s of " + run.entries[i].file + " is " +
+                                          to_text(seconds[i]) + "; allowed for --tum: > " +
+                                          to_text(seconds[i - 1]) + ", the stamp before it");
+    }
+  }
+  if (!run.entries.front().stamp_s) {
+    session.note("panonav route follow: " + wanted.dataset +
+                 " has no column 'stamp_s'; the seconds in " + *wanted.tum +
+                 " count pictures from 0");
+  }
+  return seconds;
+}
+
+ExitCode follow_run(const FollowArguments& wanted, Session& session) {
+  const auto memory = MemoryFile::open(wanted.memory, Access::read_only);
+  const std::string name = route_named(memory, wanted.name);
+  const RoutePanorama route = memory.route(name).value();
+  if (route.size() < 2) {
+    throw FileError(wanted.memory, "route '" + name + "' has 1 line; allowed: 2 or more");
+  }
+  const RouteSource source = route_source(memory, name, route.columns());
+  const Dataset run = read_dataset(wanted.dataset);
+  const LineReader reader(run.source, source);
+  // A route in its odometry's frame has nothing that a data set's poses could be compared with.
+  const auto truth = source.from_odometry ? std::vector<Pose2>{} : dataset_poses(run);
+  const bool headings_known = !truth.empty() && run.entries.front().pose->heading_rad.has_value();
+  std::vector<double> seconds;
+  if (wanted.tum) seconds = seconds_of(run, wanted, session);
+#ifdef PANONAV_COMMAND_SIMULATES
+  if (wanted.report) prepare_route_report(*wanted.report, "route follow");
+#endif
+  RouteTracker tracker(route, wanted.tracker, wanted.fit);
+  const FollowSettings settings{wanted.every, !wanted.no_odometry};
+
+  std::vector<FollowedImage> images;
+  Progress progress("following", (run.entries.size() - 1) / wanted.every + 1);
+  follow(tracker, reader, run, truth, settings, session.executor(), [&](FollowedImage&& image) {
+    progress.clear();
+    session.print(session.json() ? as_json(image, headings_known).dump() : as_text(image, session));
+    images.push_back(std::move(image));
+    progress.advance();
+  });
+  progress.clear();
+
+  if (wanted.tum) {
+    std::vector<StampedPose> trajectory;
+    for (const FollowedImage& image : images) {
+      if (image.fix) trajectory.push_back({seconds[image.index], image.fix->fix.pose});
+    }
+    write_trajectory(*wanted.tum, trajectory);
+  }
+  const FollowSummary summary = summarise_follow(images, headings_known);
+  if (!session.json()) print_summary(summary, images, session);
+#ifdef PANONAV_COMMAND_SIMULATES
+  if (wanted.report) {
+    write_follow_report(*wanted.report, name, tracker.lines(), images, summary);
+    tell_report(*wanted.report, session);
+  }
+#endif
+  return summary.on_route > 0 ? ExitCode::done : ExitCode::no_answer;
+}
+
+Run declare(Arguments& arguments) {
+  auto wanted = std::make_shared<FollowArguments>();
+  arguments.positional("MEMORY", wanted->memory, "Memory file with a route");
+  arguments.positional("DATASET", wanted->dataset, "Data set of a later drive, in its order");
+  arguments.option("--name", wanted->name, "Name of the route; the only one where none is given");
+  arguments.option("--every", wanted->every, 1,
+                   "Look at every N-th picture only and go by odometry between (default 1)");
+  arguments.flag("--no-odometry", wanted->no_odometry,
+                 "Search the whole route for each picture alone");
+  arguments.option("--tum", wanted->tum,
+                   "Write the poses on the route to this file: TUM text, or CSV for a name that "
+                   "ends in .csv");
+#ifdef PANONAV_COMMAND_SIMULATES
+  arguments.option("--report", wanted->report,
+                   "Write pictures of the route, the fixes, and what was seen beside what the "
+                   "route shows into this folder: a new one, or that of an earlier report");
+#endif
+  arguments.options("route_tracker", wanted->tracker);
+  arguments.options("route_fit", wanted->fit);
+  return [wanted](Session& session) { return follow_run(*wanted, session); };
+}
+
+}  // namespace
+
+Verb route_follow_verb() {
+  return {"route follow", "Say where a robot is beside a remembered route, to the centimetre",
+          "Position and heading come from what the route shows at the robot's place, also between "
+          "and\n"
+          "beside the remembered lines. Odometry predicts where the data set has it; where the "
+          "prediction\n"
+          "does not hold the robot is looked for around it, then on the whole route. Parts of the "
+          "scene\n"
+          "that are not as remembered are left out and named. Ends with 1 when no picture is on "
+          "the route.",
+          "  panonav route follow office.panonav repeat_run\n"
+          "  panonav route follow office.panonav repeat_run --report followed\n"
+          "  panonav route follow office.panonav repeat_run --no-odometry --json",
+          declare};
+}
+
+}  // namespace panonav::command

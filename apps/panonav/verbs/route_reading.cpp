@@ -1,0 +1,146 @@
+#include "verbs/route_reading.hpp"
+
+#include <algorithm>
+#include <sstream>
+
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/positions.hpp"
+#include "panonav/motion/headed_path.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+std::string parameter_of(const std::string& name) {
+  return "route." + name;
+}
+
+/// A cylinder no higher than the line needs, as finely sampled as a usual camera sees the horizon.
+PanoramaShape shape_of(const PictureSource& pictures, const RouteSource& route) {
+  if (pictures.kind == PictureKind::panorama) return {};
+  constexpr int rows = 5;
+  return {rows, std::min(4 * route.line.columns, 4096)};
+}
+
+PictureSource cut_to_horizon(PictureSource pictures, const RouteSource& route) {
+  if (pictures.kind == PictureKind::panorama) return pictures;
+  const double half_rad = std::max(route.line.half_band_rad, radians(0.1));
+  pictures.layout.kept_elevations = ElevationBand{-half_rad, half_rad};
+  return pictures;
+}
+
+}  // namespace
+
+RouteSource route_source(const MemoryFile& memory, const std::string& name, int columns) {
+  RouteSource source;
+  source.line.columns = columns;
+  const auto text = memory.parameter(parameter_of(name));
+  if (!text) return source;
+  std::istringstream in(*text);
+  std::string word;
+  bool good = true;
+  while (good && in >> word) {
+    if (word == "half_band_rad") {
+      good = static_cast<bool>(in >> source.line.half_band_rad);
+    } else if (word == "horizon_rows") {
+      source.horizon_rows.emplace();
+      good = static_cast<bool>(in >> source.horizon_rows->first >> source.horizon_rows->second);
+    } else if (word == "odometry") {
+      source.from_odometry = true;
+    } else {
+      good = false;
+    }
+  }
+  if (!good) {
+    throw FileError(memory.path().string(), "parameter " + parameter_of(name) + " is '" + *text +
+                                                "'; allowed: what panonav route record writes");
+  }
+  return source;
+}
+
+void remember_route_source(MemoryFile& memory, const std::string& name, const RouteSource& source) {
+  std::string text = "half_band_rad " + to_text(source.line.half_band_rad);
+  if (source.horizon_rows) {
+    text += " horizon_rows " + std::to_string(source.horizon_rows->first) + " " +
+            std::to_string(source.horizon_rows->second);
+  }
+  if (source.from_odometry) text += " odometry";
+  memory.set_parameter(parameter_of(name), text);
+}
+
+LineReader::LineReader(const PictureSource& pictures, const RouteSource& route)
+    : route_(route), reader_(cut_to_horizon(pictures, route), shape_of(pictures, route)) {
+  if (route.horizon_rows &&
+      (pictures.kind != PictureKind::panorama || pictures.layout.elevations)) {
+    throw UsageError(
+        "--horizon-rows goes with panoramas whose elevations are not known; these pictures say "
+        "where the horizon is");
+  }
+}
+
+std::vector<float> LineReader::read(const std::filesystem::path& picture) const {
+  const Panorama panorama = reader_.read(picture);
+  try {
+    return line_of(panorama);
+  } catch (const ContractError& error) {
+    throw FileError(picture.string(), error.what());
+  }
+}
+
+std::vector<float> LineReader::line_of(const Panorama& panorama) const {
+  if (!route_.horizon_rows) return horizon_line(panorama, route_.line);
+  const auto [first, last] = *route_.horizon_rows;
+  if (last >= panorama.rows()) {
+    throw ContractError("last of --horizon-rows", last,
+                        "0 to " + std::to_string(panorama.rows() - 1));
+  }
+  const auto columns = static_cast<std::size_t>(panorama.columns());
+  const auto values =
+      panorama.values().subspan(static_cast<std::size_t>(first) * columns,
+                                static_cast<std::size_t>(last - first + 1) * columns);
+  return horizon_line({last - first + 1, panorama.columns(), std::nullopt,
+                       std::vector<float>(values.begin(), values.end())},
+                      route_.line);
+}
+
+std::string route_named(const MemoryFile& memory, const std::optional<std::string>& name) {
+  const auto names = memory.route_names();
+  std::string all;
+  for (const auto& known : names) all += (all.empty() ? "" : ", ") + known;
+  if (names.empty()) {
+    throw FileError(memory.path().string(), "holds no route; panonav route record makes one");
+  }
+  if (!name) {
+    if (names.size() == 1) return names.front();
+    throw FileError(memory.path().string(), "holds several routes; say which with --name: " + all);
+  }
+  if (std::ranges::find(names, *name) == names.end()) {
+    throw FileError(memory.path().string(),
+                    "holds no route '" + *name + "'; allowed for --name: " + all);
+  }
+  return *name;
+}
+
+std::vector<Pose2> dataset_poses(const Dataset& dataset) {
+  std::vector<Pose2> poses;
+  bool headings = true;
+  for (const auto& entry : dataset.entries) {
+    if (!entry.pose) return {};
+    headings = headings && entry.pose->heading_rad;
+    poses.push_back({entry.pose->x_m, entry.pose->y_m, entry.pose->heading_rad.value_or(0.0)});
+  }
+  if (headings || poses.size() < 2) return headings ? poses : std::vector<Pose2>{};
+  return headed_along_way(positions_of(poses));
+}
+
+std::vector<Pose2> odometry_poses(const Dataset& dataset) {
+  std::vector<Pose2> poses;
+  for (const auto& entry : dataset.entries) {
+    if (!entry.odometry) return {};
+    poses.push_back(*entry.odometry);
+  }
+  return poses;
+}
+
+}  // namespace panonav::command

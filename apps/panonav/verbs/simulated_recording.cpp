@@ -1,0 +1,230 @@
+#include "verbs/simulated_recording.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+
+#include "panonav/core/error.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav/simulation/load_gazebo.hpp"
+#include "panonav/simulation/load_mesh.hpp"
+#include "panonav/simulation/mirror.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+using Given = std::function<bool(const std::string& section, const std::string& name)>;
+
+/// What stands in a scene of a file is as the file says: options that vary built-in scenes would be
+/// ignored.
+void refuse_variations_of_file(const std::string& file, const Given& given) {
+  struct Variation {
+    const char* name;
+    const char* flag;
+  };
+  for (const auto& [name, flag] :
+       {Variation{"scene_seed", "--scene-seed"}, Variation{"moved_objects", "--moved-objects"},
+        Variation{"moved_seed", "--moved-seed"}}) {
+    if (given("simulation", name)) {
+      throw UsageError(std::string(flag) + " varies built-in scenes only; '" + file +
+                       "' is a file, leave it out");
+    }
+  }
+}
+
+Scene load_scene(const std::string& name, const SceneOptions& options, const Given& given) {
+  const auto names = scene_names();
+  if (std::find(names.begin(), names.end(), name) != names.end()) {
+    return make_scene(name, {.seed = static_cast<std::uint64_t>(options.scene_seed),
+                             .moved_objects = options.moved_objects,
+                             .moved_seed = static_cast<std::uint64_t>(options.moved_seed),
+                             .light = options.light});
+  }
+  std::error_code ignored;
+  if (!fs::is_regular_file(name, ignored)) {
+    std::string all;
+    for (const auto known : names) all += (all.empty() ? "" : ", ") + std::string(known);
+    throw UsageError("'" + name + "' is neither a file nor a built-in scene; allowed: " + all);
+  }
+  refuse_variations_of_file(name, given);
+  Scene scene;
+  std::string ending = fs::path(name).extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (ending == ".world" || ending == ".sdf") {
+    GazeboOptions gazebo;
+    gazebo.textures.read = [](const fs::path& path) { return read_image(path); };
+    gazebo.model_folders = gazebo_model_folders_of_environment();
+    scene = load_gazebo(name, gazebo);
+  } else {
+    MeshOptions mesh;
+    mesh.textures.read = [](const fs::path& path) { return read_image(path); };
+    scene = load_mesh(name, mesh);
+  }
+  scale_light(scene, options.light);
+  return scene;
+}
+
+std::string picture_name(std::size_t index) {
+  const std::string digits = std::to_string(index);
+  constexpr std::size_t width = 5;
+  return "view_" + std::string(width - std::min(width, digits.size()), '0') + digits + ".png";
+}
+
+/// Takes a data set away that could not be finished.
+void discard(const Dataset& dataset, bool with_folder) {
+  std::error_code ignored;
+  for (const auto& entry : dataset.entries) fs::remove(entry.path, ignored);
+  for (const char* name : {"poses.csv", "camera.toml"}) fs::remove(dataset.folder / name, ignored);
+  if (with_folder) fs::remove(dataset.folder, ignored);
+}
+
+}  // namespace
+
+void visit_options(SceneOptions& options, OptionVisitor& visitor) {
+  visitor.visit({.name = "seed", .help = "of poses, noise, tilt and odometry", .low = 0},
+                options.seed);
+  visitor.visit(
+      {.name = "scene_seed", .help = "varies textures and furniture of built-in scenes", .low = 0},
+      options.scene_seed);
+  visitor.visit({.name = "moved_objects",
+                 .help = "share of the movable objects that stand elsewhere",
+                 .low = 0,
+                 .high = 1},
+                options.moved_objects);
+  visitor.visit({.name = "moved_seed", .help = "which objects moved, and where to", .low = 0},
+                options.moved_seed);
+  visitor.visit({.name = "light",
+                 .help = "all lamps and the sky times this",
+                 .low = 0,
+                 .high = 100,
+                 .low_open = true},
+                options.light);
+}
+
+void visit_options(SimulationOptions& options, OptionVisitor& visitor) {
+  static constexpr std::array<std::string_view, 2> kinds{"mirror", "panorama"};
+  visitor.visit({.name = "kind", .help = "what the camera writes"}, kinds, options.kind);
+  visitor.visit({.name = "rows", .help = "rows of panoramas", .low = 1, .high = 4096},
+                options.rows);
+  visitor.visit({.name = "columns", .help = "columns of panoramas", .low = 4, .high = 16384},
+                options.columns);
+  visitor.visit(
+      {.name = "elevation_low_deg", .help = "lower edge of panoramas", .low = -90, .high = 90},
+      options.elevation_low_deg);
+  visitor.visit(
+      {.name = "elevation_high_deg", .help = "upper edge of panoramas", .low = -90, .high = 90},
+      options.elevation_high_deg);
+  visit_options(options.scene, visitor);
+}
+
+void declare_simulation(Arguments& arguments, SimulationArguments& wanted) {
+  arguments.options("recording", wanted.recording);
+  arguments.options("simulation", wanted.simulation);
+  arguments.options("frame", wanted.frame);
+  arguments.options("sensor", wanted.sensor);
+  arguments.options("free_space", wanted.free_space);
+  arguments.options("odometry", wanted.odometry, "odometry");
+}
+
+SimulatedWorld::SimulatedWorld(
+    const std::string& scene, SimulationArguments wanted,
+    const std::function<bool(const std::string&, const std::string&)>& given, Executor& executor)
+    : wanted_(wanted), scene_(load_scene(scene, wanted.simulation.scene, given)) {
+  const auto& simulation = wanted_.simulation;
+  if (simulation.elevation_low_deg >= simulation.elevation_high_deg) {
+    throw OptionError("elevation_low_deg is " + to_text(simulation.elevation_low_deg) +
+                      "; allowed: below elevation_high_deg, which is " +
+                      to_text(simulation.elevation_high_deg));
+  }
+  if (!given("frame", "camera_height_m")) wanted_.frame.camera_height_m = scene_.camera_height_m;
+  // What is not said of the robot is as with the robot that the scene is made for.
+  const FreeSpaceOptions usual =
+      free_space_options(scene_.robot_radius_m, wanted_.frame.camera_height_m);
+  FreeSpaceOptions& robot = wanted_.free_space;
+  if (!given("free_space", "robot_radius_m")) robot.robot_radius_m = usual.robot_radius_m;
+  if (!given("free_space", "robot_height_m")) robot.robot_height_m = usual.robot_height_m;
+  if (!given("free_space", "step_height_m")) robot.step_height_m = usual.step_height_m;
+  if (!given("free_space", "cell_m")) robot.cell_m = usual.cell_m;
+  free_space_ = std::make_shared<const FreeSpace>(scene_, wanted_.free_space);
+  renderer_ = std::make_shared<const Renderer>(scene_, RendererOptions{}, executor);
+}
+
+SimulatedWorld SimulatedWorld::with(const RecordingOptions& recording, int seed) const {
+  SimulatedWorld world = *this;
+  world.wanted_.recording = recording;
+  world.wanted_.simulation.scene.seed = seed;
+  return world;
+}
+
+RecordingCamera SimulatedWorld::camera() const {
+  const auto& simulation = wanted_.simulation;
+  if (simulation.kind == 0) return wanted_.mirror.value_or(simulated_mirror_camera());
+  return PanoramaRendering{
+      .rows = simulation.rows,
+      .columns = simulation.columns,
+      .elevations = {radians(simulation.elevation_low_deg), radians(simulation.elevation_high_deg)},
+      .rays_per_axis = wanted_.frame.rays_per_axis};
+}
+
+PictureSource SimulatedWorld::source() const {
+  PictureSource source;
+  const auto seen_by = camera();
+  if (const auto* mirror = std::get_if<Camera>(&seen_by)) {
+    source.kind = PictureKind::mirror;
+    source.camera = *mirror;
+  } else {
+    source.layout.elevations = std::get<PanoramaRendering>(seen_by).elevations;
+  }
+  return source;
+}
+
+MissionPlace SimulatedWorld::place() const {
+  MissionPlace place;
+  place.scene = scene_;
+  place.scene.robot_radius_m = wanted_.free_space.robot_radius_m;
+  place.scene.camera_height_m = wanted_.frame.camera_height_m;
+  place.free_space = free_space_;
+  place.renderer = renderer_;
+  place.sensor = wanted_.sensor;
+  return place;
+}
+
+Dataset record_dataset(const SimulatedWorld& world, const fs::path& folder,
+                       std::span<const RecordedPose> poses, bool with_path, Executor& executor,
+                       const std::function<void()>& advance) {
+  std::error_code error;
+  const bool made_folder = fs::create_directories(folder, error);
+  if (error) throw FileError(folder.string(), "cannot be made: " + error.message());
+
+  Dataset dataset{folder, world.source(), {}};
+  const auto& wanted = world.arguments();
+  try {
+    record(world.renderer(), poses, world.camera(), wanted.frame, wanted.sensor,
+           static_cast<std::uint64_t>(wanted.simulation.scene.seed), executor,
+           [&](std::size_t number, const RecordedPose& recorded, const Image& image) {
+             DatasetEntry entry;
+             entry.file = picture_name(number);
+             entry.path = folder / entry.file;
+             entry.pose =
+                 ReferencePose{recorded.pose.x_m, recorded.pose.y_m, recorded.pose.heading_rad};
+             if (with_path) {
+               entry.stamp_s = recorded.stamp_s;
+               entry.odometry = recorded.odometry;
+             }
+             write_png(entry.path, image.view());
+             dataset.entries.push_back(std::move(entry));
+             advance();
+           });
+    write_dataset(dataset);
+  } catch (...) {
+    discard(dataset, made_folder);
+    throw;
+  }
+  return dataset;
+}
+
+}  // namespace panonav::command

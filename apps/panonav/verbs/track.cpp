@@ -1,0 +1,332 @@
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "cli/session.hpp"
+#include "cli/verbs.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/io/trajectory_file.hpp"
+#include "panonav/localisation/sample.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
+#include "panonav/storage/memory_file.hpp"
+#include "verbs/tracked_run.hpp"
+#ifdef PANONAV_COMMAND_SIMULATES
+#include "reports/report_page.hpp"
+#include "reports/track_report.hpp"
+#endif
+
+namespace panonav::command {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+/// How sure a start pose is. The defaults are those of a robot put down by hand on a mark.
+struct StartOptions {
+  double deviation_m = 0.1;
+  double heading_deviation_deg = 5.0;
+};
+
+void visit_options(StartOptions& options, OptionVisitor& visitor) {
+  visitor.visit({.name = "deviation_m",
+                 .help = "standard deviation of x and of y of the start pose",
+                 .low = 0.0,
+                 .high = 1e6},
+                options.deviation_m);
+  visitor.visit({.name = "heading_deviation_deg",
+                 .help = "standard deviation of its heading",
+                 .low = 0.0,
+                 .high = 360.0},
+                options.heading_deviation_deg);
+}
+
+/// Of positions that are taken for metres; what lies farther is a mistake.
+constexpr double farthest_m = 1e9;
+
+struct TrackArguments {
+  std::string memory;
+  std::string dataset;
+  int every = 1;
+  std::optional<double> start_x_m;
+  std::optional<double> start_y_m;
+  std::optional<double> start_heading_deg;
+  std::optional<std::string> tum;
+  std::optional<std::string> report;
+  StartOptions start;
+  MonteCarloOptions filter;
+  OdometryNoise odometry;
+};
+
+void check(const Arguments& arguments, const TrackArguments& wanted) {
+  const bool x = wanted.start_x_m.has_value();
+  const bool y = wanted.start_y_m.has_value();
+  if (x != y || (x && !wanted.start_heading_deg)) {
+    throw UsageError(
+        "--start-x-m, --start-y-m and --start-heading-deg go together; --start-heading-deg alone "
+        "is a robot that knows its heading only");
+  }
+  if (!x && arguments.given("start")) {
+    throw UsageError(
+        "--start-deviation-m and --start-heading-deviation-deg go with --start-x-m, --start-y-m "
+        "and --start-heading-deg");
+  }
+  if (x && std::max(std::abs(*wanted.start_x_m), std::abs(*wanted.start_y_m)) > farthest_m) {
+    throw UsageError("--start-x-m and --start-y-m are " + to_text(*wanted.start_x_m) + " and " +
+                     to_text(*wanted.start_y_m) + "; allowed: " + to_text(-farthest_m) + " to " +
+                     to_text(farthest_m));
+  }
+  if (wanted.filter.least_particles > wanted.filter.most_particles) {
+    throw UsageError("--least-particles is " + std::to_string(wanted.filter.least_particles) +
+                     "; allowed: at most --most-particles, which is " +
+                     std::to_string(wanted.filter.most_particles));
+  }
+}
+
+Dataset read_run(const std::string& folder) {
+  Dataset run = read_dataset(folder);
+  for (const auto& entry : run.entries) {
+    if (!entry.odometry) {
+      throw FileError(folder,
+                      "has no odometry; allowed: a table with the columns 'odom_x_m', 'odom_y_m' "
+                      "and 'odom_heading_deg'");
+    }
+    const double largest = std::max(std::abs(entry.odometry->x_m), std::abs(entry.odometry->y_m));
+    if (largest > farthest_m) {
+      throw FileError(folder, "odometry of " + entry.file + " is " + to_text(largest) +
+                                  " m from its origin; allowed: at most " + to_text(farthest_m));
+    }
+  }
+  return run;
+}
+
+/// Seconds of each entry: its stamp, or its number where there are no stamps.
+std::vector<double> seconds_of(const Dataset& run, const TrackArguments& wanted, Session& session) {
+  std::vector<double> seconds;
+  for (std::size_t i = 0; i < run.entries.size(); ++i) {
+    const auto& stamp_s = run.entries[i].stamp_s;
+    seconds.push_back(stamp_s.value_or(static_cast<double>(i)));
+    if (i > 0 && !(seconds[i] > seconds[i - 1])) {
+      throw FileError(wanted.dataset, "stamp_s of " + run.entries[i].file + " is " +
+                                          to_text(seconds[i]) + "; allowed for --tum: > " +
+                                          to_text(seconds[i - 1]) + ", the stamp before it");
+    }
+  }
+  if (!run.entries.front().stamp_s) {
+    session.note("panonav track: " + wanted.dataset + " has no column 'stamp_s'; the seconds in " +
+                 *wanted.tum + " count pictures from 0");
+  }
+  return seconds;
+}
+
+MonteCarloLocaliser make_localiser(const VisualMemory& memory, const TrackArguments& wanted) {
+  int posed = 0;
+  for (const ViewId view : memory.views()) posed += memory.info(view).pose ? 1 : 0;
+  if (posed < ObservationModel::least_views) {
+    throw FileError(wanted.memory, "holds " + std::to_string(posed) +
+                                       " views with a position; allowed: " +
+                                       std::to_string(ObservationModel::least_views) +
+                                       " or more; memorise a data set whose table has the columns "
+                                       "'x_m' and 'y_m'");
+  }
+  try {
+    MonteCarloLocaliser localiser(memory, wanted.filter, wanted.odometry);
+    const auto heading_rad = [&] { return wrap_angle(radians(*wanted.start_heading_deg)); };
+    if (wanted.start_x_m) {
+      localiser.start_at({*wanted.start_x_m, *wanted.start_y_m, heading_rad()},
+                         wanted.start.deviation_m, radians(wanted.start.heading_deviation_deg));
+    } else if (wanted.start_heading_deg) {
+      localiser.start_anywhere(heading_rad());
+    }
+    return localiser;
+  } catch (const ContractError& error) {  // the views are all in one place
+    throw FileError(wanted.memory, error.what());
+  }
+}
+
+ordered_json optional_number(const std::optional<double>& value) {
+  return value ? ordered_json(*value) : ordered_json();
+}
+
+ordered_json as_json(const Pose2& pose) {
+  return {{"x_m", pose.x_m}, {"y_m", pose.y_m}, {"heading_rad", pose.heading_rad}};
+}
+
+ordered_json as_json(const PoseMode& mode) {
+  return {{"weight", mode.weight},        {"x_m", mode.mean.x_m},
+          {"y_m", mode.mean.y_m},         {"heading_rad", mode.mean.heading_rad},
+          {"spread_m", mode.spread_m},    {"heading_spread_rad", mode.heading_spread_rad},
+          {"covariance", mode.covariance}};
+}
+
+ordered_json as_json(const TrackedImage& image) {
+  const MonteCarloEstimate& estimate = image.estimate;
+  auto modes = ordered_json::array();
+  for (const PoseMode& mode : estimate.modes) modes.push_back(as_json(mode));
+  ordered_json truth;
+  if (image.truth) {
+    truth = {{"x_m", image.truth->x_m},
+             {"y_m", image.truth->y_m},
+             {"heading_rad", optional_number(image.truth->heading_rad)}};
+  }
+  return {{"file", image.file},
+          {"stamp_s", optional_number(image.stamp_s)},
+          {"state", name_of(estimate.state)},
+          {"pose", estimate.pose ? as_json(*estimate.pose) : ordered_json()},
+          {"inside", estimate.inside},
+          {"modes", std::move(modes)},
+          {"spread_m", estimate.spread_m},
+          {"particles", estimate.particles},
+          {"effective_particles", estimate.effective_particles},
+          {"resampled", estimate.resampled},
+          {"redrawn", estimate.redrawn},
+          {"difference_here", optional_number(estimate.difference_here)},
+          {"difference_anywhere", optional_number(estimate.difference_anywhere)},
+          {"truth", std::move(truth)}};
+}
+
+std::string place_text(const Pose2& pose) {
+  return "x " + fixed(pose.x_m, 2) + " m  y " + fixed(pose.y_m, 2) + " m";
+}
+
+std::string as_text(const TrackedImage& image, Session& session) {
+  const MonteCarloEstimate& estimate = image.estimate;
+  std::string line = image.file + "  ";
+  const std::string state(name_of(estimate.state));
+  if (estimate.state == LocalisationState::lost || estimate.modes.empty()) {
+    return line + session.bad(state);
+  }
+  const PoseMode& best = estimate.modes.front();
+  if (is_localised(image)) {
+    return line + session.good(state) + "  " + place_text(*estimate.pose) + "  heading " +
+           fixed(degrees(estimate.pose->heading_rad), 1) + " degrees  spread " +
+           fixed(best.spread_m, 2) + " m";
+  }
+  line += session.strong(state) + "  ";
+  if (estimate.modes.size() == 1) {
+    return line + "an area around " + place_text(best.mean) + "  spread " +
+           fixed(best.spread_m, 2) + " m";
+  }
+  constexpr std::size_t most_shown = 3;
+  line += std::to_string(estimate.modes.size()) + " places:";
+  for (std::size_t i = 0; i < std::min(most_shown, estimate.modes.size()); ++i) {
+    const PoseMode& mode = estimate.modes[i];
+    line += (i > 0 ? ",  " : "  ") + place_text(mode.mean) + " (" + fixed(100.0 * mode.weight, 0) +
+            " %)";
+  }
+  return estimate.modes.size() > most_shown ? line + ", .." : line;
+}
+
+std::string count_text(std::size_t count, std::size_t total) {
+  return std::to_string(count) + " of " + std::to_string(total);
+}
+
+void print_summary(const TrackSummary& summary, Session& session) {
+  const std::size_t total = summary.localised + summary.ambiguous + summary.lost;
+  session.print("localised at " + session.strong(count_text(summary.localised, total)) +
+                " images, ambiguous at " + std::to_string(summary.ambiguous) + ", lost at " +
+                std::to_string(summary.lost) +
+                (summary.first_localised
+                     ? "; first localised at image " + std::to_string(*summary.first_localised)
+                     : "; never localised"));
+  if (!summary.errors_m.empty()) {
+    session.print("error of localised images  median " + fixed(quantile(summary.errors_m, 0.5), 3) +
+                  " m  95 % within " + fixed(quantile(summary.errors_m, 0.95), 3) + " m");
+  }
+  if (!summary.heading_errors_rad.empty()) {
+    session.print("error of their headings    median " +
+                  fixed(degrees(quantile(summary.heading_errors_rad, 0.5)), 2) +
+                  " degrees  95 % within " +
+                  fixed(degrees(quantile(summary.heading_errors_rad, 0.95)), 2) + " degrees");
+  }
+}
+
+ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Session& session) {
+  check(arguments, wanted);
+  const auto file = MemoryFile::open(wanted.memory, Access::read_only);
+  const auto memory = file.load();
+  const Dataset run = read_run(wanted.dataset);
+  const ViewEncoder pipeline(file.header(), run.source);
+  std::vector<double> seconds;
+  if (wanted.tum) seconds = seconds_of(run, wanted, session);
+  MonteCarloLocaliser localiser = make_localiser(memory, wanted);
+  TrackSettings settings{.every = wanted.every};
+#ifdef PANONAV_COMMAND_SIMULATES
+  if (wanted.report) {
+    prepare_track_report(*wanted.report);
+    settings.particles_kept = particles_shown(run.entries.size());
+  }
+#endif
+
+  std::vector<TrackedImage> images;
+  Progress progress("tracking", (run.entries.size() - 1) / settings.every + 1);
+  track(localiser, pipeline, run, settings, session.executor(), [&](TrackedImage&& image) {
+    progress.clear();
+    session.print(session.json() ? as_json(image).dump() : as_text(image, session));
+    images.push_back(std::move(image));
+    progress.advance();
+  });
+  progress.clear();
+
+  if (wanted.tum) {
+    std::vector<StampedPose> trajectory;
+    for (const TrackedImage& image : images) {
+      if (is_localised(image)) trajectory.push_back({seconds[image.index], *image.estimate.pose});
+    }
+    write_trajectory(*wanted.tum, trajectory);
+  }
+  const TrackSummary summary = summarise_track(images);
+  if (!session.json()) print_summary(summary, session);
+#ifdef PANONAV_COMMAND_SIMULATES
+  if (wanted.report) {
+    write_track_report(*wanted.report, memory, localiser.model().spacing_m, images, summary);
+    tell_report(*wanted.report, session);
+  }
+#endif
+  return summary.localised > 0 ? ExitCode::done : ExitCode::no_answer;
+}
+
+Run declare(Arguments& arguments) {
+  auto wanted = std::make_shared<TrackArguments>();
+  arguments.positional("MEMORY", wanted->memory, "Memory file");
+  arguments.positional("DATASET", wanted->dataset,
+                       "Data set with odometry, in the order of the run");
+  arguments.option("--every", wanted->every, 1,
+                   "Look at every N-th picture only and go by odometry between (default 1)");
+  arguments.option("--start-x-m", wanted->start_x_m, "The run starts here, not anywhere");
+  arguments.option("--start-y-m", wanted->start_y_m, "Likewise");
+  arguments.option("--start-heading-deg", wanted->start_heading_deg,
+                   "Heading at the start; alone: of a robot that does not know its place");
+  arguments.option("--tum", wanted->tum,
+                   "Write the trajectory of localised images to this file: TUM text, or CSV for a "
+                   "name that ends in .csv");
+#ifdef PANONAV_COMMAND_SIMULATES
+  arguments.option("--report", wanted->report,
+                   "Write pictures and an animation of particles, estimate and truth into this "
+                   "folder: a new one, or that of an earlier report");
+#endif
+  arguments.options("start", wanted->start, "start");
+  arguments.options("monte_carlo", wanted->filter);
+  arguments.options("odometry", wanted->odometry, "odometry");
+  return [wanted, &arguments](Session& session) { return track_run(arguments, *wanted, session); };
+}
+
+}  // namespace
+
+Verb track_verb() {
+  return {"track", "Follow a moving robot through its pictures and odometry",
+          "Monte-Carlo localisation: the robot need not know where it starts, several places that "
+          "look\n"
+          "alike are kept until a picture tells them apart, and a robot that was carried away is "
+          "found\n"
+          "again. Ends with 1 when it was never localised.",
+          "  panonav track office.panonav run\n"
+          "  panonav track office.panonav run --every 10 --report report\n"
+          "  panonav track office.panonav run --tum estimate.tum --json\n"
+          "  panonav evaluate estimate.tum run/poses.csv --align false",
+          declare};
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "panonav/core/executor.hpp"
+#include "panonav/io/dataset.hpp"
+#include "panonav/localisation/monte_carlo.hpp"
+#include "panonav/memory/visual_memory.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
+
+namespace panonav::command {
+
+/// One picture of a run and what the filter said after it.
+struct TrackedImage {
+  std::size_t index = 0;  ///< in the data set, from 0
+  std::string file;
+  std::optional<double> stamp_s;
+  std::optional<ReferencePose> truth;
+  MonteCarloEstimate estimate;
+  std::vector<Point2> particles;  ///< an even sample of them, as many as were asked for
+};
+
+/// What is true of all runs: whether and how far off the answer was.
+[[nodiscard]] bool is_localised(const TrackedImage& image);
+/// Of the pose beside the true one; empty where one of them is not known.
+[[nodiscard]] std::optional<double> position_error_m(const TrackedImage& image);
+[[nodiscard]] std::optional<double> heading_error_rad(const TrackedImage& image);
+
+struct TrackSummary {
+  std::size_t localised = 0;
+  std::size_t ambiguous = 0;
+  std::size_t lost = 0;
+  std::optional<std::size_t> first_localised;  ///< images until then, that one included
+  std::vector<double> errors_m;                ///< of localised images with a true position
+  std::vector<double> heading_errors_rad;
+};
+[[nodiscard]] TrackSummary summarise_track(const std::vector<TrackedImage>& images);
+
+struct TrackSettings {
+  int every = 1;                   ///< pictures between those that are looked at, plus one
+  std::size_t particles_kept = 0;  ///< of each image, for pictures
+};
+
+/// Runs the filter over a recording whose entries all have odometry: it moves with every entry and
+/// looks at every `settings.every`-th picture, the first one included. Signatures are computed on
+/// all threads, the filter runs in order; the same on any number of threads. `report` is called
+/// after each image, in order. Throws FileError on a picture that cannot be read.
+void track(MonteCarloLocaliser& localiser, const ViewEncoder& pipeline, const Dataset& run,
+           const TrackSettings& settings, Executor& executor,
+           const std::function<void(TrackedImage&&)>& report);
+
+/// `count` positions drawn evenly by weight; all of them where there are fewer. No randomness.
+[[nodiscard]] std::vector<Point2> even_sample(std::span<const Particle> particles,
+                                              std::size_t count);
+
+}  // namespace panonav::command

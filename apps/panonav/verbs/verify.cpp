@@ -1,0 +1,56 @@
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "cli/arguments.hpp"
+#include "cli/session.hpp"
+#include "cli/verbs.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/storage/memory_file.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+ExitCode verify(const std::string& path, Session& session) {
+  const auto memory = MemoryFile::open(path, Access::read_only);
+  const auto faults = memory.verify();
+  if (session.json()) {
+    auto listed = ordered_json::array();
+    for (const auto& fault : faults) {
+      listed.push_back({{"view", fault.view ? ordered_json(fault.view->value) : ordered_json()},
+                        {"what", fault.what}});
+    }
+    session.print(
+        ordered_json{{"memory", path}, {"intact", faults.empty()}, {"faults", listed}}.dump());
+  } else if (faults.empty()) {
+    session.print(path + ": " + session.good("intact") + ", " +
+                  std::to_string(memory.info().views) + " views");
+  } else {
+    for (const auto& fault : faults) {
+      session.print((fault.view ? "view " + std::to_string(fault.view->value) + ": " : "") +
+                    fault.what);
+    }
+  }
+  if (faults.empty()) return ExitCode::done;
+  session.finish_output();
+  throw FileError(path, "is damaged: " + std::to_string(faults.size()) +
+                            " faults, first: " + faults.front().what);
+}
+
+Run declare(Arguments& arguments) {
+  auto path = std::make_shared<std::string>();
+  arguments.positional("MEMORY", *path, "Memory file");
+  return [path](Session& session) { return verify(*path, session); };
+}
+
+}  // namespace
+
+Verb verify_verb() {
+  return {"verify", "Check every byte of a memory that can be checked",
+          "Ends with 0 when the file is intact, with 2 when it is not.",
+          "  panonav verify office.panonav", declare};
+}
+
+}  // namespace panonav::command

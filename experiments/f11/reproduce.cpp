@@ -1,0 +1,54 @@
+#include <filesystem>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "experiments/f11/experiments.hpp"
+#include "experiments/reproduction_stages.hpp"
+#include "panonav/core/error.hpp"
+
+namespace panonav {
+
+MappingReproductionOptions quick_run(MappingReproductionOptions options) {
+  options.scenes = 2;
+  options.runs = 1;
+  options.most_views = 1000;
+  options.columns = 256;
+  return options;
+}
+
+Reproduction reproduce_f11(const MappingReproductionOptions& options, Executor& executor,
+                           const ReproductionProgress& progress) {
+  require(options.scenes >= 2, "scenes", options.scenes, ">= 2");
+  require(options.runs >= 1, "runs", options.runs, ">= 1");
+  require(options.views >= 10, "views", options.views, ">= 10");
+  require(options.most_views >= 100, "most_views", options.most_views, ">= 100");
+  require(options.columns >= 132, "columns", options.columns, ">= 132, twice the components");
+  std::error_code error;
+  std::filesystem::create_directories(options.out, error);
+  if (error) throw FileError(options.out.string(), "cannot be made: " + error.message());
+
+  Reproduction result;
+  std::vector<ReproductionStage> stages{
+      {"first set", 6.0 * options.scenes, [&] { reproduce_first_set(options, executor, result); }},
+      {"second set", 10.0 * options.scenes,
+       [&] { reproduce_second_set(options, executor, result); }},
+      {"time", 1.0, [&] { measure_step_time(options, executor, result); }},
+      {"identical doors", 15.0, [&] { reproduce_identical_doors(options, executor, result); }}};
+  for (const std::string name : {"small_warehouse", "small_house"}) {
+    if (options.data.empty() || !std::filesystem::is_directory(options.data / "scenes" / name)) {
+      continue;
+    }
+    stages.push_back({name, 10.0 * options.runs,
+                      [&, name] { reproduce_mapping_in_world(options, name, executor, result); }});
+  }
+  stages.push_back(
+      {"recordings", 5.0, [&] { reproduce_mapped_recordings(options, executor, result); }});
+  stages.push_back({"large maps", 0.02 * options.most_views,
+                    [&] { measure_large_maps(options, executor, result); }});
+
+  run_stages(stages, progress);
+  return result;
+}
+
+}  // namespace panonav

@@ -1,0 +1,100 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "experiments/reproduction.hpp"
+#include "experiments/runs/tracking_filter.hpp"
+#include "experiments/runs/tracking_run.hpp"
+#include "panonav/core/executor.hpp"
+#include "reporting/plot.hpp"
+
+namespace panonav {
+
+// What the experiments of [M03] share.
+
+/// Side of the references' grid in the office, and the way between two images.
+inline constexpr double m03_spacing_m = 0.25;
+/// Runs that are not localised within so many images, or not at all, count as this many.
+inline constexpr int m03_most_images = 15;
+/// A pose that is off by more is plainly wrong.
+inline constexpr double m03_wrong_m = 1.0;
+
+/// Runs in one place.
+struct RunSet {
+  std::shared_ptr<const TrackingPlace> place;
+  std::vector<TrackingRun> runs;
+  SingleImages single_images;  ///< of these runs
+};
+[[nodiscard]] RunSet make_run_set(std::shared_ptr<const TrackingPlace> place,
+                                  std::vector<TrackingRun> runs, Executor& executor);
+[[nodiscard]] std::size_t number_of_runs(std::span<const RunSet> sets);
+
+/// All runs of all sets through a filter, in their order. Runs of different sets have different
+/// seeds.
+[[nodiscard]] std::vector<TrackedRun> track_sets(std::span<const RunSet> sets,
+                                                 const FilterSetting& setting, std::uint64_t seed,
+                                                 Executor& executor);
+
+/// An office with everything that happens in it.
+struct OfficeRuns {
+  std::vector<MapLayer> furniture;
+  RunSet constant_heading;  ///< clean
+  RunSet hard;
+  RunSet kidnapped;  ///< hard; 10 images, then carried at least 1 m
+};
+inline constexpr std::size_t m03_images_before_kidnapping = 10;
+[[nodiscard]] OfficeRuns record_office(const TrackingReproductionOptions& options, int number,
+                                       Executor& executor);
+
+/// "one image alone: right 74 % (by dissimilarity only 54 %), within 25 cm 96 %".
+[[nodiscard]] std::string single_images_text(std::span<const RunSet> sets);
+
+/// Images until localised, each at most `m03_most_images`.
+[[nodiscard]] std::vector<double> capped_images(std::span<const TrackedRun> runs, double radius_m,
+                                                std::size_t first_step = 0);
+/// How many runs are localised within so many images.
+[[nodiscard]] std::size_t localised_within(std::span<const TrackedRun> runs, double radius_m,
+                                           int images, std::size_t first_step = 0);
+/// Error after so many images, counted from `first_step`; runs that ended before are left out.
+[[nodiscard]] std::vector<double> errors_after(std::span<const TrackedRun> runs, std::size_t images,
+                                               std::size_t first_step = 0);
+
+/// A row of a rate with its Wilson interval.
+void add_rate(Reproduction& result, const std::string& id, const std::string& what,
+              std::size_t successes, std::size_t trials,
+              std::optional<Target> target = std::nullopt);
+/// A row of a median with its bootstrap interval.
+void add_median(Reproduction& result, const std::string& id, const std::string& what,
+                const std::string& unit, std::span<const double> values,
+                std::optional<Target> target = std::nullopt,
+                std::optional<std::pair<double, double>> published = std::nullopt);
+/// The same of a mean.
+void add_mean(Reproduction& result, const std::string& id, const std::string& what,
+              const std::string& unit, std::span<const double> values);
+/// How often the filter says "localised" while it is wrong by more than `m03_wrong_m`, over all
+/// images.
+void add_confidently_wrong(Reproduction& result, const std::string& id, const std::string& what,
+                           std::span<const TrackedRun> runs,
+                           std::optional<Target> target = std::nullopt);
+
+[[nodiscard]] Target at_most(double value);
+[[nodiscard]] Target at_least(double value);
+
+/// A filter's particles over a run, as in [M03] figures 7 to 9: panels at the chosen steps.
+[[nodiscard]] std::vector<MapPlot> particle_maps(const TrackingPlace& place,
+                                                 std::span<const MapLayer> furniture,
+                                                 const TrackingRun& run,
+                                                 const FilterSetting& setting, std::uint64_t seed,
+                                                 std::span<const std::size_t> steps,
+                                                 const std::string& title);
+
+/// Median error over the images with the 5 % and 95 % quantiles as bars.
+[[nodiscard]] Series error_over_images(const std::string& label, std::span<const TrackedRun> runs,
+                                       std::size_t images, std::size_t first_step = 0);
+
+}  // namespace panonav

@@ -1,0 +1,171 @@
+// [M04] figure 9: areas that shrink with the number of components compared.
+
+#include <algorithm>
+#include <string>
+
+#include "experiments/m04/experiment.hpp"
+#include "experiments/m04/support.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/localisation/hierarchical.hpp"
+#include "reporting/plot.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr std::size_t kLevels = m04_components;
+// Views within 25 % of the best known dissimilarity stay candidates: wide enough that the place
+// itself is not dropped by noise at one component, narrow enough that areas shrink visibly. The
+// rows report what it costs and misses.
+constexpr double kTolerance = 0.25;
+constexpr double kWantedRadiusM = 0.5;
+
+MapPlot area_map(const VisualMemory& memory, const ReferenceAreas& areas, Point2 robot,
+                 const LocalisationLevel& level) {
+  MapPlot map{.title = std::to_string(level.components) +
+                       (level.components == 1 ? " component" : " components"),
+              .layers = {}};
+  MapLayer area{.label = "where it may be", .colour = "#888888"};
+  for (const Match& match : level.candidates)
+    area.filled_polygons.push_back(areas.cell(match.view));
+  MapLayer references{.label = "reference views", .colour = "#0072b2"};
+  for (const ViewId view : memory.views()) {
+    references.circles.push_back(memory.info(view).pose->position());
+  }
+  MapLayer truth{.label = "robot", .colour = "#d55e00", .crosses = {robot}};
+  map.layers = {area, references, truth};
+  return map;
+}
+
+bool contains(const std::vector<Match>& matches, ViewId view) {
+  return std::ranges::any_of(matches, [&](const Match& match) { return match.view == view; });
+}
+
+bool is_nested(const std::vector<LocalisationLevel>& levels) {
+  for (std::size_t i = 1; i < levels.size(); ++i) {
+    for (const Match& match : levels[i].candidates) {
+      if (!contains(levels[i - 1].candidates, match.view)) return false;
+    }
+    if (*levels[i].area_m2 > *levels[i - 1].area_m2 ||
+        levels[i].region->radius_m > levels[i - 1].region->radius_m) {
+      return false;
+    }
+  }
+  return true;
+}
+
+class HierarchicalAreas final : public Experiment {
+ public:
+  void add(const PlaceRecording& place, Executor& executor) override {
+    const auto signatures = signatures_of(place.references, m04_components, executor);
+    const VisualMemory memory = memory_of(place.references, signatures);
+    const ReferenceAreas areas(memory);
+    for (const PlacedView& query : place.queries) {
+      const Point2 robot = query.pose.position();
+      const auto packed =
+          pack(compute_signature(query.panorama, m04_components), memory.full_scale());
+      const auto levels = localise_hierarchically(memory, areas, packed, {.tolerance = kTolerance});
+      const ViewId nearest = memory.views()[place.nearest_reference(robot)];
+      ++trials_;
+      nested_ += is_nested(levels) ? 1 : 0;
+      for (std::size_t m = 0; m < levels.size(); ++m) {
+        areas_m2_[m].push_back(*levels[m].area_m2);
+        holding_[m] += contains(levels[m].candidates, nearest) ? 1 : 0;
+      }
+      const auto coarse = localise_hierarchically(
+          memory, areas, packed, {.radius_m = kWantedRadiusM, .tolerance = kTolerance});
+      components_needed_.push_back(coarse.back().components);
+      const std::size_t scan = memory.size() * memory.shape().size();
+      bytes_shares_.push_back(static_cast<double>(coarse.back().bytes_read) /
+                              static_cast<double>(scan));
+      if (shown_.empty()) {
+        for (const std::size_t m : {0U, 2U, 5U, 14U}) {
+          shown_.push_back(area_map(memory, areas, robot, levels.at(m)));
+        }
+      }
+    }
+  }
+
+  void report(const std::filesystem::path& folder, Reproduction& result) const override {
+    require(trials_ >= 1, "queries", 0.0, ">= 1");
+    write_plot(folder / "fig09_hierarchical_areas.png", shown_, 2);
+    result.pictures.push_back({"fig09_hierarchical_areas.png",
+                               "With more components the area where the robot may be shrinks "
+                               "around it ([M04] figure 9)."});
+    LinePlot curve{.title = "Area where the robot may be, by number of components",
+                   .x_label = "number of components compared",
+                   .y_label = "area [m^2]",
+                   .series = {Series{.label = "median of all queries"}}};
+    for (std::size_t m = 0; m < kLevels; ++m) {
+      const auto interval = median_interval(areas_m2_[m], 1);
+      curve.series[0].x.push_back(static_cast<double>(m + 1));
+      curve.series[0].y.push_back(median(areas_m2_[m]));
+      curve.series[0].y_low.push_back(interval.first);
+      curve.series[0].y_high.push_back(interval.second);
+    }
+    write_plot(folder / "fig09_area_curve.png", curve);
+    result.pictures.push_back(
+        {"fig09_area_curve.png", "The median area over all queries and scenes."});
+    for (const std::size_t m : {std::size_t{1}, std::size_t{3}, kLevels}) {
+      const std::string text = std::to_string(m);
+      add_median("area_" + text,
+                 "figure 9: area where the robot may be after " + text +
+                     (m == 1 ? " component (median)" : " components (median)"),
+                 "m^2", areas_m2_[m - 1], result);
+      const Proportion holds = success_rate(holding_[m - 1], trials_);
+      result.rows.push_back(
+          {.id = "m04.fig9.holds_truth_" + text,
+           .what = "figure 9: the area holds the cell of the nearest reference, " + text +
+                   (m == 1 ? " component" : " components"),
+           .published = std::nullopt,
+           .ours = holds.value,
+           .interval = interval_of(holds),
+           .unit = "",
+           .target = std::nullopt});
+    }
+    const Proportion nested = success_rate(nested_, trials_);
+    result.rows.push_back({.id = "m04.fig9.nested",
+                           .what = "figure 9: queries whose areas only ever shrink, each within "
+                                   "the one before",
+                           .published = std::pair{1.0, 1.0},
+                           .ours = nested.value,
+                           .interval = interval_of(nested),
+                           .unit = "",
+                           .target = Target{Comparison::at_least, 1.0}});
+    add_median("components_for_50_cm",
+               "figure 9: components compared until the place is known to 0.5 m (median)", "",
+               components_needed_, result);
+    add_median("bytes_for_50_cm",
+               "figure 9: bytes read until then, as a share of all magnitudes of the memory "
+               "(median)",
+               "", bytes_shares_, result);
+  }
+
+ private:
+  static void add_median(const std::string& id, std::string what, std::string unit,
+                         const std::vector<double>& values, Reproduction& result) {
+    result.rows.push_back({.id = "m04.fig9." + id,
+                           .what = std::move(what),
+                           .published = std::nullopt,
+                           .ours = median(values),
+                           .interval = median_interval(values, 1),
+                           .unit = std::move(unit),
+                           .target = std::nullopt});
+  }
+
+  std::size_t trials_ = 0;
+  std::size_t nested_ = 0;
+  std::array<std::vector<double>, kLevels> areas_m2_;
+  std::array<std::size_t, kLevels> holding_{};
+  std::vector<double> components_needed_;
+  std::vector<double> bytes_shares_;
+  std::vector<MapPlot> shown_;
+};
+
+}  // namespace
+
+std::unique_ptr<Experiment> hierarchical_areas_experiment() {
+  return std::make_unique<HierarchicalAreas>();
+}
+
+}  // namespace panonav

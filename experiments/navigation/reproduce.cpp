@@ -1,0 +1,46 @@
+#include <filesystem>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "experiments/navigation/experiments.hpp"
+#include "experiments/reproduction.hpp"
+#include "experiments/reproduction_stages.hpp"
+#include "panonav/core/error.hpp"
+
+namespace panonav {
+
+NavigationReproductionOptions quick_run(NavigationReproductionOptions options) {
+  options.scenes = 2;
+  options.runs = 2;
+  return options;
+}
+
+Reproduction reproduce_navigation(const NavigationReproductionOptions& options, Executor& executor,
+                                  const ReproductionProgress& progress) {
+  require(options.scenes >= 2, "scenes", options.scenes, ">= 2");
+  require(options.runs >= options.scenes, "runs", options.runs, ">= scenes");
+  std::error_code error;
+  std::filesystem::create_directories(options.out, error);
+  if (error) throw FileError(options.out.string(), "cannot be made: " + error.message());
+  Reproduction result;
+  std::vector<ReproductionStage> stages;
+  std::vector<std::string> drives{"loop", "corridor"};
+  for (const std::string world : {"small_warehouse", "small_house"}) {
+    if (!options.data.empty() && std::filesystem::is_directory(options.data / "scenes" / world)) {
+      drives.push_back(world);
+    }
+  }
+  for (const std::string& scene : drives) {
+    stages.push_back({"missions in " + scene, 6.0,
+                      [&, scene] { reproduce_drive_missions(options, scene, executor, result); }});
+  }
+  stages.push_back({"tours", 4.0, [&] { reproduce_tours(options, executor, result); }});
+  stages.push_back({"routes", 3.0, [&] { reproduce_route_missions(options, executor, result); }});
+  stages.push_back(
+      {"blocked passages", 2.0, [&] { reproduce_blocked_missions(options, executor, result); }});
+  run_stages(stages, progress);
+  return result;
+}
+
+}  // namespace panonav

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+
+#include "experiments/reproduction.hpp"
+
+namespace panonav {
+
+/// A part of the experiments of a paper.
+struct ReproductionStage {
+  std::string name;
+  double cost = 1.0;  ///< relative, for the progress
+  std::function<void()> run;
+};
+
+/// One after the other; tells how far the whole is by their costs.
+void run_stages(std::span<const ReproductionStage> stages, const ReproductionProgress& progress);
+
+}  // namespace panonav

@@ -1,0 +1,128 @@
+#include "experiments/runs/mission_picture.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "experiments/runs/surroundings.hpp"
+#include "panonav/navigation/area_planner.hpp"
+#include "panonav/navigation/direction_field.hpp"
+#include "reporting/plot.hpp"
+
+namespace panonav {
+
+namespace {
+
+bool is_known(const Pose2& pose) {
+  return std::isfinite(pose.x_m) && std::isfinite(pose.y_m);
+}
+
+Point2 ahead(Point2 from, double direction_rad, double distance_m) {
+  return {from.x_m + distance_m * std::cos(direction_rad),
+          from.y_m + distance_m * std::sin(direction_rad)};
+}
+
+/// An arrow with its tail at `from`.
+std::vector<Point2> arrow(Point2 from, double direction_rad, double length_m) {
+  constexpr double barb_rad = std::numbers::pi - 0.5;
+  const Point2 tip = ahead(from, direction_rad, length_m);
+  return {from, tip, ahead(tip, direction_rad + barb_rad, 0.4 * length_m), tip,
+          ahead(tip, direction_rad - barb_rad, 0.4 * length_m)};
+}
+
+/// Each reference, and where it sends the robot.
+std::vector<MapLayer> field_layers(const RememberedPlace& remembered, const FieldOptions& options,
+                                   ViewId goal) {
+  constexpr double share_of_spacing = 0.55;
+  MapLayer references{.label = "references", .colour = "#1f77b4"};
+  MapLayer arrows{.label = "their directions to the goal", .colour = "#8fc1e3"};
+  const auto field = direction_field(remembered.graph, goal, options);
+  for (std::size_t i = 0; i < field.size(); ++i) {
+    const Pose2& pose = remembered.truth[i];
+    if (!is_known(pose)) continue;
+    references.dots.push_back(pose.position());
+    if (!field[i].direction_rad || !std::isfinite(pose.heading_rad)) continue;
+    arrows.lines.push_back(arrow(pose.position(), pose.heading_rad + *field[i].direction_rad,
+                                 share_of_spacing * remembered.spacing_m));
+  }
+  return {arrows, references};
+}
+
+/// Things around, but for frames that the robot can drive through: their outlines would bar doors.
+std::vector<MapLayer> things_layers(const MissionPlace& place) {
+  std::vector<MapLayer> layers = furniture_layers(place.scene);
+  for (MapLayer& layer : layers) {
+    std::erase_if(layer.filled_polygons, [&](const std::vector<Point2>& corners) {
+      const Point2 middle{0.5 * (corners[0].x_m + corners[2].x_m),
+                          0.5 * (corners[0].y_m + corners[2].y_m)};
+      const FreeSpace& space = *place.free_space;
+      // Far trees of a garden would make its floor a spot.
+      constexpr double around_m = 3.0;
+      const bool is_far =
+          middle.x_m < space.low().x_m - around_m || middle.y_m < space.low().y_m - around_m ||
+          middle.x_m > space.high().x_m + around_m || middle.y_m > space.high().y_m + around_m;
+      return is_far || space.is_free(middle);
+    });
+  }
+  return layers;
+}
+
+/// Over the references, from that which the robot was nearest to at first.
+MapLayer planned_layer(const RememberedPlace& remembered, const PlannerOptions& options,
+                       ViewId goal, const MissionRun& run) {
+  MapLayer layer{.label = "way planned", .colour = "#e69f00"};
+  const auto known = std::ranges::find_if(
+      run.decisions, [](const auto& look) { return look.nearest.has_value(); });
+  if (known == run.decisions.end()) return layer;
+  AreaPlanner planner(remembered.graph, options);
+  planner.set_goal(goal);
+  std::vector<Point2> way;
+  for (const std::size_t node : planner.planned_way(*remembered.graph.node_of(*known->nearest))) {
+    if (is_known(remembered.truth[node])) way.push_back(remembered.truth[node].position());
+  }
+  if (way.size() > 1) layer.lines.push_back(std::move(way));
+  return layer;
+}
+
+MapLayer driven_layer(const MissionRun& run) {
+  MapLayer layer{.label = "way driven", .colour = "#d62728", .lines = {{}}};
+  for (std::size_t i = 0; i < run.path.size(); ++i) {
+    layer.lines.back().push_back(run.path[i].position());
+    if (run.carried_at == i) layer.lines.emplace_back();
+  }
+  return layer;
+}
+
+}  // namespace
+
+void write_mission_picture(const std::filesystem::path& path, const std::string& title,
+                           const MissionPlace& place, const RememberedPlace& remembered,
+                           const PlannerOptions& options, ViewId goal, const MissionRun& run) {
+  // Fine enough for a table's leg in a room, coarse enough for a hall.
+  constexpr double dots_a_side = 150.0;
+  const FreeSpace& space = *place.free_space;
+  const double side_m =
+      std::max(space.high().x_m - space.low().x_m, space.high().y_m - space.low().y_m);
+  MapPlot plot{.title = title, .layers = things_layers(place)};
+  plot.layers.push_back(obstacle_layer(space, space.low(), space.high(), side_m / dots_a_side));
+  for (MapLayer& layer : field_layers(remembered, options.field, goal)) {
+    plot.layers.push_back(std::move(layer));
+  }
+  plot.layers.push_back(planned_layer(remembered, options, goal, run));
+  plot.layers.push_back(driven_layer(run));
+  plot.layers.push_back(
+      {.label = "start", .colour = "#009e73", .squares = {run.path.front().position()}});
+  if (run.carried_at) {
+    plot.layers.push_back({.label = "carried here",
+                           .colour = "#cc79a7",
+                           .squares = {run.path.at(*run.carried_at + 1).position()}});
+  }
+  const Pose2& at_goal = remembered.truth[*remembered.graph.node_of(goal)];
+  if (is_known(at_goal)) {
+    plot.layers.push_back({.label = "goal", .colour = "#000000", .crosses = {at_goal.position()}});
+  }
+  write_plot(path, plot);
+}
+
+}  // namespace panonav

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "experiments/runs/place_recording.hpp"
+#include "panonav/core/executor.hpp"
+#include "panonav/core/statistics.hpp"
+#include "panonav/localisation/localiser.hpp"
+#include "panonav/panorama/preprocessing.hpp"
+
+namespace panonav {
+
+/// What differs between memorising and asking.
+struct PlaceCondition {
+  std::string name;
+  SensorOptions sensor;
+  double tilt_rad = 0.0;  ///< the robot leans by this much, in another direction at each place
+};
+
+/// As memorised; light 30 % less and 30 % more, with a tenth of the columns hidden; 5 degrees of
+/// tilt.
+[[nodiscard]] std::vector<PlaceCondition> place_conditions();
+
+/// A recorded place in a memory, with everything that answers queries, all as the command's
+/// defaults have it. Neither copied nor moved: the localiser looks at the memory.
+class RememberedPlace {
+ public:
+  RememberedPlace(const PlaceRecording& place, Executor& executor);
+  RememberedPlace(const RememberedPlace&) = delete;
+  RememberedPlace& operator=(const RememberedPlace&) = delete;
+
+  [[nodiscard]] const VisualMemory& memory() const noexcept { return memory_; }
+  [[nodiscard]] const Localiser& localiser() const noexcept { return localiser_; }
+  [[nodiscard]] Localisation ask(const Panorama& view) const;
+
+ private:
+  VisualMemory memory_;
+  Localiser localiser_;
+};
+
+/// How one condition went.
+struct PlaceResult {
+  std::string condition;
+  Proportion nearest;               ///< the best match is the nearest grid place
+  Proportion nearest_or_next;       ///< or one of its eight neighbours on the grid
+  Proportion known;                 ///< taken for a place of the memory
+  double heading_median_rad = 0.0;  ///< absolute error by the best match, over all queries
+  double heading_p95_rad = 0.0;
+  double position_median_m = 0.0;  ///< error of the interpolated position, where the place is known
+  Proportion inside;               ///< of those, within the stated 95 % radius
+};
+
+/// Memorises the references of the place and asks for the queries' poses, in all conditions. Throws
+/// what Renderer throws.
+[[nodiscard]] std::vector<PlaceResult> run_place_experiment(
+    const PlaceRecording& place, const std::vector<PlaceCondition>& conditions, Executor& executor);
+
+/// Queries of one place asked of the memory of another, or of its own.
+struct RecognitionRate {
+  std::string memory;
+  std::string queries;
+  Proportion known;
+};
+
+/// Each place's memory is asked for the queries of all places. Rates of the same place come first.
+[[nodiscard]] std::vector<RecognitionRate> recognition_rates(
+    const std::vector<PlaceRecording>& places, Executor& executor);
+
+}  // namespace panonav

@@ -1,0 +1,250 @@
+// Runs home in Gazebo worlds and built-in scenes.
+
+#include "experiments/s06/worlds.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "experiments/m03/support.hpp"
+#include "experiments/runs/surroundings.hpp"
+#include "panonav/core/statistics.hpp"
+#include "panonav/geometry/positions.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav/simulation/load_gazebo.hpp"
+#include "panonav/simulation/scenes.hpp"
+#include "reporting/plot.hpp"
+
+namespace panonav {
+
+namespace {
+
+std::string centimetres(double metres) {
+  return std::to_string(static_cast<int>(std::lround(100.0 * metres))) + " cm";
+}
+
+std::size_t successes(const std::vector<HomingRun>& runs) {
+  return static_cast<std::size_t>(std::count_if(runs.begin(), runs.end(), [](const HomingRun& run) {
+    return run.succeeds(homing_success_m);
+  }));
+}
+
+MapPlot map_of_failure(const HomingPlace& place, const HomingRun& run, std::size_t number) {
+  constexpr double margin_m = 0.6;
+  Point2 low = run.goal.position();
+  Point2 high = low;
+  for (const Pose2& pose : run.path) {
+    low = {std::min(low.x_m, pose.x_m), std::min(low.y_m, pose.y_m)};
+    high = {std::max(high.x_m, pose.x_m), std::max(high.y_m, pose.y_m)};
+  }
+  MapPlot map;
+  map.title = "run " + std::to_string(number) + ": " + reason_of_failure(run);
+  map.layers.push_back(obstacle_layer(*place.free_space, {low.x_m - margin_m, low.y_m - margin_m},
+                                      {high.x_m + margin_m, high.y_m + margin_m}, 0.05));
+  map.layers.push_back({.label = "way", .colour = "#d62728", .lines = {positions_of(run.path)}});
+  map.layers.push_back(
+      {.label = "start", .colour = "#1f77b4", .circles = {run.path.front().position()}});
+  map.layers.push_back(
+      {.label = "end", .colour = "#d62728", .crosses = {run.path.back().position()}});
+  map.layers.push_back({.label = "goal", .colour = "#2ca02c", .squares = {run.goal.position()}});
+  return map;
+}
+
+MapPlot map_of_all(const HomingPlace& place, const std::vector<HomingRun>& runs,
+                   const std::string& name) {
+  MapPlot map;
+  map.title = "Runs home in " + name;
+  map.layers.push_back(
+      obstacle_layer(*place.free_space, place.free_space->low(), place.free_space->high(), 0.1));
+  MapLayer reached{.label = "reached home", .colour = "#2ca02c"};
+  MapLayer failed{.label = "did not", .colour = "#d62728"};
+  MapLayer goals{.label = "goals", .colour = "#000000"};
+  for (const HomingRun& run : runs) {
+    (run.succeeds(homing_success_m) ? reached : failed).lines.push_back(positions_of(run.path));
+    goals.squares.push_back(run.goal.position());
+  }
+  map.layers.push_back(std::move(reached));
+  map.layers.push_back(std::move(failed));
+  map.layers.push_back(std::move(goals));
+  return map;
+}
+
+// How often a robot that ended elsewhere knows it.
+void add_noticed(Reproduction& result, const std::string& id, const std::string& what,
+                 const std::vector<HomingRun>& runs) {
+  std::size_t elsewhere = 0;
+  std::size_t noticed = 0;
+  for (const HomingRun& run : runs) {
+    if (run.end_distance_m <= homing_success_m) continue;
+    ++elsewhere;
+    noticed += run.end != HomingRunEnd::arrived ? 1 : 0;
+  }
+  if (elsewhere == 0) return;
+  add_rate(result, id,
+           what +
+               ": ends farther than 10 cm from home that the robot knows not to be "
+               "home",
+           noticed, elsewhere);
+}
+
+struct Ends {
+  std::vector<double> at_home;
+  std::vector<double> elsewhere;
+  void add(const std::vector<HomingRun>& runs) {
+    for (const HomingRun& run : runs) {
+      (run.end_distance_m <= homing_success_m ? at_home : elsewhere).push_back(run.end_difference);
+    }
+  }
+};
+
+}  // namespace
+
+std::string reason_of_failure(const HomingRun& run) {
+  if (run.succeeds(homing_success_m)) return "";
+  const std::string where = centimetres(run.end_distance_m) + " off";
+  switch (run.end) {
+    case HomingRunEnd::blocked:
+      return "an obstacle stopped it, " + where;
+    case HomingRunEnd::exhausted:
+      return (run.met_obstacle ? "found no way round an obstacle, " : "does not come to rest, ") +
+             where;
+    case HomingRunEnd::wrong_place:
+      return (run.met_obstacle ? "led off by an obstacle into another minimum and says so, "
+                               : "another local minimum and says so, ") +
+             where;
+    case HomingRunEnd::arrived:
+      return (run.end_distance_m <= 3.0 * homing_success_m ? "stopped short, "
+                                                           : "takes a wrong place for home, ") +
+             where;
+  }
+  return where;
+}
+
+void reproduce_homing_in_world(const std::filesystem::path& data, const std::string& name,
+                               const std::filesystem::path& out, std::uint64_t seed, int starts,
+                               Executor& executor, Reproduction& reproduction) {
+  GazeboOptions reading;
+  reading.textures.read = [](const std::filesystem::path& path) { return read_image(path); };
+  const HomingPlace place = make_homing_place(
+      load_gazebo(data / "scenes" / name / "worlds" / (name + ".world"), reading), {}, executor);
+  const auto tasks = random_homing_tasks(place, starts, homing_start_radius_m, seed);
+  const auto runs = run_home(place, tasks, {}, seed, executor);
+
+  const std::string id = "s06.world." + name;
+  const std::string what = name + ", starts within 1.5 m";
+  add_rate(reproduction, id + ".success", what + ": home within 10 cm", successes(runs),
+           runs.size(), at_least(0.9));
+  std::vector<HomingRun> in_sight;
+  std::vector<double> steps;
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    if (place.free_space->is_free_between(tasks[i].start.position(), tasks[i].goal.position())) {
+      in_sight.push_back(runs[i]);
+    }
+    steps.push_back(static_cast<double>(runs[i].path.size() - 1));
+  }
+  if (!in_sight.empty()) {
+    add_rate(reproduction, id + ".success_in_sight",
+             what + ", the straight way free: home within 10 cm", successes(in_sight),
+             in_sight.size());
+  }
+  add_noticed(reproduction, id + ".noticed", what, runs);
+  add_median(reproduction, id + ".steps", what + ": steps of a run", "steps", steps);
+
+  const auto add_other = [&](const std::string& key, const std::string& text,
+                             const HomingRunOptions& options) {
+    add_rate(reproduction, id + key, what + ", " + text + ": home within 10 cm",
+             successes(run_home(place, tasks, options, seed, executor)), runs.size());
+  };
+  HomingRunOptions published;
+  published.vector = published_homing(5);
+  published.pursuit.strategy = PursuitStrategy::steady;
+  add_other(".published", "the published rule with K = 5", published);
+  published.pursuit.strategy = PursuitStrategy::coarse_to_fine;
+  add_other(".published_coarse_to_fine", "the published rule with K = 2, 4, 10", published);
+  HomingRunOptions holonomic;
+  holonomic.motion.drive = DriveKind::holonomic;
+  add_other(".holonomic", "a holonomic robot", holonomic);
+  HomingRunOptions stopping;
+  stopping.obstacles = ObstacleRule::stop;
+  add_other(".stopped_by_obstacles", "the first obstacle ends a run", stopping);
+
+  const std::string prefix = "s06_world_" + name;
+  write_plot(out / (prefix + ".png"), map_of_all(place, runs, name));
+  reproduction.pictures.push_back(
+      {prefix + ".png", "Homing runs in " + name + " from starts within 1.5 m of random goals"});
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    if (runs[i].succeeds(homing_success_m)) continue;
+    const MapPlot map = map_of_failure(place, runs[i], i);
+    const std::string file = prefix + "_failure_" + std::to_string(i) + ".png";
+    write_plot(out / file, map);
+    reproduction.pictures.push_back({file, name + ", " + map.title});
+  }
+}
+
+void reproduce_homing_in_scenes(std::uint64_t seed, int starts, Executor& executor,
+                                Reproduction& reproduction) {
+  constexpr std::array<const char*, 5> scenes{"office", "lab", "hall", "loop", "garden"};
+  constexpr double tilt_rad = 3.0 * std::numbers::pi / 180.0;
+  constexpr std::uint64_t seeds_each = 2;
+  Ends ends;
+  for (const char* const name : scenes) {
+    std::vector<HomingRun> flat;
+    std::vector<HomingRun> leaning;
+    std::vector<HomingRun> sideways;
+    for (std::uint64_t variant = 0; variant < seeds_each; ++variant) {
+      const std::uint64_t number = seed + variant;
+      HomingPlace place = make_homing_place(make_scene(name, {.seed = number}), {}, executor);
+      const auto tasks = random_homing_tasks(place, starts, homing_start_radius_m, number);
+      const auto append = [&](std::vector<HomingRun>& all, const HomingRunOptions& options) {
+        for (HomingRun& run : run_home(place, tasks, options, number, executor)) {
+          all.push_back(std::move(run));
+        }
+      };
+      append(flat, {});
+      HomingRunOptions holonomic;
+      holonomic.motion.drive = DriveKind::holonomic;
+      append(sideways, holonomic);
+      place.camera.frame.tilt_rad = tilt_rad;
+      append(leaning, {});
+    }
+    const std::string id = std::string("s06.scene.") + name;
+    const std::string what = std::string(name) + ", starts within 1.5 m";
+    add_rate(reproduction, id + ".success", what + ": home within 10 cm", successes(flat),
+             flat.size());
+    add_rate(reproduction, id + ".holonomic", what + ", a holonomic robot: home within 10 cm",
+             successes(sideways), sideways.size());
+    add_rate(reproduction, id + ".tilt",
+             what + ", leaning by 3 degrees in a random direction at each view: home within 10 cm",
+             successes(leaning), leaning.size());
+    std::vector<double> distances_m;
+    for (const HomingRun& run : leaning) distances_m.push_back(run.end_distance_m);
+    add_median(reproduction, id + ".tilt_error", what + ", leaning: distance from home at the end",
+               "m", distances_m);
+    ends.add(flat);
+  }
+  if (!ends.at_home.empty()) {
+    reproduction.rows.push_back({.id = "s06.difference.at_home",
+                                 .what = "difference of the views where a run ends within 10 cm of "
+                                         "home: 99 % quantile of " +
+                                         std::to_string(ends.at_home.size()),
+                                 .published = std::nullopt,
+                                 .ours = quantile(ends.at_home, 0.99),
+                                 .interval = std::nullopt,
+                                 .unit = "",
+                                 .target = std::nullopt});
+  }
+  if (!ends.elsewhere.empty()) {
+    reproduction.rows.push_back({.id = "s06.difference.elsewhere",
+                                 .what = "the same farther from home: 1 % quantile of " +
+                                         std::to_string(ends.elsewhere.size()),
+                                 .published = std::nullopt,
+                                 .ours = quantile(ends.elsewhere, 0.01),
+                                 .interval = std::nullopt,
+                                 .unit = "",
+                                 .target = std::nullopt});
+  }
+}
+
+}  // namespace panonav

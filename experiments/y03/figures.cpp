@@ -1,0 +1,188 @@
+#include "experiments/y03/figures.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/positions.hpp"
+#include "panonav/route/route_crossing.hpp"
+#include "reporting/picture_plot.hpp"
+#include "reporting/plot.hpp"
+
+namespace panonav {
+
+namespace {
+
+MapLayer line_layer(const std::string& label, const std::string& colour,
+                    const std::vector<Pose2>& poses) {
+  return {.label = label, .colour = colour, .lines = {positions_of(poses)}};
+}
+
+std::vector<Pose2> in_path_frame(const LabRoute& lab, const std::vector<Pose2>& poses) {
+  std::vector<Pose2> result;
+  for (const Pose2& pose : poses) result.push_back(inverse(lab.world_from_path) * pose);
+  return result;
+}
+
+MapLayer path_layer(const LabRoute& lab) {
+  return line_layer("memorised path", "#999999",
+                    in_path_frame(lab, {lab.route.poses().begin(), lab.route.poses().end()}));
+}
+
+// Column of a line shown at place i from the left: clockwise, forward in the middle.
+std::size_t shown_column(std::size_t i, std::size_t columns) {
+  return (2 * columns + columns / 2 - i) % columns;
+}
+
+PicturePlot panorama_plot(const LabRoute& lab, const std::string& title) {
+  const auto columns = static_cast<std::size_t>(lab.route.columns());
+  PicturePlot plot{.title = title,
+                   .x_label = "azimuth from straight ahead [degrees], left positive",
+                   .y_label = "way along the path [m]",
+                   .x_range = {180.0, -180.0},
+                   .y_range = {0.0, lab.route.length_m()},
+                   .columns = lab.route.columns(),
+                   .rows = static_cast<int>(lab.route.size()),
+                   .x_tick = 45.0};
+  for (std::size_t row = 0; row < lab.route.size(); ++row) {
+    const auto line = lab.route.line(row);
+    for (std::size_t i = 0; i < columns; ++i) {
+      plot.values.push_back(static_cast<float>(line[shown_column(i, columns)]));
+    }
+  }
+  // From black to white, for people.
+  const float most = std::max(1.0F, std::ranges::max(plot.values));
+  for (float& value : plot.values) value /= most;
+  return plot;
+}
+
+}  // namespace
+
+void draw_route_panorama(const LabRoute& lab, const std::filesystem::path& folder,
+                         Reproduction& result) {
+  const std::string file = "figure_03_route_panorama.png";
+  write_plot(folder / file,
+             panorama_plot(lab, "Route panorama: each row is the horizon at one place"));
+  result.pictures.push_back(
+      {file,
+       "The route panorama of the straight path [Y03 figure 3], the start at the bottom. "
+       "Things ahead and behind keep their place, things beside the path wander by."});
+}
+
+void draw_virtual_view(const LabRoute& lab, const LineDrive& beside,
+                       const std::filesystem::path& folder, Reproduction& result) {
+  const std::size_t middle = beside.truth.size() / 2;
+  const Pose2& pose = beside.truth[middle];
+  const Pose2 in_path = inverse(lab.world_from_path) * pose;
+  const auto columns = static_cast<std::size_t>(lab.route.columns());
+  std::vector<RouteCrossing> crossings(columns);
+  cross_route(lab.route.poses(), 0, pose.position(), equal_directions(columns), crossings);
+  PicturePlot plot =
+      panorama_plot(lab, "Light blue: where a viewpoint beside the path finds what it sees");
+  // Directions in the world; the path is straight, so that its heading turns all lines alike.
+  const double turn =
+      lab.world_from_path.heading_rad * static_cast<double>(columns) / radians(360.0);
+  const auto rows = static_cast<int>(lab.route.size());
+  for (std::size_t i = 0; i < columns; ++i) {
+    const auto column = static_cast<std::size_t>(std::lround(
+        static_cast<double>(shown_column(i, columns)) + turn + 2.0 * static_cast<double>(columns)));
+    const RouteCrossing& crossing = crossings[column % columns];
+    if (crossing.along < 0.0F) continue;
+    const auto row = static_cast<int>(std::lround(crossing.along));
+    for (int r = std::max(0, row - 1); r <= std::min(rows - 1, row + 1); ++r) {
+      plot.values[static_cast<std::size_t>(r) * columns + i] =
+          std::numeric_limits<float>::quiet_NaN();
+    }
+  }
+  const std::string where = std::to_string(std::lround(100.0 * in_path.y_m)) +
+                            " cm to the left of the path, " +
+                            std::to_string(std::lround(100.0 * in_path.x_m)) + " cm along it";
+  write_plot(folder / "figure_05_curve.png", plot);
+  result.pictures.push_back(
+      {"figure_05_curve.png",
+       "Eq. 5 for a viewpoint " + where +
+           " [Y03 figure 5]: along this curve the route panorama holds what is seen there."});
+  const auto shown = RouteLines(lab.route).synthesise(pose);
+  Series truth{.label = "seen there", .style = SeriesStyle::lines};
+  Series made{.label = "synthesised from the route panorama", .style = SeriesStyle::points};
+  for (std::size_t i = 0; i < columns; ++i) {
+    const std::size_t c = shown_column(i, columns);
+    const double azimuth = 180.0 - 360.0 * static_cast<double>(i) / static_cast<double>(columns);
+    truth.x.push_back(azimuth);
+    truth.y.push_back(static_cast<double>(beside.lines[middle][c]));
+    if (!std::isfinite(shown[c])) continue;
+    made.x.push_back(azimuth);
+    made.y.push_back(static_cast<double>(shown[c]));
+  }
+  write_plot(folder / "figure_05_lines.png",
+             LinePlot{.title = "The horizon " + where,
+                      .x_label = "azimuth from straight ahead [degrees], left positive",
+                      .y_label = "brightness",
+                      .series = {truth, made},
+                      .x_range = std::pair(-180.0, 180.0)});
+  result.pictures.push_back({"figure_05_lines.png",
+                             "The line synthesised at that viewpoint, where no picture was taken, "
+                             "and the one that a camera sees there. Ahead and behind, the lines "
+                             "of sight do not cross the path."});
+}
+
+void draw_drives(const LabRoute& lab, const LocalisedDrives& drives,
+                 const std::filesystem::path& folder, Reproduction& result) {
+  const auto panel = [&](const std::string& title, const LineDrive& drive, const DriveErrors& fit,
+                         const DriveErrors& contours) {
+    return MapPlot{
+        title,
+        {path_layer(lab), line_layer("true", "#000000", in_path_frame(lab, drive.truth)),
+         line_layer("contours, as published", "#d95f02", in_path_frame(lab, contours.poses)),
+         line_layer("direct fit", "#1f77b4", in_path_frame(lab, fit.poses))}};
+  };
+  const std::string file = "figure_09_drives.png";
+  write_plot(folder / file,
+             {panel("scene as memorised", lab.across, drives.fit, drives.contours),
+              panel("things moved, a tenth of what is seen", lab.across_changed, drives.changed_fit,
+                    drives.changed_contours)},
+             1);
+  result.pictures.push_back(
+      {file,
+       "A robot crosses the memorised path at 30 degrees [Y03 figure 9]; metres. The direct fit "
+       "lies on the true drive."});
+  const auto series = [](const std::string& label, const DriveErrors& errors) {
+    Series line{.label = label, .style = SeriesStyle::lines};
+    for (std::size_t i = 0; i < errors.position_m.size(); ++i) {
+      line.x.push_back(static_cast<double>(i));
+      line.y.push_back(100.0 * errors.position_m[i]);
+    }
+    return line;
+  };
+  const std::string errors_file = "figure_09_errors.png";
+  write_plot(folder / errors_file,
+             LinePlot{.title = "How far off along these drives",
+                      .x_label = "image, 5 cm apart",
+                      .y_label = "error of the position [cm]",
+                      .series = {series("contours", drives.contours),
+                                 series("contours, things moved", drives.changed_contours),
+                                 series("direct fit", drives.fit),
+                                 series("direct fit, things moved", drives.changed_fit)}});
+  result.pictures.push_back({errors_file, "The errors of these drives, image by image."});
+}
+
+void draw_goal_run(const LabRoute& lab, const GoalRun& run, const std::filesystem::path& folder,
+                   Reproduction& result) {
+  MapLayer goals{.label = "start, sub-goal and goal", .colour = "#2ca02c"};
+  for (const Point2 point : goal_run_points()) goals.squares.push_back(point);
+  const std::string file = "figure_10_goal.png";
+  write_plot(folder / file,
+             MapPlot{"To a goal over a sub-goal off the path: metres",
+                     {path_layer(lab), line_layer("true", "#000000", in_path_frame(lab, run.truth)),
+                      line_layer("estimate", "#d62728", in_path_frame(lab, run.estimate)), goals}});
+  result.pictures.push_back(
+      {file,
+       "Closed loop under proportional control [Y03 figure 10]; the estimate lies on the true "
+       "drive."});
+}
+
+}  // namespace panonav

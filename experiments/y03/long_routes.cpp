@@ -1,0 +1,288 @@
+// Routes of 60 m repeated in closed loop, what they take in a file, and a real route.
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "experiments/m03/support.hpp"
+#include "experiments/runs/surroundings.hpp"
+#include "experiments/s06/support.hpp"
+#include "experiments/y03/experiments.hpp"
+#include "experiments/y03/routes.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/core/statistics.hpp"
+#include "panonav/geometry/positions.hpp"
+#include "panonav/io/dataset.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav/io/panorama_reader.hpp"
+#include "panonav/motion/headed_path.hpp"
+#include "panonav/route/horizon_line.hpp"
+#include "panonav/route/route_place.hpp"
+#include "panonav/route/route_tracker.hpp"
+#include "panonav/simulation/load_gazebo.hpp"
+#include "panonav/simulation/scenes.hpp"
+#include "panonav/storage/memory_file.hpp"
+#include "reporting/plot.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr double route_m = 60.0;
+// The way between lines that the paper counts its bytes for [Y03 section 2.2].
+constexpr double spacing_m = 0.1;
+constexpr int runs_each = 10;  // of a route, half of them back
+
+// One route and the robots that repeated it.
+struct RepeatedRoute {
+  std::vector<Pose2> way;
+  RoutePanorama panorama;
+  std::vector<RouteRun> runs;
+};
+
+RepeatedRoute repeat_one(const RouteScene& place, int runs, std::uint64_t seed,
+                         Executor& executor) {
+  RepeatedRoute repeated;
+  repeated.way = curved_route(place, route_m, spacing_m, seed);
+  repeated.panorama = record_route(place, repeated.way, Random(seed, 7).next(), executor);
+  const RouteTracker tracker(repeated.panorama);
+  repeated.runs.resize(static_cast<std::size_t>(runs));
+  executor.for_chunks(
+      repeated.runs.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
+        for (std::size_t i = begin; i < end; ++i) {
+          repeated.runs[i] =
+              repeat_route(place, tracker, {.back = i % 2 == 1}, Random(seed, 100 + i).next());
+        }
+      });
+  return repeated;
+}
+
+MapPlot map_of(const RouteScene& place, const RepeatedRoute& repeated) {
+  const FreeSpace& space = *place.free_space;
+  MapPlot map{.title = place.name + ": x and y in metres",
+              .layers = {obstacle_layer(space, space.low(), space.high(), 0.1)}};
+  map.layers.push_back(
+      {.label = "remembered route", .colour = "#000000", .lines = {positions_of(repeated.way)}});
+  MapLayer forward{.label = "driven forward", .colour = "#1f77b4"};
+  MapLayer back{.label = "driven back", .colour = "#2ca02c"};
+  MapLayer starts{.label = "starts, 0.3 m off", .colour = "#d62728"};
+  MapLayer lost{.label = "lost", .colour = "#d62728"};
+  for (std::size_t i = 0; i < repeated.runs.size(); ++i) {
+    const RouteRun& run = repeated.runs[i];
+    (i % 2 == 0 ? forward : back).lines.push_back(positions_of(run.truth));
+    starts.circles.push_back(run.truth.front().position());
+    if (!run.completes()) lost.crosses.push_back(run.truth.back().position());
+  }
+  for (MapLayer* layer : {&forward, &back, &starts, &lost}) map.layers.push_back(*layer);
+  return map;
+}
+
+void report_routes(const RouteReproductionOptions& options, const std::string& name,
+                   const RouteScene& first_place, const std::vector<RepeatedRoute>& routes,
+                   Reproduction& result) {
+  std::vector<double> lateral_cm;
+  std::vector<double> lateral_back_cm;
+  std::vector<double> worst_cm;
+  std::vector<double> fix_cm;
+  std::size_t completed = 0;
+  std::size_t runs = 0;
+  std::size_t lines = 0;
+  std::size_t off_route = 0;
+  std::size_t turned_aside = 0;
+  for (const RepeatedRoute& route : routes) {
+    for (std::size_t i = 0; i < route.runs.size(); ++i) {
+      const RouteRun& run = route.runs[i];
+      const double mean_cm = 100.0 * mean(run.lateral_m);
+      lateral_cm.push_back(mean_cm);
+      if (i % 2 == 1) lateral_back_cm.push_back(mean_cm);
+      worst_cm.push_back(100.0 * quantile(run.lateral_m, 0.95));
+      if (!run.position_m.empty()) fix_cm.push_back(100.0 * median(run.position_m));
+      completed += run.completes() ? 1 : 0;
+      lines += run.truth.size();
+      off_route += run.off_route;
+      turned_aside += run.turned_aside;
+      ++runs;
+    }
+  }
+  const std::string id = "y03.route." + name;
+  const std::string what = name + ", 60 m route repeated with wheels 5 % wrong, start 0.3 m off";
+  result.rows.push_back(
+      {.id = id + ".lateral",
+       .what = what + ": distance from the route, mean of " + std::to_string(runs) + " runs",
+       .ours = mean(lateral_cm),
+       .interval = mean_interval(lateral_cm, options.seed),
+       .unit = "cm",
+       .target = at_most(5.0)});
+  add_rate(result, id + ".completed", what + ": runs that reach the end, none lost", completed,
+           runs, at_least(1.0));
+  if (!lateral_back_cm.empty()) {
+    add_mean(result, id + ".lateral_back", what + ": distance from the route, runs back alone",
+             "cm", lateral_back_cm);
+  }
+  add_mean(result, id + ".lateral_95", what + ": distance that 95 % of a run keep within", "cm",
+           worst_cm);
+  if (!fix_cm.empty()) {
+    add_median(result, id + ".fix", what + ": error of a fix, median of a run", "cm", fix_cm);
+  }
+  add_rate(result, id + ".off_route", what + ": lines taken for not on this route", off_route,
+           lines);
+  add_rate(result, id + ".turned_aside", what + ": steps at which something was in the way",
+           turned_aside, lines);
+  const std::string file = "route_" + name + ".png";
+  write_plot(options.out / file, map_of(first_place, routes.front()));
+  result.pictures.push_back(
+      {file, "A route of 60 m through " + name +
+                 ", recorded once and repeated forward and back; the driven ways lie on it."});
+}
+
+// Sizes on the disk, with nothing left in the write-ahead log.
+std::uint64_t file_bytes(const std::filesystem::path& path) {
+  std::uint64_t bytes = std::filesystem::file_size(path);
+  const std::filesystem::path log = path.string() + "-wal";
+  if (std::filesystem::exists(log)) bytes += std::filesystem::file_size(log);
+  return bytes;
+}
+
+void measure_file(const RouteReproductionOptions& options, const std::vector<RepeatedRoute>& routes,
+                  Reproduction& result) {
+  const std::filesystem::path path = options.out / "routes.panonav";
+  std::filesystem::remove(path);
+  MemoryHeader header;
+  header.shape = {1, 1};
+  std::uint64_t empty = 0;
+  double length_m = 0.0;
+  std::uint64_t stored = 0;
+  {
+    MemoryFile file = MemoryFile::create(path, header);
+    // The first route makes the tables.
+    RoutePanorama none(routes.front().panorama.columns());
+    none.append({0.0, 0.0, 0.0}, routes.front().panorama.line(0));
+    static_cast<void>(file.append_route("none", none));
+  }
+  empty = file_bytes(path);
+  {
+    MemoryFile file = MemoryFile::open(path, Access::read_write);
+    for (std::size_t i = 0; i < routes.size(); ++i) {
+      const std::string name = "route " + std::to_string(i);
+      static_cast<void>(file.append_route(name, routes[i].panorama));
+      require(file.route(name) == routes[i].panorama, "route read back", 0.0, "the one written");
+      length_m += routes[i].panorama.length_m();
+      stored += file.route_bytes(name);
+    }
+  }
+  const std::uint64_t whole = file_bytes(path);
+  std::filesystem::remove(path);
+  const double megabytes_per_km = 1e-3 / length_m;
+  const std::string what = "memory of routes through loop, a line every 10 cm, ";
+  result.rows.push_back({.id = "y03.memory.file",
+                         .what = what + "by what a memory file grows, a kilometre",
+                         .published = std::pair(3.6, 3.6),
+                         .ours = megabytes_per_km * static_cast<double>(whole - empty),
+                         .unit = "MB",
+                         .target = at_most(3.6)});
+  report_figure(result, "y03.memory.packed", what + "packed lines and poses alone, a kilometre",
+                megabytes_per_km * static_cast<double>(stored), "MB");
+}
+
+int routes_of(const RouteReproductionOptions& options) {
+  return std::max(1, options.runs / runs_each);
+}
+
+}  // namespace
+
+void reproduce_loop_routes(const RouteReproductionOptions& options, Executor& executor,
+                           Reproduction& result) {
+  std::vector<RepeatedRoute> routes;
+  std::optional<RouteScene> first;
+  for (int i = 0; i < routes_of(options); ++i) {
+    const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
+    RouteScene place = make_route_scene(make_scene("loop", {.seed = seed}), "loop", executor);
+    routes.push_back(repeat_one(place, std::min(runs_each, options.runs), seed, executor));
+    if (!first) first = std::move(place);
+  }
+  report_routes(options, "loop", *first, routes, result);
+  measure_file(options, routes, result);
+}
+
+void reproduce_world_routes(const RouteReproductionOptions& options, const std::string& name,
+                            Executor& executor, Reproduction& result) {
+  GazeboOptions reading;
+  reading.textures.read = [](const std::filesystem::path& path) { return read_image(path); };
+  const RouteScene place = make_route_scene(
+      load_gazebo(options.data / "scenes" / name / "worlds" / (name + ".world"), reading), name,
+      executor);
+  std::vector<RepeatedRoute> routes;
+  for (int i = 0; i < routes_of(options); ++i) {
+    routes.push_back(repeat_one(place, std::min(runs_each, options.runs),
+                                options.seed + static_cast<std::uint64_t>(i), executor));
+  }
+  report_routes(options, name, place, routes, result);
+}
+
+void reproduce_real_route(const RouteReproductionOptions& options, Executor& executor,
+                          Reproduction& result) {
+  const Dataset dataset = read_dataset(options.data / "sussex_route");
+  const PanoramaReader reader(dataset.source, {});
+  std::vector<std::vector<float>> lines(dataset.entries.size());
+  executor.for_chunks(lines.size(), 8, [&](std::size_t begin, std::size_t end, std::size_t) {
+    for (std::size_t i = begin; i < end; ++i) {
+      lines[i] = horizon_line(reader.read(dataset.entries[i].path));
+    }
+  });
+  std::vector<Point2> places;
+  for (const DatasetEntry& entry : dataset.entries) {
+    if (!entry.pose) throw FileError((options.data / "sussex_route").string(), "has no positions");
+    places.push_back({entry.pose->x_m, entry.pose->y_m});
+  }
+  const std::vector<Pose2> way = headed_along_way(places);
+  constexpr std::size_t every = 10;
+  RoutePanorama route;
+  for (std::size_t i = 0; i < way.size(); i += every) {
+    static_cast<void>(route.append(way[i], std::span<const float>(lines[i])));
+  }
+  const RouteTracker tracker(route);
+  std::vector<std::optional<TrackedRouteFix>> found(way.size());
+  executor.for_chunks(way.size(), 8, [&](std::size_t begin, std::size_t end, std::size_t) {
+    for (std::size_t i = begin; i < end; ++i) {
+      if (i % every != 0) found[i] = tracker.search(lines[i]);
+    }
+  });
+  std::vector<double> along_cm;
+  std::vector<double> beside_cm;
+  std::size_t asked = 0;
+  MapLayer right{.label = "fixes", .colour = "#1f77b4"};
+  MapLayer remembered{.label = "remembered lines", .colour = "#000000"};
+  for (std::size_t i = 0; i < way.size(); ++i) {
+    if (i % every == 0) {
+      remembered.circles.push_back(places[i]);
+      continue;
+    }
+    ++asked;
+    if (!found[i]) continue;
+    const RoutePlace truth = place_on_route(route.poses(), places[i]);
+    along_cm.push_back(100.0 * std::abs(found[i]->along_m - truth.along_m));
+    beside_cm.push_back(100.0 * std::abs(found[i]->lateral_m - truth.lateral_m));
+    right.dots.push_back(found[i]->fix.pose.position());
+  }
+  const std::string what =
+      "sussex_route, outdoors, every 10th line remembered, the others each searched alone";
+  add_median(result, "y03.sussex.along", what + ": error along the route, median", "cm", along_cm,
+             at_most(3.0));
+  add_median(result, "y03.sussex.lateral", what + ": error beside the route, median", "cm",
+             beside_cm);
+  add_rate(result, "y03.sussex.found", what + ": found on the route", along_cm.size(), asked);
+  MapLayer driven{.label = "driven way", .colour = "#999999", .lines = {places}};
+  write_plot(options.out / "sussex_route.png", MapPlot{.title = "sussex_route: x and y in metres",
+                                                       .layers = {driven, right, remembered}});
+  result.pictures.push_back(
+      {"sussex_route.png",
+       "A real route outdoors: where each picture between the remembered lines "
+       "was found, without odometry."});
+}
+
+}  // namespace panonav

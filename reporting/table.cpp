@@ -1,0 +1,165 @@
+#include "reporting/table.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav {
+
+namespace {
+
+std::string_view symbol(Comparison comparison) {
+  return comparison == Comparison::at_most ? "<=" : ">=";
+}
+
+// Four significant digits: what a person compares.
+std::string shown(double value) {
+  if (!std::isfinite(value)) return "none";
+  std::array<char, 32> text{};
+  if (value == std::round(value) && std::abs(value) < 1e7) {
+    std::snprintf(text.data(), text.size(), "%.0f", value);
+  } else {
+    std::snprintf(text.data(), text.size(), "%.4g", value);
+  }
+  return text.data();
+}
+
+std::string shown(const std::pair<double, double>& range) {
+  return range.first == range.second ? shown(range.first)
+                                     : shown(range.first) + " .. " + shown(range.second);
+}
+
+// A vertical bar would end a cell of the table.
+std::string cell(std::string text) {
+  for (std::size_t i = text.find('|'); i != std::string::npos; i = text.find('|', i + 2)) {
+    text.insert(i, "\\");
+  }
+  return text;
+}
+
+}  // namespace
+
+bool ResultRow::holds() const {
+  if (!std::isfinite(ours)) return false;
+  if (!target) return true;
+  return target->comparison == Comparison::at_most ? ours <= target->value : ours >= target->value;
+}
+
+TargetCount count_targets(std::span<const ResultRow> rows) {
+  TargetCount count;
+  for (const ResultRow& row : rows) {
+    count.judged += row.target ? 1 : 0;
+    count.held += row.target && row.holds() ? 1 : 0;
+  }
+  return count;
+}
+
+std::string shown_figure(const ResultRow& row) {
+  std::string text = shown(row.ours);
+  if (row.interval) {
+    text += " (" + shown(row.interval->first) + " .. " + shown(row.interval->second) + ")";
+  }
+  return row.unit.empty() ? text : text + " " + row.unit;
+}
+
+std::string shown_target(const ResultRow& row) {
+  if (!row.target) return "-";
+  return (row.target->comparison == Comparison::at_most ? "at most " : "at least ") +
+         shown(row.target->value);
+}
+
+std::string miss_text(const ResultRow& row) {
+  if (!row.target) return "it has no target";
+  if (!std::isfinite(row.ours)) {
+    return row.reason.empty() ? "nothing could be measured" : row.reason;
+  }
+  std::vector<std::string> parts{"by " + shown(std::abs(row.ours - row.target->value))};
+  ResultRow reached = row;
+  if (row.interval) {
+    reached.ours =
+        row.target->comparison == Comparison::at_most ? row.interval->first : row.interval->second;
+    if (reached.holds()) parts.emplace_back("the 95 % interval reaches the target");
+  }
+  if (!row.reason.empty()) {
+    parts.push_back(row.reason);
+  } else if (row.unit == "ms" || row.unit == "us") {
+    parts.emplace_back("a time on this machine, with whatever else it did");
+  } else if (parts.size() == 1) {
+    parts.emplace_back("no reason is known");
+  }
+  std::string text = parts.front();
+  for (std::size_t i = 1; i < parts.size(); ++i) text += "; " + parts[i];
+  return text;
+}
+
+std::span<const std::string> table_header() {
+  static const std::array<std::string, 6> header{"what", "published", "ours (95 % interval)",
+                                                 "unit", "target",    "holds"};
+  return header;
+}
+
+std::vector<std::string> table_cells(const ResultRow& row) {
+  ResultRow bare = row;
+  bare.unit.clear();
+  return {row.what,           row.published ? shown(*row.published) : "-",
+          shown_figure(bare), row.unit.empty() ? "-" : row.unit,
+          shown_target(row),  !row.target ? "-" : row.holds() ? "yes" : "no"};
+}
+
+std::string to_json(std::span<const ResultRow> rows) {
+  auto list = nlohmann::ordered_json::array();
+  for (const auto& row : rows) {
+    nlohmann::ordered_json entry;
+    entry["id"] = row.id;
+    entry["what"] = row.what;
+    if (!row.published) {
+      entry["published"] = nullptr;
+    } else if (row.published->first == row.published->second) {
+      entry["published"] = row.published->first;
+    } else {
+      entry["published"] = {row.published->first, row.published->second};
+    }
+    entry["ours"] = row.ours;  // a value that is not finite becomes null
+    if (row.interval) {
+      entry["interval"] = {row.interval->first, row.interval->second};
+    } else {
+      entry["interval"] = nullptr;
+    }
+    entry["unit"] = row.unit;
+    if (row.target) {
+      entry["target"] = {{"op", symbol(row.target->comparison)}, {"value", row.target->value}};
+    } else {
+      entry["target"] = nullptr;
+    }
+    entry["holds"] = row.holds();
+    if (row.holds() || row.reason.empty()) {
+      entry["reason"] = nullptr;
+    } else {
+      entry["reason"] = row.reason;
+    }
+    list.push_back(std::move(entry));
+  }
+  return list.dump(1) + "\n";
+}
+
+std::string to_markdown(std::span<const ResultRow> rows) {
+  const auto line = [](std::span<const std::string> cells) {
+    std::string text = "|";
+    for (const std::string& one : cells) text += " " + cell(one) + " |";
+    return text + "\n";
+  };
+  std::string text = line(table_header()) + "|";
+  for (std::size_t i = 0; i < table_header().size(); ++i) text += "---|";
+  text += "\n";
+  for (const ResultRow& row : rows) {
+    auto cells = table_cells(row);
+    if (row.target && !row.holds()) cells.back() = "**" + cells.back() + "**";
+    text += line(cells);
+  }
+  return text;
+}
+
+}  // namespace panonav

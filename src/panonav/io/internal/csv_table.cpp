@@ -1,0 +1,140 @@
+#include "panonav/io/internal/csv_table.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "panonav/core/error.hpp"
+#include "panonav/io/atomic_file.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr std::size_t file_limit_bytes = 64U << 20U;
+
+std::string_view trimmed(std::string_view text) {
+  const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
+  while (!text.empty() && blank(text.front())) text.remove_prefix(1);
+  while (!text.empty() && blank(text.back())) text.remove_suffix(1);
+  return text;
+}
+
+// Empty when a quote is not closed or something follows it.
+std::optional<std::vector<std::string>> split(std::string_view line) {
+  std::vector<std::string> fields;
+  std::size_t i = 0;
+  while (true) {
+    while (i < line.size() && (line[i] == ' ' || line[i] == '\t')) ++i;
+    std::string field;
+    if (i < line.size() && line[i] == '"') {
+      ++i;
+      while (true) {
+        if (i >= line.size()) return std::nullopt;
+        if (line[i] == '"') {
+          if (i + 1 >= line.size() || line[i + 1] != '"') break;
+          ++i;
+        }
+        field += line[i++];
+      }
+      ++i;
+      while (i < line.size() && (line[i] == ' ' || line[i] == '\t')) ++i;
+      if (i < line.size() && line[i] != ',') return std::nullopt;
+    } else {
+      const std::size_t end = std::min(line.find(',', i), line.size());
+      field = trimmed(line.substr(i, end - i));
+      i = end;
+    }
+    fields.push_back(std::move(field));
+    if (i >= line.size()) return fields;
+    ++i;
+  }
+}
+
+}  // namespace
+
+CsvTable CsvTable::read(const std::filesystem::path& path) {
+  const auto bytes = read_file(path, file_limit_bytes);
+  std::string_view rest(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  // A byte order mark is how some programs begin a table.
+  if (rest.starts_with("\xEF\xBB\xBF")) rest.remove_prefix(3);
+  CsvTable table;
+  table.path_ = path;
+  std::size_t line_number = 0;
+  while (!rest.empty()) {
+    const std::size_t end = std::min(rest.find('\n'), rest.size());
+    const std::string_view line = trimmed(rest.substr(0, end));
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+    ++line_number;
+    if (line.empty() || line.front() == '#') continue;
+    auto fields = split(line);
+    const std::string where = "line " + std::to_string(line_number);
+    if (!fields)
+      throw FileError(path.string(),
+                      where + " has quotation marks that do not enclose a whole field");
+    if (table.columns_.empty()) {
+      table.columns_ = std::move(*fields);
+      for (std::size_t i = 0; i < table.columns_.size(); ++i) {
+        if (*table.index(table.columns_[i]) != i) {
+          throw FileError(path.string(),
+                          where + ": the column '" + table.columns_[i] + "' stands twice");
+        }
+      }
+      continue;
+    }
+    if (fields->size() != table.columns_.size()) {
+      throw FileError(path.string(), where + " has " + std::to_string(fields->size()) +
+                                         " fields; allowed: " +
+                                         std::to_string(table.columns_.size()) + " as the header");
+    }
+    table.cells_.push_back(std::move(*fields));
+    table.lines_.push_back(line_number);
+  }
+  if (table.columns_.empty()) throw FileError(path.string(), "has no header line");
+  return table;
+}
+
+std::optional<std::size_t> CsvTable::index(std::string_view column) const noexcept {
+  const auto found = std::find(columns_.begin(), columns_.end(), column);
+  if (found == columns_.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - columns_.begin());
+}
+
+const std::string& CsvTable::text(std::size_t row, std::string_view column) const {
+  const auto i = index(column);
+  if (!i) throw FileError(path_.string(), "has no column '" + std::string(column) + "'");
+  return cells_[row][*i];
+}
+
+double CsvTable::number(std::size_t row, std::string_view column) const {
+  const std::string& field = text(row, column);
+  double value = 0.0;
+  const char* begin = field.data() + (field.starts_with('+') ? 1 : 0);
+  const auto result = std::from_chars(begin, field.data() + field.size(), value);
+  if (field.empty() || result.ec != std::errc{} || result.ptr != field.data() + field.size() ||
+      !std::isfinite(value)) {
+    fail(row, column, field.empty() ? "empty" : "'" + field + "'", "a finite number");
+  }
+  return value;
+}
+
+void CsvTable::fail(std::size_t row, std::string_view column, std::string_view found,
+                    std::string_view allowed) const {
+  throw FileError(path_.string(), "line " + std::to_string(lines_[row]) + ": " +
+                                      std::string(column) + " is " + std::string(found) +
+                                      "; allowed: " + std::string(allowed));
+}
+
+std::string csv_field(std::string_view text) {
+  const bool quoted = text.empty() || text.find_first_of(",\"#") != std::string_view::npos ||
+                      trimmed(text).size() != text.size();
+  if (!quoted) return std::string(text);
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"') result += '"';
+    result += c;
+  }
+  return result + "\"";
+}
+
+}  // namespace panonav

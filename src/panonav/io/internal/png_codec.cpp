@@ -1,0 +1,186 @@
+#include <png.h>
+
+#include <algorithm>
+#include <csetjmp>
+#include <cstring>
+#include <string>
+
+#include "panonav/core/error.hpp"
+#include "panonav/io/internal/image_codecs.hpp"
+
+namespace panonav::detail {
+
+namespace {
+
+// libpng leaves a failed call by longjmp. The functions that call it (`*_steps`) hold no object
+// with a destructor; all that must be freed lives in the structs below, one frame further up.
+
+constexpr std::size_t message_size = 160;
+
+void keep_message(char* message, const char* text) {
+  std::strncpy(message, text, message_size - 1);
+}
+
+struct Reader {
+  png_structp png = nullptr;
+  png_infop info = nullptr;
+  const std::uint8_t* next = nullptr;
+  std::size_t left = 0;
+  char message[message_size] = {};
+  ~Reader() { png_destroy_read_struct(&png, &info, nullptr); }
+};
+
+[[noreturn]] void on_read_error(png_structp png, png_const_charp text) {
+  keep_message(static_cast<Reader*>(png_get_error_ptr(png))->message, text);
+  png_longjmp(png, 1);
+}
+
+void on_warning(png_structp /*png*/, png_const_charp /*text*/) {}
+
+void on_read(png_structp png, png_bytep to, png_size_t count) {
+  auto* reader = static_cast<Reader*>(png_get_io_ptr(png));
+  if (count > reader->left) png_error(png, "the file ends too early");
+  std::memcpy(to, reader->next, count);
+  reader->next += count;
+  reader->left -= count;
+}
+
+bool open_steps(Reader& reader, png_uint_32& width, png_uint_32& height) {
+  if (setjmp(png_jmpbuf(reader.png))) return false;
+  // Sizes are checked by the caller, with its own message; ancillary chunks must not take much
+  // memory.
+  png_set_user_limits(reader.png, 0x7FFFFFFF, 0x7FFFFFFF);
+  png_set_chunk_malloc_max(reader.png, 8U << 20U);
+  png_set_chunk_cache_max(reader.png, 64);
+  png_set_read_fn(reader.png, &reader, on_read);
+  png_read_info(reader.png, reader.info);
+  width = png_get_image_width(reader.png, reader.info);
+  height = png_get_image_height(reader.png, reader.info);
+  return true;
+}
+
+// Asks for 8 bit grey or RGB and tells how many channels that is.
+bool transform_steps(Reader& reader, int& channels) {
+  if (setjmp(png_jmpbuf(reader.png))) return false;
+  png_set_scale_16(reader.png);
+  png_set_expand(reader.png);
+  png_set_strip_alpha(reader.png);
+  png_set_interlace_handling(reader.png);
+  png_read_update_info(reader.png, reader.info);
+  channels = png_get_channels(reader.png, reader.info);
+  return true;
+}
+
+bool pixel_steps(Reader& reader, png_bytepp rows) {
+  if (setjmp(png_jmpbuf(reader.png))) return false;
+  png_read_image(reader.png, rows);
+  // Also reads the end of the file: a picture without its end is cut short.
+  png_read_end(reader.png, nullptr);
+  return true;
+}
+
+[[noreturn]] void fail(const Reader& reader, std::string_view name) {
+  throw FileError(name, std::string("damaged PNG: ") + reader.message);
+}
+
+ImageSize open(Reader& reader, std::span<const std::uint8_t> bytes, std::string_view name) {
+  reader.next = bytes.data();
+  reader.left = bytes.size();
+  reader.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &reader, on_read_error, on_warning);
+  reader.info = reader.png == nullptr ? nullptr : png_create_info_struct(reader.png);
+  if (reader.info == nullptr) throw FileError(name, "cannot be read: out of memory");
+  png_uint_32 width = 0;
+  png_uint_32 height = 0;
+  if (!open_steps(reader, width, height)) fail(reader, name);
+  check_image_size(width, height, name);
+  return {static_cast<int>(width), static_cast<int>(height)};
+}
+
+struct Writer {
+  png_structp png = nullptr;
+  png_infop info = nullptr;
+  std::vector<std::uint8_t> bytes;
+  char message[message_size] = {};
+  ~Writer() { png_destroy_write_struct(&png, &info); }
+};
+
+[[noreturn]] void on_write_error(png_structp png, png_const_charp text) {
+  keep_message(static_cast<Writer*>(png_get_error_ptr(png))->message, text);
+  png_longjmp(png, 1);
+}
+
+// False when memory ran out: an exception must not pass through libpng.
+bool keep_bytes(Writer& writer, const std::uint8_t* from, std::size_t count) noexcept {
+  try {
+    writer.bytes.insert(writer.bytes.end(), from, from + count);
+    return true;
+  } catch (...) {
+    return false;
+  }
+}
+
+void on_write(png_structp png, png_bytep from, png_size_t count) {
+  if (!keep_bytes(*static_cast<Writer*>(png_get_io_ptr(png)), from, count)) {
+    png_error(png, "out of memory");
+  }
+}
+
+void on_flush(png_structp /*png*/) {}
+
+bool write_steps(Writer& writer, const ImageView& image) {
+  if (setjmp(png_jmpbuf(writer.png))) return false;
+  png_set_write_fn(writer.png, &writer, on_write, on_flush);
+  // Level 3 takes a quarter of the time of level 6 and makes files a few percent larger.
+  png_set_compression_level(writer.png, 3);
+  png_set_IHDR(writer.png, writer.info, static_cast<png_uint_32>(image.width),
+               static_cast<png_uint_32>(image.height), 8,
+               image.channels == 1 ? PNG_COLOR_TYPE_GRAY : PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
+               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  png_write_info(writer.png, writer.info);
+  for (int v = 0; v < image.height; ++v) png_write_row(writer.png, image.data + v * image.stride);
+  png_write_end(writer.png, nullptr);
+  return true;
+}
+
+}  // namespace
+
+ImageSize png_size(std::span<const std::uint8_t> bytes, std::string_view name) {
+  Reader reader;
+  return open(reader, bytes, name);
+}
+
+Image decode_png(std::span<const std::uint8_t> bytes, std::string_view name) {
+  Reader reader;
+  const ImageSize size = open(reader, bytes, name);
+  // Deflate packs at most 1032 to 1: a larger picture cannot be in this file, so take no memory for
+  // it.
+  const auto least_bits = static_cast<std::int64_t>(size.width) * size.height;
+  if (least_bits / 8 / 1032 > static_cast<std::int64_t>(bytes.size())) {
+    throw FileError(name, "damaged PNG: the file ends too early");
+  }
+  int channels = 0;
+  if (!transform_steps(reader, channels)) fail(reader, name);
+  if (channels != 1 && channels != 3) throw FileError(name, "damaged PNG: unknown colour type");
+
+  Image image(size.width, size.height, channels);
+  std::vector<png_bytep> rows(static_cast<std::size_t>(size.height));
+  for (int v = 0; v < size.height; ++v) rows[static_cast<std::size_t>(v)] = &image.at(0, v);
+  if (!pixel_steps(reader, rows.data())) fail(reader, name);
+  return image;
+}
+
+std::vector<std::uint8_t> encode_png(ImageView image) {
+  require(image.width >= 1 && image.height >= 1, "image size in pixels",
+          static_cast<double>(image.width) * image.height, ">= 1");
+  require(image.channels == 1 || image.channels == 3, "image channels", image.channels, "1 or 3");
+  Writer writer;
+  writer.png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &writer, on_write_error, on_warning);
+  writer.info = writer.png == nullptr ? nullptr : png_create_info_struct(writer.png);
+  if (writer.info == nullptr || !write_steps(writer, image)) {
+    throw Error(std::string("cannot make a PNG: ") +
+                (writer.info == nullptr ? "out of memory" : writer.message));
+  }
+  return std::move(writer.bytes);
+}
+
+}  // namespace panonav::detail

@@ -1,0 +1,326 @@
+#include "panonav/localisation/internal/view_likelihood.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <tuple>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr double near_spacings = 2.0;  // beyond the border of the references too, twelve are near
+
+// Mean distance of a place in a square of a grid from the nearest corner.
+constexpr double nearest_spacings = 0.3826;
+
+std::uint32_t hash_of(std::int32_t x, std::int32_t y) {
+  auto h = static_cast<std::uint64_t>(static_cast<std::uint32_t>(x)) << 32U |
+           static_cast<std::uint32_t>(y);
+  h *= 0x9E3779B97F4A7C15ULL;
+  return static_cast<std::uint32_t>(h >> 32U);
+}
+
+constexpr std::size_t most_near = 12;  // a grid's square and the ring around it
+constexpr auto lanes_of_all = static_cast<std::size_t>(kernels::likeness_lanes);
+static_assert(most_near <= lanes_of_all);
+
+}  // namespace
+
+ViewLikelihood::ViewLikelihood(const ColumnRanking& ranking, const ObservationModel& model,
+                               bool compass)
+    : ranking_(&ranking), model_(model), compass_(compass) {
+  const VisualMemory& memory = ranking.memory();
+  for (const ViewId view : memory.views()) {
+    const auto& pose = memory.info(view).pose;
+    if (!pose) continue;
+    Site& site = sites_.emplace_back();
+    site.view = view;
+    site.position = pose->position();
+    site.reference_heading_rad = pose->heading_rad ? static_cast<float>(*pose->heading_rad)
+                                                   : std::numeric_limits<float>::quiet_NaN();
+    site.heading_rad = site.reference_heading_rad;
+    views_.push_back(view);
+    profiles_.push_back(ranking.profiles(view));
+  }
+  differences_.resize(sites_.size());
+  require(!sites_.empty(), "views with a pose", 0.0, ">= 1");
+  require(model.spacing_m > 0.0, "spacing of the references", model.spacing_m, "> 0 m");
+  require(model.range_m > 0.0, "range of likeness", model.range_m, "> 0 m");
+  fall_.per_metre = static_cast<float>(1.0 / model.range_m);
+  index_sites();
+}
+
+void ViewLikelihood::index_sites() {
+  cell_m_ = model_.spacing_m;
+  cells_per_metre_ = 1.0 / cell_m_;
+  const double reach_m =
+      std::max(near_spacings * model_.spacing_m, std::min(model_.range_m, 4 * model_.spacing_m));
+  const auto around = static_cast<std::int32_t>(std::ceil(reach_m / cell_m_));
+  // (cell, distance from the cell's centre, site)
+  std::vector<std::tuple<std::int32_t, std::int32_t, float, std::uint32_t>> entries;
+  for (std::uint32_t s = 0; s < sites_.size(); ++s) {
+    const auto [x, y] = cell_of(sites_[s].position);
+    for (std::int32_t cx = x - around; cx <= x + around; ++cx) {
+      for (std::int32_t cy = y - around; cy <= y + around; ++cy) {
+        const double distance_m = distance(centre_of({cx, cy}), sites_[s].position);
+        if (distance_m > reach_m + 0.5 * cell_m_) continue;
+        entries.emplace_back(cx, cy, static_cast<float>(distance_m), s);
+      }
+    }
+  }
+  std::ranges::sort(entries);
+  std::vector<Cell> cells;
+  for (std::size_t i = 0; i < entries.size();) {
+    const auto [x, y, d, s] = entries[i];
+    Cell cell{x, y, static_cast<std::uint32_t>(near_.size()), 0, 0, 0};
+    std::size_t taken = 0;
+    for (; i < entries.size() && std::get<0>(entries[i]) == x && std::get<1>(entries[i]) == y;
+         ++i) {
+      if (taken++ < most_near) near_.push_back(std::get<3>(entries[i]));
+    }
+    cell.end = static_cast<std::uint32_t>(near_.size());
+    cells.push_back(cell);
+  }
+  table_.assign(std::bit_ceil(2 * cells.size() + 1), Cell{0, 0, 0, 0, 0, 0});
+  const auto last = static_cast<std::uint32_t>(table_.size() - 1);
+  for (const Cell& cell : cells) {
+    std::uint32_t at = hash_of(cell.x, cell.y) & last;
+    while (table_[at].end != 0) at = (at + 1) & last;
+    table_[at] = cell;
+  }
+  group_of_cell_.assign(table_.size() + 1, 0);
+}
+
+std::optional<std::uint32_t> ViewLikelihood::cell_at(std::int32_t x,
+                                                     std::int32_t y) const noexcept {
+  const auto last = static_cast<std::uint32_t>(table_.size() - 1);
+  for (std::uint32_t at = hash_of(x, y) & last; table_[at].end != 0; at = (at + 1) & last) {
+    if (table_[at].x == x && table_[at].y == y) return at;
+  }
+  return std::nullopt;
+}
+
+std::pair<std::int32_t, std::int32_t> ViewLikelihood::cell_of(Point2 position) const noexcept {
+  // Farther than any memory reaches all places are alike.
+  constexpr double limit = 2e9;
+  const auto index = [&](double value) {
+    const double far = value * cells_per_metre_;
+    const double cells = far < limit ? (far > -limit ? far : -limit) : limit;
+    const auto towards_zero = static_cast<std::int32_t>(cells);  // faster than floor
+    return towards_zero - (static_cast<double>(towards_zero) > cells ? 1 : 0);
+  };
+  return {index(position.x_m), index(position.y_m)};
+}
+
+Point2 ViewLikelihood::centre_of(std::pair<std::int32_t, std::int32_t> cell) const noexcept {
+  return {(cell.first + 0.5) * cell_m_, (cell.second + 0.5) * cell_m_};
+}
+
+void ViewLikelihood::begin(const PackedSignature& view) {
+  const SignatureShape shape = ranking_->memory().shape();
+  if (view.shape != shape) {
+    throw ContractError("rows of the view's signature", view.shape.rows,
+                        to_text(shape.rows) + " with " + to_text(shape.components) + " components");
+  }
+  asked_.emplace(view, ranking_->components());
+  compared_sites_.clear();
+  most_likeness_ = 0.0;
+  fall_.blur_square_m2 = 0.0F;
+  lanes_.clear();
+  ++revision_;
+  ++number_;
+}
+
+double ViewLikelihood::compare(std::uint32_t site) {
+  Site& s = sites_[site];
+  if (s.compared_at == number_) return differences_[site];
+  const ColumnMatches matches = match_columns_twice(*asked_, profiles_[site]);
+  const ColumnMatch& match = matches.best;
+  const double far = model_.far_difference;
+  s.compared_at = number_;
+  const auto likeness_of = [far](const ColumnMatch& m) {
+    return static_cast<float>(std::max(0.0, far * far - m.difference * m.difference));
+  };
+  s.likeness = likeness_of(match);
+  s.other_likeness = likeness_of(matches.other);
+  s.log_likeness = std::log(s.likeness);
+  s.other_log_likeness = std::log(s.other_likeness);
+  if (static_cast<double>(s.likeness) > most_likeness_) {
+    most_likeness_ = static_cast<double>(s.likeness);
+    const double apart_m = model_.range_m * std::log(far * far / most_likeness_);
+    const double nearest_m = nearest_spacings * model_.spacing_m;
+    fall_.blur_square_m2 =
+        static_cast<float>(std::max(0.0, apart_m * apart_m - nearest_m * nearest_m));
+  }
+  s.heading_rad = s.reference_heading_rad + static_cast<float>(match.heading_rad);
+  s.other_heading_rad =
+      s.heading_rad + static_cast<float>(matches.other.heading_rad - match.heading_rad);
+  differences_[site] = match.difference;
+  compared_sites_.push_back(site);
+  lanes_.clear();
+  ++revision_;
+  return match.difference;
+}
+
+std::optional<double> ViewLikelihood::least_difference(std::span<const std::uint32_t> sites) const {
+  std::optional<double> least;
+  for (const std::uint32_t site : sites) {
+    if (!compared(site)) continue;
+    const double difference = differences_[site];
+    if (!least || difference < *least) least = difference;
+  }
+  return least;
+}
+
+const kernels::LikenessLanes& ViewLikelihood::lanes_of(Cell& cell) {
+  if (cell.lanes_revision == revision_) return lanes_[cell.lanes];
+  cell.lanes_revision = revision_;
+  cell.lanes = static_cast<std::uint32_t>(lanes_.size());
+  kernels::LikenessLanes& lanes = lanes_.emplace_back();
+  for (std::size_t i = 0; i < lanes_of_all; ++i) {
+    lanes.x_m[i] = 1e6F / fall_.per_metre;
+    lanes.y_m[i] = lanes.heading_rad[i] = lanes.per_square_turn[i] = 0.0F;
+    lanes.other_heading_rad[i] = 0.0F;
+    lanes.log_likeness[i] = lanes.other_log_likeness[i] = -std::numeric_limits<float>::infinity();
+  }
+  // Small numbers, wherever on Earth the origin is.
+  const Point2 centre = centre_of({cell.x, cell.y});
+  const auto per_square_turn =
+      static_cast<float>(-0.5 / (model_.heading_width_rad * model_.heading_width_rad));
+  for (std::size_t i = 0; i < cell.end - cell.begin; ++i) {
+    const Site& s = sites_[near_[cell.begin + i]];
+    lanes.x_m[i] = static_cast<float>(s.position.x_m - centre.x_m);
+    lanes.y_m[i] = static_cast<float>(s.position.y_m - centre.y_m);
+    if (s.compared_at != number_) continue;
+    lanes.log_likeness[i] = s.log_likeness;
+    if (!compass_ || std::isnan(s.heading_rad)) continue;
+    lanes.heading_rad[i] = s.heading_rad;
+    lanes.other_heading_rad[i] = s.other_heading_rad;
+    lanes.other_log_likeness[i] = s.other_log_likeness;
+    lanes.per_square_turn[i] = per_square_turn;
+  }
+  return lanes;
+}
+
+void ViewLikelihood::log_ratios(std::span<const Particle> particles, std::span<double> ratios) {
+  if (particles.empty()) return;
+  // Particles of one cell that follow each other are handed on together.
+  constexpr std::size_t most = 128;
+  std::array<float, most> x_m, y_m, heading_rad, explained;
+  std::size_t begin = 0;
+  auto next = cell_of(particles.front().pose.position());
+  while (begin < particles.size()) {
+    const auto place = next;
+    const Point2 centre = centre_of(place);
+    std::size_t count = 0;
+    do {
+      const Pose2& pose = particles[begin + count].pose;
+      x_m[count] = static_cast<float>(pose.x_m - centre.x_m);
+      y_m[count] = static_cast<float>(pose.y_m - centre.y_m);
+      heading_rad[count] = static_cast<float>(pose.heading_rad);
+      ++count;
+      if (begin + count == particles.size()) break;
+      next = cell_of(particles[begin + count].pose.position());
+    } while (count < most && next == place);
+    if (const auto cell = cell_at(place.first, place.second)) {
+      kernels::explain_likeness(lanes_of(table_[*cell]), fall_, std::span(x_m).first(count),
+                                std::span(y_m).first(count), std::span(heading_rad).first(count),
+                                std::span(explained).first(count), kernels::chosen_instructions());
+    } else {
+      explained.fill(0.0F);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      ratios[begin + i] = model_.sharpness * static_cast<double>(explained[i]);
+    }
+    begin += count;
+  }
+}
+
+double ViewLikelihood::log_ratio(const Pose2& pose) {
+  const Particle particle{pose, 1.0};
+  double ratio = 0.0;
+  log_ratios({&particle, 1}, {&ratio, 1});
+  return ratio;
+}
+
+std::span<const std::uint32_t> ViewLikelihood::sites_near(Point2 position) const noexcept {
+  const auto [x, y] = cell_of(position);
+  const auto cell = cell_at(x, y);
+  if (!cell) return {};
+  return std::span(near_).subspan(table_[*cell].begin, table_[*cell].end - table_[*cell].begin);
+}
+
+void ViewLikelihood::group(std::span<const Particle> particles) {
+  groups_.clear();
+  group_of_.resize(particles.size());
+  std::pair<std::int32_t, std::int32_t> last;
+  std::uint32_t at = 0;
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    const auto place = cell_of(particles[i].pose.position());
+    if (i == 0 || place != last) {
+      last = place;
+      const auto none = static_cast<std::uint32_t>(table_.size());
+      const std::uint32_t cell = cell_at(place.first, place.second).value_or(none);
+      at = group_of_cell_[cell];
+      if (at >= groups_.size() || groups_[at].cell != cell) {
+        at = group_of_cell_[cell] = static_cast<std::uint32_t>(groups_.size());
+        groups_.push_back({cell, 0, 0.0});
+      }
+    }
+    group_of_[i] = at;
+    ++groups_[at].count;
+    groups_[at].weight += particles[i].weight;
+  }
+}
+
+void ViewLikelihood::arrange(std::vector<Particle>& particles) {
+  group(particles);
+  std::uint32_t begin = 0;
+  for (Group& group : groups_) {
+    const std::uint32_t count = group.count;
+    group.count = begin;
+    begin += count;
+  }
+  arranged_.resize(particles.size());
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    arranged_[groups_[group_of_[i]].count++] = particles[i];
+  }
+  particles.swap(arranged_);
+}
+
+std::vector<std::uint32_t> ViewLikelihood::sites_near_most(std::span<const Particle> particles,
+                                                           std::size_t most, double least) {
+  group(particles);
+  std::vector<double> mass(sites_.size());
+  std::vector<std::uint32_t> found;
+  for (const Group& group : groups_) {
+    if (group.cell == table_.size()) continue;
+    const Cell& cell = table_[group.cell];
+    for (std::uint32_t i = cell.begin; i < cell.end; ++i) {
+      if (mass[near_[i]] == 0.0) found.push_back(near_[i]);
+      mass[near_[i]] += group.weight;
+    }
+  }
+  std::erase_if(found, [&](std::uint32_t site) { return mass[site] < least; });
+  most = std::min(most, found.size());
+  std::partial_sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(most), found.end(),
+                    [&](std::uint32_t a, std::uint32_t b) {
+                      return mass[a] != mass[b] ? mass[a] > mass[b] : a < b;
+                    });
+  found.resize(most);
+  return found;
+}
+
+std::optional<std::uint32_t> ViewLikelihood::site_of(ViewId view) const noexcept {
+  const auto at = std::ranges::lower_bound(views_, view);
+  if (at == views_.end() || *at != view) return std::nullopt;
+  return static_cast<std::uint32_t>(at - views_.begin());
+}
+
+}  // namespace panonav

@@ -1,0 +1,206 @@
+#include "panonav/mapping/internal/ground_displacement.hpp"
+
+#include <Eigen/Core>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/median.hpp"
+
+namespace panonav {
+
+namespace {
+
+using Pixels = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+constexpr double pi = std::numbers::pi;
+constexpr int columns = 64;
+constexpr int fine_columns = 256;  // of the view that is looked up between columns
+constexpr int iterations = 4;
+constexpr int least_bands = 4;
+// Nearer to the horizon the ground is far and walls begin.
+constexpr double highest_elevation_rad = -10.0 * pi / 180.0;
+constexpr double band_height_rad = 1.75 * pi / 180.0;
+
+// Rows below the horizon, averaged to bands.
+struct GroundBands {
+  int begin = 0;  // rows
+  int bands = 0;
+  int rows_per_band = 1;
+  double first_rad = 0.0;  // middle of the first band
+  double step_rad = 0.0;   // downwards
+};
+
+std::optional<GroundBands> ground_bands(const HomingView& view) {
+  if (!view.elevations()) return std::nullopt;
+  const ElevationBand& band = *view.elevations();
+  const double row_rad = (band.top_rad - band.bottom_rad) / view.rows();
+  GroundBands made;
+  made.rows_per_band = std::max(1, static_cast<int>(std::lround(band_height_rad / row_rad)));
+  made.begin = std::max(
+      0, static_cast<int>(std::ceil((band.top_rad - highest_elevation_rad) / row_rad - 1e-9)));
+  made.bands = (view.rows() - made.begin) / made.rows_per_band;
+  if (made.bands < least_bands) return std::nullopt;
+  made.step_rad = made.rows_per_band * row_rad;
+  made.first_rad = band.top_rad - made.begin * row_rad - 0.5 * made.step_rad;
+  return made;
+}
+
+// Bands x columns. The mean of a row belongs to it: the ground moves from row to row.
+Pixels sampled(const HomingView& view, const GroundBands& ground, int count) {
+  const int highest = std::min(view.components(), columns / 2) - 1;
+  Pixels cosines = Pixels::Zero(ground.bands, highest);
+  Pixels sines = Pixels::Zero(ground.bands, highest);
+  const float share = 1.0F / static_cast<float>(ground.rows_per_band);
+  for (int k = 1; k <= highest; ++k) {
+    for (int row = 0; row < ground.bands * ground.rows_per_band; ++row) {
+      cosines(row / ground.rows_per_band, k - 1) += share * view.a(ground.begin + row, k);
+      sines(row / ground.rows_per_band, k - 1) += share * view.b(ground.begin + row, k);
+    }
+  }
+  std::vector<float> cosine(static_cast<std::size_t>(count));
+  std::vector<float> sine(static_cast<std::size_t>(count));
+  for (int c = 0; c < count; ++c) {
+    const double angle = 2.0 * pi * c / count;
+    cosine[static_cast<std::size_t>(c)] = static_cast<float>(std::cos(angle));
+    sine[static_cast<std::size_t>(c)] = static_cast<float>(std::sin(angle));
+  }
+  Pixels waves(2 * highest, count);
+  for (int k = 1; k <= highest; ++k) {
+    for (int c = 0; c < count; ++c) {
+      const auto at = static_cast<std::size_t>(k * c % count);
+      waves(k - 1, c) = cosine[at];
+      waves(highest + k - 1, c) = sine[at];
+    }
+  }
+  Eigen::VectorXf means = Eigen::VectorXf::Zero(ground.bands);
+  for (int row = 0; row < ground.bands * ground.rows_per_band; ++row) {
+    means[row / ground.rows_per_band] += 0.5F * share * view.a(ground.begin + row, 0);
+  }
+  Pixels values = cosines * waves.topRows(highest) + sines * waves.bottomRows(highest);
+  values.colwise() += means;
+  return values;
+}
+
+// A pixel of the later view where the earlier one shows the same point of the ground.
+struct Equation {
+  double difference = 0.0;
+  Eigen::Vector2d slopes = Eigen::Vector2d::Zero();  // over x, y
+};
+
+class Ground {
+ public:
+  Ground(const HomingView& before, const HomingView& after, const GroundBands& bands)
+      : bands_(bands),
+        later_(sampled(after, bands, columns)),
+        earlier_(sampled(before, bands, fine_columns)) {}
+
+  [[nodiscard]] std::size_t pixels() const {
+    return static_cast<std::size_t>(bands_.bands) * columns;
+  }
+
+  // Equations of the pixels whose point both views show.
+  void linearise(const Pose2& motion, std::vector<Equation>& equations) const {
+    equations.clear();
+    for (int c = 0; c < columns; ++c) {
+      const double azimuth = 2.0 * pi * c / columns + motion.heading_rad;
+      const Eigen::Vector2d direction(std::cos(azimuth), std::sin(azimuth));
+      for (int band = 0; band < bands_.bands; ++band) {
+        const double away = -1.0 / std::tan(bands_.first_rad - band * bands_.step_rad);
+        const Eigen::Vector2d point = away * direction + Eigen::Vector2d(motion.x_m, motion.y_m);
+        if (const auto equation = compare(point, later_(band, c))) equations.push_back(*equation);
+      }
+    }
+  }
+
+ private:
+  // A point of the ground in the frame of the earlier view, which the later one shows as `value`.
+  [[nodiscard]] std::optional<Equation> compare(const Eigen::Vector2d& point, double value) const {
+    const double distance = point.norm();
+    if (!(distance > 1e-3)) return std::nullopt;
+    const double row = (bands_.first_rad + std::atan(1.0 / distance)) / bands_.step_rad;
+    if (!(row >= 0.0) || row > bands_.bands - 1) return std::nullopt;
+    double column = std::atan2(point.y(), point.x()) / (2.0 * pi) * fine_columns;
+    if (column < 0.0) column += fine_columns;
+    // Between four pixels.
+    const int r = std::min(static_cast<int>(row), bands_.bands - 2);
+    const int left = static_cast<int>(column) % fine_columns;
+    const int right = (left + 1) % fine_columns;
+    const double down = row - r;
+    const double along = column - std::floor(column);
+    const double upper = (1.0 - along) * earlier_(r, left) + along * earlier_(r, right);
+    const double lower = (1.0 - along) * earlier_(r + 1, left) + along * earlier_(r + 1, right);
+    const double over_azimuth = ((1.0 - down) * (earlier_(r, right) - earlier_(r, left)) +
+                                 down * (earlier_(r + 1, right) - earlier_(r + 1, left))) *
+                                (fine_columns / (2.0 * pi));
+    const double over_elevation = (upper - lower) / bands_.step_rad;
+    const double squared = distance * distance;
+    return Equation{.difference = value - (1.0 - down) * upper - down * lower,
+                    .slopes = over_azimuth / squared * Eigen::Vector2d(-point.y(), point.x()) +
+                              over_elevation / (1.0 + squared) / distance * point};
+  }
+
+  GroundBands bands_;
+  Pixels later_;
+  Pixels earlier_;
+};
+
+std::optional<GroundDisplacement> solve(const Ground& ground, const Pose2& start) {
+  Pose2 motion = start;
+  std::vector<Equation> equations;
+  std::vector<double> sizes;
+  for (int iteration = 0;; ++iteration) {
+    ground.linearise(motion, equations);
+    if (equations.size() < ground.pixels() / 4) return std::nullopt;
+    sizes.clear();
+    for (const Equation& equation : equations) sizes.push_back(std::abs(equation.difference));
+    const double middle = upper_median_in_place(std::span(sizes));
+    const double scale = 1.4826 * middle + 1e-9;
+    Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
+    Eigen::Vector2d right = Eigen::Vector2d::Zero();
+    double left = 0.0;
+    double weights = 0.0;
+    for (const Equation& equation : equations) {
+      const double relative = equation.difference / scale;
+      const double weight = 1.0 / (1.0 + relative * relative);
+      normal += weight * equation.slopes * equation.slopes.transpose();
+      right += weight * equation.difference * equation.slopes;
+      left += weight * equation.difference * equation.difference;
+      weights += weight;
+    }
+    const double trace = normal.trace();
+    if (!(trace > 0.0)) return std::nullopt;
+    const Eigen::Matrix2d covariance =
+        (normal + 1e-9 * trace * Eigen::Matrix2d::Identity()).inverse();
+    if (iteration == iterations) {
+      const double length = std::hypot(motion.x_m, motion.y_m);
+      const Eigen::Vector2d along = length > 0.0
+                                        ? Eigen::Vector2d(motion.x_m / length, motion.y_m / length)
+                                        : Eigen::Vector2d(1.0, 0.0);
+      // The shortest wave of 15 components covers four columns, which say the same.
+      const double variance = 4.0 * left / weights;
+      return GroundDisplacement{motion.x_m, motion.y_m,
+                                std::sqrt(variance * along.dot(covariance * along)), middle};
+    }
+    const Eigen::Vector2d change = covariance * right;
+    motion.x_m += change.x();
+    motion.y_m += change.y();
+    if (!is_finite(motion)) return std::nullopt;
+  }
+}
+
+}  // namespace
+
+std::optional<GroundDisplacement> ground_displacement(const HomingView& before,
+                                                      const HomingView& after, const Pose2& start) {
+  require(before.rows() == after.rows(), "rows of the view before", before.rows(),
+          "those of the view after");
+  const auto bands = ground_bands(after);
+  if (!bands || before.elevations() != after.elevations()) return std::nullopt;
+  return solve(Ground(before, after, *bands), start);
+}
+
+}  // namespace panonav

@@ -1,0 +1,340 @@
+#include "panonav/mapping/internal/lattice_solver.hpp"
+
+#include <Eigen/Sparse>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/median.hpp"
+#include "panonav/geometry/angles.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr double kWidth = 3.0;            // in deviations: where a spring begins to be given up
+constexpr int kIterationsPerWidth = 20;   // at most
+constexpr double kEnough = 1e-7;          // relative change of the energy
+constexpr double kEnoughOnTheWay = 1e-3;  // the same before the widths are narrow
+
+using Row = std::array<double, 6>;  // derivatives by x, y, heading of a and of b
+
+/// What a spring tells, in groups that are right or wrong together.
+enum Group : std::size_t { phases, length, length_by_phases, groups };
+/// Median of the squared strain of a group when deviations are right (chi-squared of two rows and
+/// of one).
+constexpr std::array<double, groups> kMedianSquare{1.386, 0.455, 0.455};
+
+/// The strain of one spring in deviations, and its derivatives.
+struct Strain {
+  struct Entry {
+    Group group;
+    double value;
+    Row slope;
+  };
+  std::size_t rows = 0;
+  std::array<Entry, 4> entries{};
+
+  void add(Group group, double strain, Row slope, double deviation) {
+    for (double& d : slope) d /= deviation;
+    entries[rows++] = {group, strain / deviation, slope};
+  }
+  [[nodiscard]] std::span<const Entry> used() const { return std::span(entries).first(rows); }
+  /// Squared strain of each group; empty where the spring tells nothing.
+  [[nodiscard]] std::array<std::optional<double>, groups> squares() const {
+    std::array<std::optional<double>, groups> sums;
+    for (const Entry& entry : used()) {
+      sums[entry.group] = sums[entry.group].value_or(0.0) + entry.value * entry.value;
+    }
+    return sums;
+  }
+};
+
+Strain strain_of(const SpringTerm& spring, const Pose2& a, const Pose2& b) {
+  Strain strain;
+  const double dx = b.x_m - a.x_m;
+  const double dy = b.y_m - a.y_m;
+  if (spring.length == 0.0) {
+    strain.add(length, dx, {-1.0, 0.0, 0.0, 1.0, 0.0, 0.0}, spring.length_deviation);
+    strain.add(length, dy, {0.0, -1.0, 0.0, 0.0, 1.0, 0.0}, spring.length_deviation);
+  } else {
+    const double way = std::hypot(dx, dy);
+    // On the spot any direction is as good as another.
+    const double ux = way > 0.0 ? dx / way : 1.0;
+    const double uy = way > 0.0 ? dy / way : 0.0;
+    const Row slope{-ux, -uy, 0.0, ux, uy, 0.0};
+    strain.add(length, way - spring.length, slope, spring.length_deviation);
+    if (spring.along_direction) {
+      strain.add(length_by_phases, way - spring.along_direction->length, slope,
+                 spring.along_direction->deviation);
+    }
+    if (spring.direction && way > 0.0) {
+      const SpringDirection& known = *spring.direction;
+      double world_rad = a.heading_rad + known.from_a_rad;
+      double share_a = 1.0;
+      if (known.from_b_rad) {
+        const double back_rad = b.heading_rad + *known.from_b_rad + std::numbers::pi;
+        world_rad += 0.5 * wrap_angle(back_rad - world_rad);
+        share_a = 0.5;
+      }
+      // Nodes that nearly coincide turn about each other without end: the slope is that of a way
+      // of some length.
+      const double lever = std::max(way, 0.1 * spring.length);
+      strain.add(phases, wrap_angle(std::atan2(dy, dx) - world_rad),
+                 {uy / lever, -ux / lever, -share_a, -uy / lever, ux / lever, share_a - 1.0},
+                 known.deviation_rad);
+    }
+  }
+  if (spring.turn) {
+    const double missed = angle_difference(b.heading_rad - a.heading_rad, spring.turn->turn_rad);
+    strain.add(phases, missed, {0.0, 0.0, -1.0, 0.0, 0.0, 1.0}, spring.turn->deviation_rad);
+  }
+  return strain;
+}
+
+void check(std::span<const SpringTerm> springs, std::span<const Pose2> poses,
+           std::span<const unsigned char> moving) {
+  require(moving.empty() || moving.size() == poses.size(), "size of moving",
+          static_cast<double>(moving.size()), "0 or the number of poses");
+  for (const Pose2& pose : poses) {
+    const double sum = pose.x_m + pose.y_m + pose.heading_rad;
+    require(std::isfinite(sum), "pose of a node", sum, "finite");
+  }
+  const auto positive = [](double value, const char* name) {
+    require(std::isfinite(value) && value > 0.0, name, value, "finite and > 0");
+  };
+  for (const SpringTerm& spring : springs) {
+    require(spring.a < poses.size() && spring.b < poses.size() && spring.a != spring.b,
+            "node of a spring", static_cast<double>(spring.b), "another node");
+    require(std::isfinite(spring.length) && spring.length >= 0.0, "length of a spring",
+            spring.length, "finite and >= 0");
+    positive(spring.length_deviation, "deviation of a length");
+    if (spring.direction) {
+      const double sum = spring.direction->from_a_rad + spring.direction->from_b_rad.value_or(0.0);
+      require(std::isfinite(sum), "direction of a spring", sum, "finite");
+      positive(spring.direction->deviation_rad, "deviation of a direction");
+    }
+    if (spring.along_direction) {
+      require(
+          std::isfinite(spring.along_direction->length) && spring.along_direction->length >= 0.0,
+          "length along a direction", spring.along_direction->length, "finite and >= 0");
+      positive(spring.along_direction->deviation, "deviation of a length along a direction");
+    }
+    if (spring.turn) {
+      require(std::isfinite(spring.turn->turn_rad), "turn of a spring", spring.turn->turn_rad,
+              "finite");
+      positive(spring.turn->deviation_rad, "deviation of a turn");
+    }
+  }
+}
+
+class Solver {
+ public:
+  Solver(std::span<const SpringTerm> springs, std::span<Pose2> poses,
+         std::span<const unsigned char> moving)
+      : springs_(springs), poses_(poses), unknown_(poses.size(), -1) {
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      if (moving.empty() || moving[i] != 0) {
+        unknown_[i] = unknowns_;
+        unknowns_ += 3;
+      }
+    }
+    solution_.weights.assign(springs.size(), 1.0);
+    trust_.resize(springs.size());
+  }
+
+  LatticeSolution solve() {
+    if (unknowns_ > 0 && !springs_.empty()) {
+      widths_.fill(kWidth);
+      for (const SpringTerm& spring : springs_) {
+        if (spring.certain) continue;
+        const auto squares = squares_of(spring);
+        for (std::size_t g = 0; g < groups; ++g) {
+          widths_[g] = std::max(widths_[g], 2.0 * std::sqrt(squares[g].value_or(0.0)));
+        }
+      }
+      while (narrow()) relax(kEnoughOnTheWay);
+      relax(kEnough);
+    }
+    solution_.energy = energy();
+    for (std::size_t s = 0; s < springs_.size(); ++s) {
+      const auto squares = squares_of(springs_[s]);
+      const Group group = squares[phases] ? phases : length;
+      solution_.weights[s] = weight(s, group, squares[group].value_or(0.0));
+    }
+    return solution_;
+  }
+
+ private:
+  [[nodiscard]] std::array<std::optional<double>, groups> squares_of(
+      const SpringTerm& spring) const {
+    return strain_of(spring, poses_[spring.a], poses_[spring.b]).squares();
+  }
+
+  /// Halves the widths, down to three deviations, which the median strain corrects where they were
+  /// given too small. False when all are there.
+  bool narrow() {
+    std::array<std::vector<double>, groups> squares;
+    for (const SpringTerm& spring : springs_) {
+      if (spring.certain) continue;
+      const auto all = squares_of(spring);
+      for (std::size_t g = 0; g < groups; ++g) {
+        if (all[g]) squares[g].push_back(*all[g]);
+      }
+    }
+    bool narrowed = false;
+    for (std::size_t g = 0; g < groups; ++g) {
+      double least = kWidth;
+      if (!squares[g].empty()) {
+        const double middle = upper_median_in_place(std::span(squares[g]));
+        least *= std::max(1.0, std::sqrt(middle / kMedianSquare[g]));
+      }
+      if (widths_[g] <= least) continue;
+      widths_[g] = std::max(least, 0.5 * widths_[g]);
+      narrowed = true;
+    }
+    return narrowed;
+  }
+
+  /// What counts of a group of a spring's strains. Where the views tell direction and turn, lengths
+  /// are believed as far as these are, and then pull for ever: else a node could leave along a
+  /// direction.
+  [[nodiscard]] double weight(std::size_t s, Group group, double square) const {
+    if (springs_[s].certain) return 1.0;
+    const double share = square / (widths_[group] * widths_[group]);
+    if (group == phases || !trust_[s]) return 1.0 / ((1.0 + share) * (1.0 + share));
+    return *trust_[s] / std::sqrt(1.0 + share);
+  }
+  /// The loss that the weights belong to.
+  [[nodiscard]] double energy() const {
+    double sum = 0.0;
+    for (std::size_t s = 0; s < springs_.size(); ++s) {
+      const auto squares = squares_of(springs_[s]);
+      for (const Group group : {phases, length, length_by_phases}) {
+        if (!squares[group]) continue;
+        const double width = widths_[group] * widths_[group];
+        const double share = *squares[group] / width;
+        if (springs_[s].certain) {
+          sum += *squares[group];
+        } else if (group == phases || !trust_[s]) {
+          sum += *squares[group] / (1.0 + share);
+        } else {
+          sum += *trust_[s] * 2.0 * width * (std::sqrt(1.0 + share) - 1.0);
+        }
+      }
+    }
+    return sum;
+  }
+  /// Makes up the mind on whose lengths to believe.
+  void judge() {
+    for (std::size_t s = 0; s < springs_.size(); ++s) {
+      const auto square = squares_of(springs_[s])[phases];
+      trust_[s] = square ? std::optional(weight(s, phases, *square)) : std::nullopt;
+    }
+  }
+
+  void relax(double enough) {
+    double damping = 1e-6;
+    for (int i = 0; i < kIterationsPerWidth; ++i) {
+      ++solution_.iterations;
+      judge();
+      const double before = energy();
+      assemble();
+      bool better = false;
+      double after = before;
+      const std::vector<Pose2> start(poses_.begin(), poses_.end());
+      for (int attempt = 0; attempt < 8 && !better; ++attempt) {
+        if (step(damping)) after = energy();
+        better = after < before;
+        if (better) {
+          damping = std::max(1e-9, damping * 0.1);
+        } else {
+          std::ranges::copy(start, poses_.begin());
+          damping *= 10.0;
+        }
+      }
+      if (!better || before - after <= enough * before) break;
+    }
+  }
+
+  void assemble() {
+    entries_.clear();
+    gradient_ = Eigen::VectorXd::Zero(unknowns_);
+    // Every diagonal entry is there, whatever the springs touch.
+    for (int i = 0; i < unknowns_; ++i) entries_.emplace_back(i, i, 0.0);
+    for (std::size_t s = 0; s < springs_.size(); ++s) {
+      const SpringTerm& spring = springs_[s];
+      const int first = unknown_[spring.a];
+      const int second = unknown_[spring.b];
+      if (first < 0 && second < 0) continue;
+      const Strain strain = strain_of(spring, poses_[spring.a], poses_[spring.b]);
+      const auto squares = strain.squares();
+      const auto column = [&](int i) {
+        const int base = i < 3 ? first : second;
+        return base < 0 ? -1 : base + i % 3;
+      };
+      for (const auto& entry : strain.used()) {
+        const double w = weight(s, entry.group, *squares[entry.group]);
+        for (int i = 0; i < 6; ++i) {
+          const double si = entry.slope[static_cast<std::size_t>(i)];
+          const int ci = column(i);
+          if (ci < 0 || si == 0.0) continue;
+          gradient_(ci) += w * si * entry.value;
+          for (int j = 0; j < 6; ++j) {
+            const double sj = entry.slope[static_cast<std::size_t>(j)];
+            const int cj = column(j);
+            if (cj >= 0 && cj <= ci && sj != 0.0) entries_.emplace_back(ci, cj, w * si * sj);
+          }
+        }
+      }
+    }
+    matrix_.resize(unknowns_, unknowns_);
+    matrix_.setFromTriplets(entries_.begin(), entries_.end());
+    diagonal_ = matrix_.diagonal();
+  }
+
+  /// False when the system cannot be solved with so little damping.
+  bool step(double damping) {
+    const double floor = 1e-9 * std::max(diagonal_.maxCoeff(), 1e-9);
+    for (int i = 0; i < unknowns_; ++i) {
+      matrix_.coeffRef(i, i) = diagonal_(i) * (1.0 + damping) + floor;
+    }
+    Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower> factors(matrix_);
+    if (factors.info() != Eigen::Success) return false;
+    const Eigen::VectorXd change = factors.solve(-gradient_);
+    if (!change.allFinite()) return false;
+    for (std::size_t i = 0; i < poses_.size(); ++i) {
+      const int base = unknown_[i];
+      if (base < 0) continue;
+      poses_[i].x_m += change(base);
+      poses_[i].y_m += change(base + 1);
+      poses_[i].heading_rad = wrap_angle(poses_[i].heading_rad + change(base + 2));
+    }
+    return true;
+  }
+
+  std::span<const SpringTerm> springs_;
+  std::span<Pose2> poses_;
+  std::vector<int> unknown_;  // first unknown of each pose, -1: it stays
+  int unknowns_ = 0;
+  std::vector<Eigen::Triplet<double>> entries_;  // lower triangle
+  Eigen::SparseMatrix<double> matrix_;
+  Eigen::VectorXd diagonal_;
+  Eigen::VectorXd gradient_;
+  std::vector<std::optional<double>> trust_;  // in the lengths of each spring with phases
+  std::array<double, groups> widths_{kWidth, kWidth, kWidth};
+  LatticeSolution solution_;
+};
+
+}  // namespace
+
+LatticeSolution solve_lattice(std::span<const SpringTerm> springs, std::span<Pose2> poses,
+                              std::span<const unsigned char> moving) {
+  check(springs, poses, moving);
+  return Solver(springs, poses, moving).solve();
+}
+
+}  // namespace panonav

@@ -1,0 +1,173 @@
+#include "panonav/mapping/internal/lattice_springs.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "panonav/core/median.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/mapping/lattice_graph.hpp"
+#include "panonav/signature/dissimilarity.hpp"
+
+namespace panonav {
+
+namespace {
+
+// Answers of two views that differ by more say nothing. Unrelated views agree so well in direction
+// and turn by chance once in 16 times.
+constexpr double kAgreement = 0.25 * std::numbers::pi;
+// Three turns that should cancel; three displacements, relative to the longest.
+constexpr double kTurnsCancel = 10.0 * std::numbers::pi / 180.0;
+constexpr double kWaysCancel = 0.5;
+constexpr double kUnknownError = 0.25;     // of a length, before the curve is known
+constexpr double kSmallestAngle = 0.0035;  // rad; phases are packed in steps of 0.025
+
+/// Displacement and turn of the spring from one of its ends.
+Pose2 step_from(std::size_t from, const LatticeSpring& spring) {
+  const PhaseReading& phases = *spring.phases;
+  const bool forward = from == spring.a;
+  const double direction = forward ? phases.direction_a_rad : phases.direction_b_rad;
+  return {spring.length * std::cos(direction), spring.length * std::sin(direction),
+          forward ? phases.turn_rad : wrap_angle(-phases.turn_rad)};
+}
+
+bool has_direction(const LatticeSpring& spring) {
+  return spring.phases && spring.phases->points;
+}
+
+}  // namespace
+
+SpringViews::SpringViews(const VisualMemory& memory, const LatticeOptions& options)
+    : memory_(&memory), components_(options.components) {
+  for (const ViewId view : memory.views()) {
+    packed_.push_back(memory.packed(view));
+    if (!options.phases) continue;
+    const HomingView seen = homing_view(memory.signature(view));
+    homing_.push_back(components_ > 0 ? first_components(seen, components_) : seen);
+  }
+}
+
+std::vector<NodePair> SpringViews::most_alike(const LatticeOptions& options,
+                                              Executor& executor) const {
+  const auto views = memory_->views();
+  std::vector<std::vector<NodePair>> found(views.size());
+  executor.for_chunks(views.size(), 16, [&](std::size_t begin, std::size_t end, std::size_t) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto answer = memory_->search(packed_[i], {options.neighbours, components_},
+                                          {.excluded_views = views.subspan(i, 1)});
+      for (const Match& match : answer.matches) {
+        const auto j =
+            static_cast<std::size_t>(std::ranges::lower_bound(views, match.view) - views.begin());
+        found[i].push_back(std::minmax(i, j));
+      }
+    }
+  });
+  std::vector<NodePair> pairs;
+  for (const auto& some : found) pairs.insert(pairs.end(), some.begin(), some.end());
+  std::ranges::sort(pairs);
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  return pairs;
+}
+
+double SpringViews::dissimilarity(NodePair pair) const {
+  return dissimilarity_packed(packed_[pair.first], packed_[pair.second], components_);
+}
+
+LatticeSpring SpringViews::measure(NodePair pair, const std::optional<TurnHint>& hint) const {
+  LatticeSpring spring{.a = pair.first, .b = pair.second, .dissimilarity = dissimilarity(pair)};
+  if (!homing_.empty()) spring.phases = read_phases(homing_[spring.a], homing_[spring.b], hint);
+  return spring;
+}
+
+bool agrees(const LatticeSpring& spring) {
+  if (!spring.phases) return true;
+  return spring.phases->disagreement_rad <= kAgreement &&
+         spring.phases->turn_disagreement_rad <= kAgreement;
+}
+
+void learn_errors(std::span<const LatticeSpring> springs, const DissimilarityCurve& curve,
+                  SpringErrors& errors) {
+  std::vector<double> lengths;
+  std::vector<double> disagreements;
+  std::vector<double> turn_disagreements;
+  for (const auto& spring : springs) {
+    lengths.push_back(spring.length);
+    if (!spring.phases) continue;
+    disagreements.push_back(spring.phases->disagreement_rad);
+    turn_disagreements.push_back(spring.phases->turn_disagreement_rad);
+  }
+  // The median spring errs by E, the others as their stiffness says [M04 eq. 5].
+  const double middle = lengths.empty() ? 1.0 : upper_median(lengths);
+  double error = curve.error(middle);
+  if (!(error > 0.0)) error = kUnknownError * (middle > 0.0 ? middle : 1.0);
+  errors.length = error * std::sqrt(curve.stiffness(middle));
+  // Two readings of deviation s differ by sqrt(2) s; their mean errs by s / sqrt(2).
+  const auto deviation = [](const std::vector<double>& differences) {
+    if (differences.empty()) return kSmallestAngle;
+    return std::max(kSmallestAngle, 0.5 * normal_over_median * upper_median(differences));
+  };
+  errors.direction_rad = deviation(disagreements);
+  errors.turn_rad = deviation(turn_disagreements);
+}
+
+SpringTerm spring_term(const LatticeSpring& spring, const SpringErrors& errors,
+                       bool phase_lengths) {
+  SpringTerm term{.a = spring.a,
+                  .b = spring.b,
+                  .length = spring.length,
+                  .length_deviation = errors.length / std::sqrt(spring.stiffness)};
+  if (!spring.phases) return term;
+  const PhaseReading& phases = *spring.phases;
+  term.turn =
+      SpringTurn{phases.turn_rad, std::hypot(errors.turn_rad, 0.5 * phases.turn_disagreement_rad)};
+  if (!phases.points) return term;
+  term.direction = SpringDirection{phases.direction_a_rad, phases.direction_b_rad,
+                                   std::hypot(errors.direction_rad, 0.5 * phases.disagreement_rad)};
+  if (phase_lengths) {
+    const double length = errors.phase_unit * phases.length;
+    term.along_direction = SpringLength{length, errors.phase_length * length};
+  }
+  return term;
+}
+
+std::vector<double> closing_triangles(std::size_t nodes, std::span<const LatticeSpring> springs) {
+  std::vector<GraphEdge> edges;
+  for (const auto& spring : springs) edges.push_back({spring.a, spring.b, spring.length});
+  const LatticeGraph graph(nodes, edges);
+  std::vector<double> all(springs.size());
+  std::vector<double> closing(springs.size());
+  std::vector<std::size_t> spring_to(nodes, springs.size());  // from the node at hand
+  for (std::size_t a = 0; a < nodes; ++a) {
+    for (const auto& n : graph.neighbours(a)) spring_to[n.node] = n.edge;
+    for (const auto& n : graph.neighbours(a)) {
+      const LatticeSpring& ab = springs[n.edge];
+      if (n.node < a || !has_direction(ab)) continue;
+      const Pose2 to_b = step_from(a, ab);
+      for (const auto& m : graph.neighbours(n.node)) {
+        // Each triangle once.
+        if (m.node < n.node || spring_to[m.node] == springs.size()) continue;
+        const std::size_t across = spring_to[m.node];
+        const LatticeSpring& bc = springs[m.edge];
+        const LatticeSpring& ac = springs[across];
+        if (!has_direction(bc) || !has_direction(ac)) continue;
+        const Pose2 by_b = to_b * step_from(n.node, bc);
+        const Pose2 straight = step_from(a, ac);
+        const double longest = std::max({ab.length, bc.length, ac.length});
+        const bool closes =
+            std::abs(angle_difference(by_b.heading_rad, straight.heading_rad)) <= kTurnsCancel &&
+            distance(by_b.position(), straight.position()) <= kWaysCancel * longest;
+        for (const std::size_t edge : {n.edge, m.edge, across}) {
+          all[edge] += 1.0;
+          closing[edge] += closes ? 1.0 : 0.0;
+        }
+      }
+    }
+    for (const auto& n : graph.neighbours(a)) spring_to[n.node] = springs.size();
+  }
+  for (std::size_t s = 0; s < springs.size(); ++s) {
+    if (all[s] > 0.0) closing[s] /= all[s];
+  }
+  return closing;
+}
+
+}  // namespace panonav

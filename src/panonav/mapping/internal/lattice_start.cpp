@@ -1,0 +1,209 @@
+#include "panonav/mapping/internal/lattice_start.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <queue>
+#include <tuple>
+#include <utility>
+
+#include "panonav/geometry/alignment.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/mapping/internal/multidimensional_scaling.hpp"
+#include "panonav/mapping/lattice_graph.hpp"
+
+namespace panonav {
+
+namespace {
+
+std::vector<std::vector<std::size_t>> members_of(const std::vector<std::size_t>& parts) {
+  std::vector<std::vector<std::size_t>> members;
+  for (std::size_t node = 0; node < parts.size(); ++node) {
+    if (parts[node] >= members.size()) members.resize(parts[node] + 1);
+    members[parts[node]].push_back(node);
+  }
+  return members;
+}
+
+/// Headings from the springs whose views agree best: a spanning tree of least disagreement. The
+/// first view of each part has heading 0.
+void set_headings(const LatticeGraph& graph, std::span<const LatticeSpring> springs,
+                  std::vector<Pose2>& poses) {
+  using Open = std::tuple<double, std::size_t, std::size_t>;  // disagreement, spring, node
+  std::vector<unsigned char> done(poses.size());
+  for (std::size_t first = 0; first < poses.size(); ++first) {
+    if (done[first] != 0) continue;
+    std::priority_queue<Open, std::vector<Open>, std::greater<>> open;
+    const auto reach = [&](std::size_t node, double heading_rad) {
+      poses[node].heading_rad = wrap_angle(heading_rad);
+      done[node] = 1;
+      for (const auto& neighbour : graph.neighbours(node)) {
+        const auto& phases = springs[neighbour.edge].phases;
+        if (!phases || done[neighbour.node] != 0) continue;
+        open.emplace(phases->turn_disagreement_rad, neighbour.edge, neighbour.node);
+      }
+    };
+    reach(first, 0.0);
+    while (!open.empty()) {
+      const auto [unused, edge, node] = open.top();
+      open.pop();
+      if (done[node] != 0) continue;
+      const LatticeSpring& spring = springs[edge];
+      if (node == spring.b) {
+        reach(node, poses[spring.a].heading_rad + spring.phases->turn_rad);
+      } else {
+        reach(node, poses[spring.b].heading_rad - spring.phases->turn_rad);
+      }
+    }
+  }
+}
+
+/// Points whose ways to each other stand for all others: each is the farthest from those before.
+std::vector<std::size_t> choose_landmarks(const LatticeGraph& graph, std::size_t count,
+                                          std::vector<double>& distances) {
+  std::vector<std::size_t> landmarks;
+  std::vector<double> nearest(graph.size(), std::numeric_limits<double>::infinity());
+  std::size_t next = 0;
+  while (landmarks.size() < std::min(count, graph.size())) {
+    landmarks.push_back(next);
+    const auto ways = graph.shortest_ways(next);
+    distances.insert(distances.end(), ways.begin(), ways.end());
+    for (std::size_t i = 0; i < nearest.size(); ++i) nearest[i] = std::min(nearest[i], ways[i]);
+    for (const std::size_t landmark : landmarks) nearest[landmark] = -1.0;
+    next = static_cast<std::size_t>(std::ranges::max_element(nearest) - nearest.begin());
+  }
+  return landmarks;
+}
+
+/// Turns, and mirrors if that fits better, the positions of one part until its springs point where
+/// the views say. False when no spring points anywhere.
+bool turn_to_directions(const std::vector<std::size_t>& members,
+                        const std::vector<std::size_t>& parts,
+                        std::span<const LatticeSpring> springs, std::vector<Pose2>& poses) {
+  std::vector<Point2> laid_out;
+  std::vector<Point2> seen;
+  const std::size_t part = parts[members.front()];
+  for (const LatticeSpring& spring : springs) {
+    if (parts[spring.a] != part || !spring.phases || !spring.phases->points) continue;
+    const Pose2& a = poses[spring.a];
+    const Pose2& b = poses[spring.b];
+    const double length = distance(a.position(), b.position());
+    if (!(length > 0.0)) continue;
+    const double world_rad = a.heading_rad + spring.phases->direction_a_rad;
+    // Both ways, so that neither set has a centre of its own.
+    for (const double sign : {1.0, -1.0}) {
+      laid_out.push_back({sign * (b.x_m - a.x_m) / length, sign * (b.y_m - a.y_m) / length});
+      seen.push_back({sign * std::cos(world_rad), sign * std::sin(world_rad)});
+    }
+  }
+  if (seen.empty()) return false;
+  const Alignment turned = align(laid_out, seen, {.allow_reflection = true});
+  for (const std::size_t node : members) {
+    const Point2 p = turned.apply(poses[node].position());
+    poses[node].x_m = p.x_m;
+    poses[node].y_m = p.y_m;
+  }
+  return true;
+}
+
+/// What the phases say of the way from `from`, whichever end of the spring that is.
+PhaseReading seen_from(std::size_t from, const LatticeSpring& spring) {
+  PhaseReading phases = *spring.phases;
+  if (from == spring.a) return phases;
+  phases.turn_rad = wrap_angle(-phases.turn_rad);
+  std::swap(phases.direction_a_rad, phases.direction_b_rad);
+  return phases;
+}
+
+}  // namespace
+
+LatticeStart lay_out_by_springs(std::size_t nodes, std::span<const LatticeSpring> springs,
+                                int landmarks) {
+  std::vector<GraphEdge> edges;
+  for (const auto& spring : springs) edges.push_back({spring.a, spring.b, spring.length});
+  const LatticeGraph graph(nodes, edges);
+  LatticeStart start{.poses = std::vector<Pose2>(nodes), .parts = graph.parts()};
+  set_headings(graph, springs, start.poses);
+  std::vector<std::size_t> local(nodes);
+  for (const auto& members : members_of(start.parts)) {
+    for (std::size_t i = 0; i < members.size(); ++i) local[members[i]] = i;
+    std::vector<GraphEdge> own;
+    for (const GraphEdge& edge : edges) {
+      if (start.parts[edge.a] != start.parts[members.front()]) continue;
+      own.push_back({local[edge.a], local[edge.b], edge.length});
+    }
+    std::vector<double> distances;
+    const auto chosen = choose_landmarks(LatticeGraph(members.size(), own),
+                                         static_cast<std::size_t>(landmarks), distances);
+    const auto points = multidimensional_scaling(chosen, members.size(), distances);
+    for (std::size_t i = 0; i < members.size(); ++i) {
+      start.poses[members[i]].x_m = points[i].x_m;
+      start.poses[members[i]].y_m = points[i].y_m;
+    }
+    start.handedness_known.push_back(
+        turn_to_directions(members, start.parts, springs, start.poses) ? 1 : 0);
+  }
+  return start;
+}
+
+bool is_compatible(const PhaseReading& phases, const CoarseMotion& motion) {
+  constexpr double kDeviations = 3.0;
+  const double turn = std::abs(angle_difference(phases.turn_rad, motion.step.heading_rad));
+  if (turn > kDeviations * motion.turn_deviation_rad) return false;
+  const double travel = std::hypot(motion.step.x_m, motion.step.y_m);
+  if (!phases.points || travel <= kDeviations * motion.distance_deviation_m) return true;
+  const double direction = std::abs(
+      angle_difference(phases.direction_a_rad, std::atan2(motion.step.y_m, motion.step.x_m)));
+  return direction <= kDeviations * motion.direction_deviation_rad;
+}
+
+LatticeStart lay_out_by_motion(std::size_t nodes, std::span<const NodeMotion> motions,
+                               std::span<const LatticeSpring> springs) {
+  std::map<std::pair<std::size_t, std::size_t>, const LatticeSpring*> seen;
+  for (const LatticeSpring& spring : springs) {
+    if (spring.phases) seen[{spring.a, spring.b}] = &spring;
+  }
+  std::vector<GraphEdge> edges;
+  for (const auto& motion : motions) edges.push_back({motion.a, motion.b, 1.0});
+  const LatticeGraph graph(nodes, edges);
+  LatticeStart start{.poses = std::vector<Pose2>(nodes), .parts = graph.parts()};
+  std::vector<unsigned char> done(nodes);
+  start.handedness_known.assign(members_of(start.parts).size(), 0);
+  for (std::size_t first = 0; first < nodes; ++first) {
+    if (done[first] != 0) continue;
+    // Breadth first: as few steps as can be add up their errors.
+    std::queue<std::size_t> open;
+    open.push(first);
+    done[first] = 1;
+    while (!open.empty()) {
+      const std::size_t from = open.front();
+      open.pop();
+      for (const auto& neighbour : graph.neighbours(from)) {
+        if (done[neighbour.node] != 0) continue;
+        const NodeMotion& moved = motions[neighbour.edge];
+        Pose2 step = moved.motion.step;  // in the frame of the motion's first node
+        const auto found = seen.find(std::minmax(moved.a, moved.b));
+        if (found != seen.end()) {
+          const PhaseReading phases = seen_from(moved.a, *found->second);
+          if (is_compatible(phases, moved.motion)) {
+            step.heading_rad = phases.turn_rad;
+            if (phases.points) {
+              const double travel = std::hypot(step.x_m, step.y_m);
+              step.x_m = travel * std::cos(phases.direction_a_rad);
+              step.y_m = travel * std::sin(phases.direction_a_rad);
+            }
+          }
+        }
+        start.poses[neighbour.node] = start.poses[from] * (from == moved.a ? step : inverse(step));
+        done[neighbour.node] = 1;
+        start.handedness_known[start.parts[from]] = 1;
+        open.push(neighbour.node);
+      }
+    }
+  }
+  return start;
+}
+
+}  // namespace panonav

@@ -1,0 +1,76 @@
+#include "panonav/mapping/map_measures.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav {
+
+namespace {
+
+// ranks[j]: how many points are nearer to `centre` than j, from 1; that of the centre is 0.
+std::vector<std::size_t> ranks_around(std::span<const Point2> points, std::size_t centre) {
+  std::vector<std::size_t> order(points.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::ranges::stable_sort(order, {}, [&](std::size_t j) {
+    return j == centre ? -1.0 : distance(points[centre], points[j]);
+  });
+  std::vector<std::size_t> ranks(points.size());
+  for (std::size_t rank = 0; rank < order.size(); ++rank) ranks[order[rank]] = rank;
+  return ranks;
+}
+
+}  // namespace
+
+NeighbourPreservation neighbour_preservation(std::span<const Point2> map,
+                                             std::span<const Point2> truth, int neighbours) {
+  const std::size_t n = map.size();
+  require(truth.size() == n, "points of the truth", static_cast<double>(truth.size()),
+          "as many as of the map");
+  require(neighbours >= 1 && 3 * static_cast<std::size_t>(neighbours) + 1 < 2 * n, "neighbours",
+          neighbours, ">= 1 and, times 3, below twice the points less 1");
+  for (const auto points : {map, truth}) {
+    for (const Point2& p : points) {
+      require(std::isfinite(p.x_m) && std::isfinite(p.y_m), "point", p.x_m + p.y_m, "finite");
+    }
+  }
+  const auto k = static_cast<std::size_t>(neighbours);
+  double untrue = 0.0;
+  double lost = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto in_map = ranks_around(map, i);
+    const auto in_truth = ranks_around(truth, i);
+    for (std::size_t j = 0; j < n; ++j) {
+      if (j == i) continue;
+      if (in_map[j] <= k && in_truth[j] > k) untrue += static_cast<double>(in_truth[j] - k);
+      if (in_truth[j] <= k && in_map[j] > k) lost += static_cast<double>(in_map[j] - k);
+    }
+  }
+  const double most = 0.5 * static_cast<double>(n) * static_cast<double>(k) *
+                      static_cast<double>(2 * n - 3 * k - 1);
+  return {1.0 - untrue / most, 1.0 - lost / most};
+}
+
+ClosureCount count_closures(const TopologicalMap& map,
+                            const std::function<std::optional<Point2>(ViewId)>& truth,
+                            double right_within_m) {
+  ClosureCount count;
+  for (const MapEdge& edge : map.edges) {
+    if (edge.kind != LinkKind::closure) continue;
+    const auto a = truth(edge.a);
+    const auto b = truth(edge.b);
+    if (!a || !b) {
+      ++count.unknown;
+    } else if (distance(*a, *b) <= right_within_m) {
+      ++count.right;
+    } else {
+      ++count.wrong;
+    }
+  }
+  return count;
+}
+
+}  // namespace panonav

@@ -1,0 +1,60 @@
+#include "panonav/memory/internal/comparison.hpp"
+
+#include <string>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav {
+
+namespace {
+
+std::string shape_text(SignatureShape shape) {
+  return std::to_string(shape.rows) + " rows x " + std::to_string(shape.components) + " components";
+}
+
+}  // namespace
+
+void require_signature(const PackedSignature& signature, SignatureShape shape) {
+  if (!(signature.shape == shape)) {
+    throw ContractError("signature shape", shape_text(signature.shape), shape_text(shape));
+  }
+  require(signature.magnitudes.size() == shape.size(), "number of packed magnitudes",
+          static_cast<double>(signature.magnitudes.size()), std::to_string(shape.size()));
+  require(signature.phases.size() == shape.size(), "number of packed phases",
+          static_cast<double>(signature.phases.size()), std::to_string(shape.size()));
+}
+
+int checked_components(int components, SignatureShape shape) {
+  require(components >= 0 && components <= shape.components, "components", components,
+          "0 .. " + std::to_string(shape.components));
+  return components == 0 ? shape.components : components;
+}
+
+Comparison::Comparison(const SearchedViews& searched, const PackedSignature& query, int components,
+                       const SearchMask& mask, const kernels::DistanceKernels& kernels)
+    : store_(searched.store),
+      kernels_(kernels),
+      components_(checked_components(components, searched.shape)),
+      component_bytes_(static_cast<std::size_t>(searched.shape.rows)) {
+  require_signature(query, searched.shape);
+  require(mask.allowed_rows.empty() || mask.allowed_rows.size() == component_bytes_,
+          "number of allowed rows", static_cast<double>(mask.allowed_rows.size()),
+          "0 or " + std::to_string(component_bytes_));
+  query_.assign(query.magnitudes.begin(), query.magnitudes.end());
+  if (!mask.allowed_rows.empty()) {
+    mask_.resize(bytes());
+    for (std::size_t i = 0; i < mask_.size(); ++i) {
+      mask_[i] = mask.allowed_rows[i % component_bytes_] != 0 ? 255 : 0;
+    }
+  }
+  for (const ViewId view : mask.excluded_views) {
+    const auto found = std::ranges::lower_bound(searched.views, view);
+    if (found == searched.views.end() || *found != view) continue;
+    excluded_rows_.push_back(searched.rows[found - searched.views.begin()]);
+  }
+  std::ranges::sort(excluded_rows_);
+  const auto repeated = std::ranges::unique(excluded_rows_);
+  excluded_rows_.erase(repeated.begin(), repeated.end());
+}
+
+}  // namespace panonav

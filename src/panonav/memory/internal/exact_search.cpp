@@ -1,0 +1,253 @@
+#include "panonav/memory/internal/exact_search.hpp"
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/memory/internal/comparison.hpp"
+
+namespace panonav {
+
+namespace {
+
+using Row = ViewStore::Row;
+
+/// A row and a lower bound of its distance.
+using Bounded = std::pair<std::uint32_t, Row>;
+
+/// The nearest views so far, at most `top`.
+class Nearest {
+ public:
+  /// Nothing further away than `limit` is wanted.
+  Nearest(std::size_t top, std::uint32_t limit) : top_(top), limit_(limit) {}
+
+  void offer(const Match& match) {
+    if (heap_.size() == top_) {
+      if (!is_nearer(match, heap_.front())) return;
+      std::ranges::pop_heap(heap_, is_nearer);
+      heap_.back() = match;
+    } else {
+      heap_.push_back(match);
+    }
+    std::ranges::push_heap(heap_, is_nearer);
+    if (heap_.size() == top_) limit_ = std::min(limit_, heap_.front().dissimilarity);
+  }
+  /// Views whose distance is larger cannot be among the nearest; views at this distance can.
+  [[nodiscard]] std::uint32_t limit() const noexcept { return limit_; }
+  /// Whether a view at `bound` or further away would not be taken.
+  [[nodiscard]] bool rules_out(std::uint32_t bound, ViewId view) const noexcept {
+    return bound > limit_ || (heap_.size() == top_ && bound == heap_.front().dissimilarity &&
+                              heap_.front().view < view);
+  }
+  [[nodiscard]] std::vector<Match> sorted() && {
+    std::ranges::sort_heap(heap_, is_nearer);
+    return std::move(heap_);
+  }
+
+ private:
+  std::size_t top_;
+  std::uint32_t limit_;
+  std::vector<Match> heap_;  // the furthest in front
+};
+
+/// Whether the fine bounds of the last views were worth their bytes.
+class FineBenefit {
+ public:
+  FineBenefit(std::size_t fine_bytes, std::size_t full_bytes)
+      : fine_bytes_(fine_bytes), full_bytes_(full_bytes) {}
+  void count(std::size_t tested, std::size_t passed) {
+    tested_ = tested_ / 2 + tested;
+    passed_ = passed_ / 2 + passed;
+  }
+  [[nodiscard]] bool pays() const noexcept {
+    return tested_ < 256 || (tested_ - passed_) * full_bytes_ > tested_ * fine_bytes_;
+  }
+
+ private:
+  std::size_t fine_bytes_, full_bytes_;
+  std::size_t tested_ = 0, passed_ = 0;
+};
+
+class Search {
+ public:
+  Search(const SearchedViews& searched, const Comparison& comparison,
+         const SketchIndex::Query& query, const kernels::DistanceKernels& kernels, std::size_t top,
+         SearchResult& result)
+      : searched_(searched),
+        comparison_(comparison),
+        query_(query),
+        kernels_(kernels),
+        top_(top),
+        fine_(searched.index, kernels, query),
+        has_fine_(searched.index.layout().fine_blocks > 0 && fine_.bytes() < comparison.bytes()),
+        result_(result) {}
+
+  std::vector<Match> run() {
+    const std::size_t blocks = searched_.index.blocks();
+    const std::size_t rows = blocks * SketchIndex::rows_per_block;
+    const auto bounds = std::make_unique_for_overwrite<std::uint32_t[]>(rows);
+    const auto smallest = std::make_unique_for_overwrite<std::uint32_t[]>(blocks);
+    bounds_ = {bounds.get(), rows};
+    smallest_ = {smallest.get(), blocks};
+    searched_.index.coarse_bounds(kernels_, query_, bounds_, smallest_);
+    result_.bytes_read += std::uint64_t{rows} * searched_.index.coarse_bytes(query_);
+    for (const Row row : comparison_.excluded_rows()) bounds_[row] = SketchIndex::no_view;
+
+    Nearest nearest(top_, first_limit());
+    scan(nearest);
+    return std::move(nearest).sorted();
+  }
+
+ private:
+  std::uint32_t full(Row row) {
+    result_.bytes_read += comparison_.bytes();
+    ++result_.views_in_full;
+    return comparison_.full(row);
+  }
+
+  /// Fine bounds of rows first + places[i], which lie in one segment.
+  void fine(Row first, std::span<const std::uint32_t> places, std::uint32_t* bounds) {
+    result_.bytes_read += places.size() * fine_.bytes();
+    fine_(first, places, bounds);
+  }
+
+  /// A distance within which `top` views lie, from the views that look best by their bounds. A good
+  /// one is worth some bytes: it decides how many views the bounds leave.
+  std::uint32_t first_limit() {
+    std::vector<Bounded> best_blocks(smallest_.size());
+    for (std::size_t i = 0; i < best_blocks.size(); ++i) {
+      best_blocks[i] = {smallest_[i], static_cast<Row>(i)};
+    }
+    std::vector<Bounded> best;
+    for (std::size_t blocks = 16 + top_; best.size() < top_; blocks *= 2) {
+      best.clear();
+      blocks = std::min(blocks, best_blocks.size());
+      std::ranges::nth_element(best_blocks,
+                               best_blocks.begin() + static_cast<std::ptrdiff_t>(blocks - 1));
+      for (std::size_t i = 0; i < blocks; ++i) {
+        const Row first = best_blocks[i].second * static_cast<Row>(SketchIndex::rows_per_block);
+        for (Row row = first; row < first + SketchIndex::rows_per_block; ++row) {
+          if (bounds_[row] < SketchIndex::no_view) best.emplace_back(bounds_[row], row);
+        }
+      }
+    }
+    if (has_fine_) {
+      keep_smallest(best, 64 + 8 * top_);
+      // In the order of the rows, so that the query is encoded once for each segment.
+      std::ranges::sort(best, {}, &Bounded::second);
+      constexpr std::uint32_t here = 0;
+      for (Bounded& candidate : best) fine(candidate.second, {&here, 1}, &candidate.first);
+    }
+    keep_smallest(best, 2 * top_);
+    for (Bounded& candidate : best) candidate.first = full(candidate.second);
+    keep_smallest(best, top_);
+    return std::ranges::max(best).first;
+  }
+
+  static void keep_smallest(std::vector<Bounded>& values, std::size_t count) {
+    if (values.size() <= count) return;
+    std::ranges::nth_element(values, values.begin() + static_cast<std::ptrdiff_t>(count));
+    values.resize(count);
+  }
+
+  void scan(Nearest& nearest) {
+    constexpr std::size_t chunk = 1024;
+    static_assert(SketchIndex::rows_per_segment % chunk == 0);
+    // Now and then the fine bounds get a new chance: the limit sinks while the scan runs.
+    constexpr std::size_t retry = 16;
+    constexpr std::size_t most_waiting = 2048;
+    std::array<std::uint32_t, chunk + 16> found{};
+    std::array<std::uint32_t, chunk> fine_bounds{};
+    std::vector<Bounded> waiting;
+    FineBenefit benefit(fine_.bytes(), comparison_.bytes());
+    for (std::size_t begin = 0; begin < bounds_.size(); begin += chunk) {
+      const std::size_t count = std::min(chunk, bounds_.size() - begin);
+      const std::size_t passed =
+          kernels_.collect_at_most(bounds_.data() + begin, count, nearest.limit(), found.data());
+      const bool test_fine = has_fine_ && (benefit.pays() || begin / chunk % retry == 0);
+      if (test_fine) {
+        const std::size_t before = waiting.size();
+        fine(static_cast<Row>(begin), {found.data(), passed}, fine_bounds.data());
+        for (std::size_t i = 0; i < passed; ++i) {
+          if (fine_bounds[i] <= nearest.limit()) {
+            waiting.emplace_back(fine_bounds[i], static_cast<Row>(begin + found[i]));
+          }
+        }
+        benefit.count(passed, waiting.size() - before);
+        if (waiting.size() >= most_waiting || !benefit.pays()) compare(waiting, nearest);
+      } else {
+        for (std::size_t i = 0; i < passed; ++i) {
+          // The processor itself looks ahead from row to row.
+          if (i + 1 < passed && found[i + 1] != found[i] + 1) {
+            comparison_.prefetch(static_cast<Row>(begin + found[i + 1]));
+          }
+          const auto row = static_cast<Row>(begin + found[i]);
+          if (nearest.rules_out(bounds_[row], searched_.view_of_row[row])) continue;
+          nearest.offer({searched_.view_of_row[row], full(row)});
+        }
+      }
+    }
+    compare(waiting, nearest);
+  }
+
+  /// Compares in full, the best bound first, as long as the bounds allow.
+  void compare(std::vector<Bounded>& waiting, Nearest& nearest) {
+    std::ranges::sort(waiting);
+    for (std::size_t i = 0; i < waiting.size(); ++i) {
+      const auto [bound, row] = waiting[i];
+      if (bound > nearest.limit()) break;
+      if (i + 1 < waiting.size()) comparison_.prefetch(waiting[i + 1].second);
+      if (nearest.rules_out(bound, searched_.view_of_row[row])) continue;
+      nearest.offer({searched_.view_of_row[row], full(row)});
+    }
+    waiting.clear();
+  }
+
+  const SearchedViews& searched_;
+  const Comparison& comparison_;
+  const SketchIndex::Query& query_;
+  const kernels::DistanceKernels& kernels_;
+  std::size_t top_;
+  SketchIndex::FineBounds fine_;
+  bool has_fine_;
+  SearchResult& result_;
+  std::span<std::uint32_t> bounds_, smallest_;
+};
+
+}  // namespace
+
+SearchResult exact_search(const SearchedViews& searched, const PackedSignature& query,
+                          const SearchOptions& options, const SearchMask& mask,
+                          kernels::Instructions instructions) {
+  require(options.top >= 1, "top", options.top, ">= 1");
+  const kernels::DistanceKernels& kernels = kernels::distance_kernels(instructions);
+  const Comparison comparison(searched, query, options.components, mask, kernels);
+  SearchResult result;
+  const std::size_t views = searched.views.size() - comparison.excluded_rows().size();
+  result.bytes_in_full = std::uint64_t{views} * comparison.bytes();
+  const std::size_t top = std::min(static_cast<std::size_t>(options.top), views);
+  if (top == 0) return result;
+
+  // Bounds help when few of the views are wanted.
+  constexpr std::size_t fewest_views_per_match = 8;
+  if (searched.index.layout().any() && views / fewest_views_per_match >= top) {
+    const SketchIndex::Query sketch =
+        searched.index.prepare(comparison.query(), comparison.components(), mask.allowed_rows);
+    result.matches = Search(searched, comparison, sketch, kernels, top, result).run();
+    return result;
+  }
+  Nearest nearest(top, SketchIndex::no_view);
+  for (std::size_t i = 0; i < searched.views.size(); ++i) {
+    const Row row = searched.rows[i];
+    if (comparison.excludes(row)) continue;
+    nearest.offer({searched.views[i], comparison.full(row)});
+  }
+  result.views_in_full = views;
+  result.bytes_read = result.bytes_in_full;
+  result.matches = std::move(nearest).sorted();
+  return result;
+}
+
+}  // namespace panonav

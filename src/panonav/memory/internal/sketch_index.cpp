@@ -1,0 +1,332 @@
+#include "panonav/memory/internal/sketch_index.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+#include <numeric>
+
+namespace panonav {
+
+namespace {
+
+constexpr std::size_t group_bytes = 8;
+constexpr std::int32_t no_slack = -static_cast<std::int32_t>(SketchIndex::no_view);
+
+std::size_t groups_of(std::size_t dimensions) {
+  return (dimensions + group_bytes - 1) / group_bytes;
+}
+
+/// The sum of `count` bytes.
+std::int32_t sum_of_bytes(const std::uint8_t* bytes, int count) {
+  std::int32_t sum = 0;
+  int i = 0;
+  for (; i + 8 <= count; i += 8) {
+    // Eight bytes at once, added up in pairs; the product gathers the four pairs in the highest 16
+    // bits.
+    std::uint64_t eight = 0;
+    std::memcpy(&eight, bytes + i, 8);
+    constexpr std::uint64_t even = 0x00FF00FF00FF00FFU;
+    const std::uint64_t pairs = (eight & even) + ((eight >> 8U) & even);
+    sum += static_cast<std::int32_t>((pairs * 0x0001000100010001U) >> 48U);
+  }
+  for (; i < count; ++i) sum += bytes[i];
+  return sum;
+}
+
+/// The codes nearest to the sums of one group, and what they miss. Any code would be safe, so
+/// rounding of the float product does no harm.
+std::int32_t encode_group(const std::int32_t* sums, const std::int32_t* offsets,
+                          std::uint64_t group_step, float inverse_step, std::uint8_t* codes) {
+  const auto step = static_cast<std::int32_t>(group_step);
+  std::int32_t missed = 0;
+  for (std::size_t i = 0; i < group_bytes; ++i) {
+    const std::int32_t above = sums[i] - offsets[i];
+    const float scaled = static_cast<float>(above) * inverse_step + 0.5F;
+    const auto code = static_cast<std::int32_t>(std::min(std::max(scaled, 0.0F), 255.0F));
+    codes[i] = static_cast<std::uint8_t>(code);
+    missed += std::abs(above - code * step);
+  }
+  return missed;
+}
+
+void set_scale(SketchScale& scale, std::vector<std::int32_t> lowest,
+               std::vector<std::int32_t> highest) {
+  const std::size_t groups = lowest.size() / group_bytes;
+  scale.offsets = std::move(lowest);
+  scale.highest = std::move(highest);
+  scale.steps.assign(groups, 1);
+  scale.inverse_steps.assign(groups, 1.0F);
+  for (std::size_t d = 0; d < scale.offsets.size(); ++d) {
+    const auto range = static_cast<std::uint64_t>(scale.highest[d] - scale.offsets[d]);
+    std::uint64_t& step = scale.steps[d / group_bytes];
+    step = std::max(step, (range + 254) / 255);
+    scale.inverse_steps[d / group_bytes] = 1.0F / static_cast<float>(step);
+  }
+}
+
+/// A query in the codes of one segment. `values` has room for all groups.
+/// Where all views lie within the scale, what the query lies outside of it is part of the distance.
+void encode_query(const SketchScale& scale, bool covers, std::span<const std::int32_t> sums,
+                  std::span<const std::uint8_t> mask, std::size_t groups, std::uint8_t* values,
+                  kernels::SketchQuery& encoded) {
+  std::int32_t constant = 0;
+  std::int32_t largest_slack = 0;
+  groups = std::min(groups, scale.steps.size());
+  for (std::size_t group = 0; group < groups; ++group) {
+    std::array<std::int32_t, group_bytes> offsets{};
+    std::array<std::int32_t, group_bytes> inside{};
+    std::array<std::int32_t, group_bytes> counts{};
+    for (std::size_t i = 0; i < group_bytes; ++i) {
+      const std::size_t d = group * group_bytes + i;
+      counts[i] = mask[d] != 0 ? 1 : 0;
+      // What does not count becomes code 0 without loss.
+      offsets[i] = counts[i] * scale.offsets[d];
+      inside[i] = counts[i] * sums[d];
+      if (covers) {
+        const std::int32_t highest = counts[i] * scale.highest[d];
+        const std::int32_t clamped = std::min(std::max(inside[i], offsets[i]), highest);
+        constant += std::abs(inside[i] - clamped);
+        inside[i] = clamped;
+      }
+    }
+    const std::uint64_t step = scale.steps[group];
+    constant -= encode_group(inside.data(), offsets.data(), step, scale.inverse_steps[group],
+                             values + group * group_bytes);
+    for (const std::int32_t count : counts) {
+      largest_slack += count * static_cast<std::int32_t>(step / 2 + 1);
+    }
+  }
+  encoded.steps = scale.steps.data();
+  encoded.groups = groups;
+  encoded.constant = constant;
+  encoded.largest_slack = covers ? largest_slack : static_cast<std::int32_t>(SketchIndex::no_view);
+}
+
+}  // namespace
+
+SketchLayout::SketchLayout(SignatureShape shape_) : shape(shape_) {
+  // Where a block would hold fewer than about three rows, a sketch costs as much as what it saves.
+  if (shape.rows >= 3) coarse_blocks = shape.rows >= 6 ? 2 : 1;
+  if (shape.rows >= 20) {
+    fine_blocks = BlockSums::blocks_per_component;
+    // Views differ most in their low components, because the spectra of pictures fall.
+    low_components = (shape.components + 2) / 3;
+  }
+  const auto components = static_cast<std::size_t>(shape.components);
+  coarse_groups = groups_of(coarse_dimensions(shape.components));
+  fine_groups = (groups_of(components * fine_blocks) + 7) / 8 * 8;
+}
+
+void SketchLayout::sum_blocks(const std::uint8_t* magnitudes, BlockSums& sums) const {
+  const auto components = static_cast<std::size_t>(shape.components);
+  sums.fine.resize(fine_groups * group_bytes);
+  sums.coarse.resize(coarse_groups * group_bytes);
+  const int blocks = fine_blocks > 0 ? fine_blocks : coarse_blocks;
+  std::int32_t* const out = fine_blocks > 0 ? sums.fine.data() : sums.coarse.data();
+  std::array<int, BlockSums::blocks_per_component + 1> borders{};
+  for (int block = 0; block <= blocks; ++block) borders[block] = first_row(block, blocks);
+  for (std::size_t k = 0; k < components; ++k) {
+    const std::uint8_t* const rows = magnitudes + k * shape.rows;
+    for (int block = 0; block < blocks; ++block) {
+      out[k * blocks + block] =
+          sum_of_bytes(rows + borders[block], borders[block + 1] - borders[block]);
+    }
+  }
+  if (fine_blocks == 0) return;
+  const std::int32_t* fine = sums.fine.data();
+  std::size_t d = 0;
+  for (int k = 0; k < shape.components; ++k) {
+    const int joined = fine_blocks / coarse_blocks_of(k);
+    for (int block = 0; block < coarse_blocks_of(k); ++block, fine += joined) {
+      sums.coarse[d++] = std::accumulate(fine, fine + joined, std::int32_t{0});
+    }
+  }
+}
+
+SketchIndex::Segment SketchIndex::make_segment() const {
+  // Until enough views are there to learn from, a scale that holds every possible sum.
+  BlockSums highest;
+  layout_.sum_blocks(std::vector<std::uint8_t>(layout_.shape.size(), 255).data(), highest);
+  Segment segment;
+  set_scale(segment.coarse.scale, std::vector<std::int32_t>(highest.coarse.size(), 0),
+            highest.coarse);
+  set_scale(segment.fine.scale, std::vector<std::int32_t>(highest.fine.size(), 0), highest.fine);
+  return segment;
+}
+
+bool SketchIndex::encode(Segment& segment, std::size_t place, const BlockSums& sums) const {
+  const auto encode_level = [place](Level& level, std::uint8_t* codes, std::size_t group_stride,
+                                    const std::vector<std::int32_t>& values) {
+    const SketchScale& scale = level.scale;
+    std::int32_t slack = 0;
+    std::int32_t outside = 0;
+    for (std::size_t group = 0; group < scale.steps.size(); ++group) {
+      const std::size_t first = group * group_bytes;
+      slack += encode_group(values.data() + first, scale.offsets.data() + first, scale.steps[group],
+                            scale.inverse_steps[group], codes + group * group_stride);
+      for (std::size_t d = first; d < first + group_bytes; ++d) {
+        outside |= (values[d] - scale.offsets[d]) | (scale.highest[d] - values[d]);
+      }
+    }
+    level.slacks[place] = slack;
+    level.covers = level.covers && outside >= 0;
+    return outside >= 0;
+  };
+  const std::size_t octet = place / 8 * layout_.coarse_groups * 8 + place % 8;
+  bool within = encode_level(segment.coarse, segment.coarse.codes.data() + octet * group_bytes,
+                             8 * group_bytes, sums.coarse);
+  if (layout_.fine_blocks > 0) {
+    const std::size_t at = place * layout_.fine_groups * group_bytes;
+    within &= encode_level(segment.fine, segment.fine.codes.data() + at, group_bytes, sums.fine);
+  }
+  return within;
+}
+
+void SketchIndex::learn(Segment& segment, std::size_t first_row, const ViewStore& store) const {
+  std::vector<std::pair<std::size_t, BlockSums>> all;
+  all.reserve(segment.used);
+  for (std::size_t place = 0; place < segment.coarse.slacks.size(); ++place) {
+    if (segment.coarse.slacks[place] == no_slack) continue;
+    all.emplace_back(place, BlockSums{});
+    layout_.sum_blocks(store.magnitudes(static_cast<Row>(first_row + place)), all.back().second);
+  }
+  BlockSums low = all.front().second;
+  BlockSums high = low;
+  const auto widen = [](const std::vector<std::int32_t>& values, std::vector<std::int32_t>& lowest,
+                        std::vector<std::int32_t>& highest) {
+    for (std::size_t d = 0; d < values.size(); ++d) {
+      lowest[d] = std::min(lowest[d], values[d]);
+      highest[d] = std::max(highest[d], values[d]);
+    }
+  };
+  for (const auto& [place, sums] : all) {
+    widen(sums.coarse, low.coarse, high.coarse);
+    widen(sums.fine, low.fine, high.fine);
+  }
+  set_scale(segment.coarse.scale, std::move(low.coarse), std::move(high.coarse));
+  set_scale(segment.fine.scale, std::move(low.fine), std::move(high.fine));
+  segment.coarse.covers = true;
+  segment.fine.covers = true;
+  for (const auto& [place, sums] : all) encode(segment, place, sums);
+  segment.learnt_from = segment.used;
+  segment.outside = 0;
+}
+
+void SketchIndex::insert(const ViewStore& store, Row row) {
+  if (!layout_.any()) return;
+  const std::size_t number = row / rows_per_segment;
+  const std::size_t place = row % rows_per_segment;
+  if (number == segments_.size()) segments_.push_back(make_segment());
+  Segment& segment = segments_[number];
+  if (place >= segment.coarse.slacks.size()) {
+    const std::size_t rows = place / rows_per_block * rows_per_block + rows_per_block;
+    segment.coarse.codes.resize(rows * layout_.coarse_groups * group_bytes);
+    segment.coarse.slacks.resize(rows, no_slack);
+    segment.fine.codes.resize(rows * layout_.fine_groups * group_bytes);
+    segment.fine.slacks.resize(layout_.fine_blocks > 0 ? rows : 0, no_slack);
+  }
+  rows_end_ = std::max(rows_end_, std::size_t{row} + 1);
+
+  BlockSums sums;
+  layout_.sum_blocks(store.magnitudes(row), sums);
+  if (!encode(segment, place, sums)) ++segment.outside;
+  ++segment.used;
+  // A scale that was learnt from fewer views is never too wide, so only those outside call for
+  // another.
+  constexpr std::size_t enough_to_learn = 64;
+  const bool first = segment.learnt_from == 0 && segment.used >= enough_to_learn;
+  const bool drifted = segment.learnt_from > 0 && segment.outside >= 8 + segment.used / 8;
+  if (first || drifted) learn(segment, number * rows_per_segment, store);
+}
+
+void SketchIndex::erase(Row row) {
+  if (!layout_.any()) return;
+  Segment& segment = segments_[row / rows_per_segment];
+  const std::size_t place = row % rows_per_segment;
+  segment.coarse.slacks[place] = no_slack;
+  if (layout_.fine_blocks > 0) segment.fine.slacks[place] = no_slack;
+  --segment.used;
+}
+
+SketchIndex::Query SketchIndex::prepare(const std::uint8_t* magnitudes, int components,
+                                        std::span<const std::uint8_t> allowed_rows) const {
+  Query query;
+  layout_.sum_blocks(magnitudes, query.sums);
+  const auto counts = [&](int block, int blocks) {
+    if (allowed_rows.empty()) return true;
+    const auto rows = allowed_rows.subspan(
+        layout_.first_row(block, blocks),
+        layout_.first_row(block + 1, blocks) - layout_.first_row(block, blocks));
+    return std::ranges::count(rows, 0) == 0;
+  };
+  query.coarse_mask.assign(layout_.coarse_groups * group_bytes, 0);
+  query.fine_mask.assign(layout_.fine_groups * group_bytes, 0);
+  std::size_t coarse = 0;
+  std::size_t fine = 0;
+  for (int k = 0; k < components; ++k) {
+    const int blocks = layout_.coarse_blocks_of(k);
+    for (int i = 0; i < blocks; ++i) query.coarse_mask[coarse++] = counts(i, blocks) ? 255 : 0;
+    for (int i = 0; i < layout_.fine_blocks; ++i) {
+      query.fine_mask[fine++] = counts(i, layout_.fine_blocks) ? 255 : 0;
+    }
+  }
+  query.coarse_groups = groups_of(coarse);
+  query.fine_groups = (groups_of(fine) + 7) / 8 * 8;
+  return query;
+}
+
+void SketchIndex::coarse_bounds(const kernels::DistanceKernels& kernels, const Query& query,
+                                std::span<std::uint32_t> bounds,
+                                std::span<std::uint32_t> smallest) const {
+  std::vector<std::uint8_t> values(layout_.coarse_groups * group_bytes, 0);
+  kernels::SketchQuery encoded{};
+  encoded.values = values.data();
+  encoded.mask = query.coarse_mask.data();
+  encoded.stored_groups = layout_.coarse_groups;
+  std::size_t block = 0;
+  for (const Segment& segment : segments_) {
+    encode_query(segment.coarse.scale, segment.coarse.covers, query.sums.coarse, query.coarse_mask,
+                 query.coarse_groups, values.data(), encoded);
+    const std::size_t blocks_here = segment.coarse.slacks.size() / rows_per_block;
+    for (std::size_t i = 0; i < blocks_here; ++i, ++block) {
+      const std::size_t place = i * rows_per_block;
+      smallest[block] = kernels.sketch_bounds(
+          segment.coarse.codes.data() + place * layout_.coarse_groups * group_bytes,
+          segment.coarse.slacks.data() + place, rows_per_block / 8, encoded,
+          bounds.data() + block * rows_per_block);
+    }
+  }
+}
+
+SketchIndex::FineBounds::FineBounds(const SketchIndex& index,
+                                    const kernels::DistanceKernels& kernels, const Query& query)
+    : index_(index),
+      kernels_(kernels),
+      query_(query),
+      values_(index.layout_.fine_groups * group_bytes, 0),
+      mask_(query.fine_mask.begin(), query.fine_mask.end()) {
+  encoded_.values = values_.data();
+  encoded_.mask = mask_.data();
+  encoded_.stored_groups = index.layout_.fine_groups;
+}
+
+void SketchIndex::FineBounds::operator()(Row first, std::span<const std::uint32_t> places,
+                                         std::uint32_t* bounds) {
+  const std::size_t number = first / rows_per_segment;
+  const std::size_t place = first % rows_per_segment;
+  const Level& level = index_.segments_[number].fine;
+  if (number != segment_) {
+    encode_query(level.scale, level.covers, query_.sums.fine, query_.fine_mask, query_.fine_groups,
+                 values_.data(), encoded_);
+    segment_ = number;
+  }
+  kernels_.sketch_bounds_at(level.codes.data() + place * index_.layout_.fine_groups * group_bytes,
+                            level.slacks.data() + place, places.data(), places.size(), encoded_,
+                            bounds);
+}
+
+std::size_t SketchIndex::FineBounds::bytes() const noexcept {
+  return query_.fine_groups * group_bytes + sizeof(std::int32_t);
+}
+
+}  // namespace panonav

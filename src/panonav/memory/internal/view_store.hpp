@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "panonav/memory/internal/aligned_vector.hpp"
+#include "panonav/signature/fourier_signature.hpp"
+
+namespace panonav {
+
+/// Packed signatures in rows that never move while they are in use, so that a memory grows without
+/// copying what it holds. Magnitudes start on 64-byte borders and are padded with zeros up to the
+/// next one. A freed row is given out again. Row numbers are below `rows_end()`.
+class ViewStore {
+ public:
+  using Row = std::uint32_t;
+
+  explicit ViewStore(SignatureShape shape);
+
+  /// Copies one signature of the store's shape.
+  Row add(const PackedSignature& signature);
+  void free(Row row);
+
+  [[nodiscard]] Row rows_end() const noexcept { return rows_end_; }
+  /// Bytes from one view's magnitudes to the next, padding included.
+  [[nodiscard]] std::size_t stride() const noexcept { return stride_; }
+  [[nodiscard]] const std::uint8_t* magnitudes(Row row) const noexcept {
+    return chunks_[row / rows_per_chunk].data() + (row % rows_per_chunk) * stride_;
+  }
+  [[nodiscard]] const std::uint8_t* phases(Row row) const noexcept {
+    return chunks_[row / rows_per_chunk].data() + rows_per_chunk * stride_ +
+           (row % rows_per_chunk) * shape_.size();
+  }
+
+ private:
+  static constexpr std::size_t rows_per_chunk = 256;
+
+  SignatureShape shape_;
+  std::size_t stride_;
+  std::vector<AlignedVector<std::uint8_t>> chunks_;  // magnitudes of all rows, then their phases
+  std::vector<Row> free_rows_;
+  Row rows_end_ = 0;
+};
+
+}  // namespace panonav

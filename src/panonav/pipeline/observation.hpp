@@ -1,0 +1,46 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "panonav/core/image.hpp"
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/memory/visual_memory.hpp"
+#include "panonav/panorama/panorama.hpp"
+
+namespace panonav {
+
+/// How far the camera's axis leans against the vertical: first about the robot's x axis, then about
+/// its y axis, right-handed [REP 103].
+struct Tilt {
+  double roll_rad = 0.0;
+  double pitch_rad = 0.0;
+  friend bool operator==(const Tilt&, const Tilt&) = default;
+};
+
+/// One moment of a robot: what its camera saw, and what else is known of it. A folder, a video, a
+/// live camera and a recording all become observations, and everything in `pipeline` takes them one
+/// at a time.
+struct Observation {
+  // NOLINTNEXTLINE(google-explicit-constructor): a picture alone is an observation
+  Observation(Image seen) : picture(std::move(seen)) {}
+  // NOLINTNEXTLINE(google-explicit-constructor)
+  Observation(Panorama seen) : picture(std::move(seen)) {}
+
+  /// As the camera delivered it, or a panoramic cylinder already.
+  std::variant<Image, Panorama> picture;
+  std::string name;  ///< the picture's file or topic; it stands in messages
+  std::optional<double> stamp_s;
+  /// Absolute, in the frame of the odometry, which drifts against the world.
+  std::optional<Pose2> odometry;
+  /// In the world frame, where a survey or a simulation knows it. Memories keep it; no estimate of
+  /// this picture's own place ever reads it.
+  std::optional<ReferencePose> pose;
+  /// Measured by an inertial sensor. Pictures are taken as upright: a tilt of more than half a
+  /// degree is refused with ContractError until unwarping compensates it.
+  std::optional<Tilt> tilt;
+};
+
+}  // namespace panonav

@@ -1,0 +1,172 @@
+#include "panonav/pipeline/view_encoder.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string_view>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav/panorama/preprocessing.hpp"
+
+namespace panonav {
+
+namespace {
+
+/// Lean of the camera that changes less than the spacing of rows does.
+constexpr double tolerated_tilt_rad = 0.5 * std::numbers::pi / 180.0;
+
+constexpr PanoramaShape default_shape{80, 512};  // [M04 section 2.1]
+
+/// Pictures that are resampled anyway are cut to the memory's band; ready-made panoramas stay as
+/// they are.
+PictureSource cut_to(const MemoryHeader& header, PictureSource source) {
+  if (source.kind != PictureKind::panorama) source.layout.kept_elevations = header.elevations;
+  return source;
+}
+
+bool both_ready_made(const MemoryHeader& header, const PictureSource& source) {
+  return source.kind == PictureKind::panorama && header.source.kind == PictureKind::panorama;
+}
+
+PanoramaShape shape_for(const MemoryHeader& header, const PictureSource& source) {
+  if (both_ready_made(header, source) && !header.picture_shape) return {};
+  return {header.shape.rows, header.panorama_columns};
+}
+
+std::string band_text(const std::optional<ElevationBand>& band) {
+  if (!band) return "unknown";
+  return short_number(degrees(band->bottom_rad)) + " to " + short_number(degrees(band->top_rad)) +
+         " degrees";
+}
+
+bool same_band(const std::optional<ElevationBand>& a, const std::optional<ElevationBand>& b) {
+  if (!a || !b) return !a && !b;
+  constexpr double tolerance_rad = 1e-6;
+  return std::abs(a->bottom_rad - b->bottom_rad) < tolerance_rad &&
+         std::abs(a->top_rad - b->top_rad) < tolerance_rad;
+}
+
+constexpr std::string_view as_remembered = ", as in the views of the memory";
+
+void require_same(std::string_view field, int value, int remembered) {
+  if (value != remembered) {
+    throw ContractError(field, value, std::to_string(remembered) + std::string(as_remembered));
+  }
+}
+
+}  // namespace
+
+ViewEncoder::ViewEncoder(const MemoryHeader& header, const PictureSource& source)
+    : header_(header), reader_(cut_to(header, source), shape_for(header, source)) {
+  if (both_ready_made(header, source)) picture_shape_ = header.picture_shape;
+}
+
+Panorama ViewEncoder::panorama(ImageView picture) const {
+  if (picture_shape_) {
+    require_same("rows", picture.height, picture_shape_->rows);
+    require_same("columns", picture.width, picture_shape_->columns);
+  }
+  return checked(reader_.convert(picture));
+}
+
+Panorama ViewEncoder::checked(Panorama panorama) const {
+  require_same("rows", panorama.rows(), header_.shape.rows);
+  require_same("columns", panorama.columns(), header_.panorama_columns);
+  if (!same_band(panorama.elevations(), header_.elevations)) {
+    throw ContractError("elevation band", band_text(panorama.elevations()),
+                        band_text(header_.elevations) + std::string(as_remembered));
+  }
+  return panorama;
+}
+
+Panorama ViewEncoder::panorama(const Observation& observation) const {
+  const auto& tilt = observation.tilt;
+  if (tilt && std::max(std::abs(tilt->roll_rad), std::abs(tilt->pitch_rad)) > tolerated_tilt_rad) {
+    throw ContractError("tilt of " + observation.name,
+                        short_number(degrees(tilt->roll_rad)) + ", " +
+                            short_number(degrees(tilt->pitch_rad)) + " degrees",
+                        "-0.5 to 0.5 degrees, as pictures are taken as upright");
+  }
+  if (const auto* ready = std::get_if<Panorama>(&observation.picture)) return checked(*ready);
+  return panorama(std::get<Image>(observation.picture).view());
+}
+
+FourierSignature ViewEncoder::signature(const Panorama& panorama) const {
+  return compute_signature(preprocess(panorama, header_.preprocessing), header_.shape.components);
+}
+
+PackedSignature ViewEncoder::packed(const Panorama& panorama) const {
+  return pack(signature(panorama), header_.full_scale);
+}
+
+Panorama ViewEncoder::read(const DatasetEntry& entry) const {
+  const Image picture = read_image(entry.path);
+  try {
+    return panorama(picture.view());
+  } catch (const ContractError& error) {
+    throw FileError(entry.path.string(), error.what());
+  }
+}
+
+PanoramaShape wanted_shape(const PictureSource& source, const SignatureOptions& options) {
+  PanoramaShape shape{options.rows, options.columns};
+  if (source.kind == PictureKind::panorama) return shape;
+  if (shape.rows == 0) shape.rows = default_shape.rows;
+  if (shape.columns == 0) shape.columns = default_shape.columns;
+  return shape;
+}
+
+void visit_options(SignatureOptions& options, OptionVisitor& visitor) {
+  visitor.visit(
+      {.name = "rows",
+       .help = "Rows of the panoramic cylinder; pictures are resampled; 0: 80, or a panorama's own",
+       .low = 0,
+       .high = 4096},
+      options.rows);
+  visitor.visit({.name = "columns",
+                 .help = "Columns of the panoramic cylinder, likewise; 0: 512, or a panorama's own",
+                 .low = 0,
+                 .high = 16384},
+                options.columns);
+  visitor.visit({.name = "components",
+                 .help = "Fourier components of a signature, k = 0 included",
+                 .low = 1,
+                 .high = 1024},
+                options.components);
+}
+
+float largest_structure(const FourierSignature& signature) {
+  const auto structure = signature.magnitudes().subspan(static_cast<std::size_t>(signature.rows()));
+  return structure.empty() ? signature.magnitudes().front()
+                           : *std::max_element(structure.begin(), structure.end());
+}
+
+std::vector<std::uint8_t> thumbnail_png(const Panorama& panorama) {
+  constexpr int largest_columns = 256;
+  const Image picture = to_picture(panorama);
+  const int step = (picture.width() + largest_columns - 1) / largest_columns;
+  if (step == 1) return encode_png(picture.view());
+  Image small(picture.width() / step, std::max(1, picture.height() / step));
+  const int rows_averaged = std::min(step, picture.height());
+  for (int v = 0; v < small.height(); ++v) {
+    for (int u = 0; u < small.width(); ++u) {
+      int sum = 0;
+      for (int y = 0; y < rows_averaged; ++y) {
+        for (int x = 0; x < step; ++x) sum += picture.at(u * step + x, v * step + y);
+      }
+      small.at(u, v) = static_cast<std::uint8_t>(sum / (rows_averaged * step));
+    }
+  }
+  return encode_png(small.view());
+}
+
+void for_each_entry(Executor& executor, std::size_t count,
+                    const std::function<void(std::size_t)>& body) {
+  executor.for_chunks(count, 1, [&](std::size_t begin, std::size_t, std::size_t) { body(begin); });
+}
+
+}  // namespace panonav

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "panonav/core/executor.hpp"
+#include "panonav/core/options.hpp"
+#include "panonav/io/dataset.hpp"
+#include "panonav/io/panorama_reader.hpp"
+#include "panonav/pipeline/observation.hpp"
+#include "panonav/storage/memory_file.hpp"
+
+namespace panonav {
+
+/// The cylinders' size that a user wants; 0: 80 x 512 [M04 section 2.1] for mirror and 360 degree
+/// pictures, the picture's own for ready-made panoramas.
+struct SignatureOptions {
+  int rows = 0;
+  int columns = 0;
+  int components = 15;
+};
+void visit_options(SignatureOptions& options, OptionVisitor& visitor);
+
+/// From a picture to what a memory compares, as the memory's header says. Several threads may use
+/// one at a time.
+class ViewEncoder {
+ public:
+  /// Pictures lie as `source` says; those of the memory's own camera: `header.source`. Throws
+  /// ContractError when the elevations of the pictures are not the memory's.
+  ViewEncoder(const MemoryHeader& header, const PictureSource& source);
+
+  [[nodiscard]] const MemoryHeader& header() const noexcept { return header_; }
+
+  /// The panoramic cylinder. Throws ContractError on a picture of another size or band than the
+  /// memory's, and on a tilt (`Observation::tilt`).
+  [[nodiscard]] Panorama panorama(const Observation& observation) const;
+  [[nodiscard]] Panorama panorama(ImageView picture) const;
+  /// Throws FileError on a picture that is missing, damaged or of another size than the memory's.
+  [[nodiscard]] Panorama read(const DatasetEntry& entry) const;
+
+  [[nodiscard]] FourierSignature signature(const Panorama& panorama) const;
+  [[nodiscard]] PackedSignature packed(const Panorama& panorama) const;
+
+ private:
+  [[nodiscard]] Panorama checked(Panorama panorama) const;
+
+  MemoryHeader header_;
+  PanoramaReader reader_;
+  std::optional<PanoramaShape> picture_shape_;  ///< of panoramas that are resampled
+};
+
+/// The size of the cylinders of a new memory, with the defaults filled in; 0: a panorama's own.
+[[nodiscard]] PanoramaShape wanted_shape(const PictureSource& source,
+                                         const SignatureOptions& options);
+
+/// The largest magnitude of k >= 1. k = 0 is the mean brightness: much larger than the rest, and it
+/// tells more of the light than of the place, so it may saturate.
+[[nodiscard]] float largest_structure(const FourierSignature& signature);
+
+/// A small picture of the view for people, as PNG.
+[[nodiscard]] std::vector<std::uint8_t> thumbnail_png(const Panorama& panorama);
+
+/// Calls body(i) for 0 .. count - 1 on all threads.
+void for_each_entry(Executor& executor, std::size_t count,
+                    const std::function<void(std::size_t)>& body);
+
+}  // namespace panonav

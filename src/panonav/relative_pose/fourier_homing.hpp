@@ -1,0 +1,116 @@
+#pragma once
+
+#include "panonav/core/options.hpp"
+#include "panonav/relative_pose/homing_view.hpp"
+
+namespace panonav {
+
+/// What two views tell about the way from one to the other.
+struct HomeVector {
+  /// Towards home in the frame of the robot that took the current view, in units of the distance R
+  /// at which all things are assumed to be.
+  double xi = 0.0;
+  double eta = 0.0;
+  /// Heading of the home view minus heading of the current view, in [-pi, pi).
+  double heading_rad = 0.0;
+  /// Correlation of the views at the heading that the compass found, -1 .. 1 [S06 eq. 33 over its
+  /// largest possible value]: how alike the views are.
+  double correlation = 0.0;
+  /// Share of the energy of both views that turn and displacement leave unexplained, 0 .. 1.
+  double residual = 1.0;
+  /// How far the vector stands out of what the residual would do to it, 0 .. 1: the square of its
+  /// length over that square plus its variance. Near 0 at home, where there is no way to point to.
+  double confidence = 0.0;
+  /// Frequencies that counted, summed by their weights.
+  double frequencies = 0.0;
+
+  [[nodiscard]] double length() const noexcept;         ///< in units of R
+  [[nodiscard]] double direction_rad() const noexcept;  ///< in the current robot frame
+};
+
+/// How the heading between the views is found first.
+enum class TurnEstimate {
+  sequential,  ///< S06's rule: each component refines those before [S06 eq. 40-43]
+  global,      ///< the maximum of the correlation over all headings
+};
+
+/// At which view the slope of the image is taken.
+enum class HomingGradient {
+  current,  ///< as published [S06 eq. 20]
+  both,     ///< the mean of both views: errors of second order in the displacement cancel
+};
+
+/// How much a component and a row count.
+enum class HomingWeights {
+  equal,  ///< as published: all alike
+  /// By how well both views agree there: components fade out where their phases have nothing to do
+  /// with each other any more, which moves towards lower frequencies with the distance. So a far
+  /// view is compared coarsely and a near one finely, without knowing the distance.
+  coherence,
+};
+
+/// So many headings can be tried at most.
+inline constexpr int most_starting_estimates = 6;
+
+/// The defaults are our own rule; `published_homing` is S06's.
+struct FourierHomingOptions {
+  int highest = 0;     ///< K, the highest frequency; 0 takes all that both views have, but one
+  int iterations = 0;  ///< N_it of S06 section 2.3
+  /// The first iteration compares a few frequencies and each further one more, up to K [S06
+  /// footnote 6].
+  bool rising = false;
+  TurnEstimate turn = TurnEstimate::global;
+  HomingGradient gradient = HomingGradient::both;
+  HomingWeights weights = HomingWeights::coherence;
+  /// Headings from which the displacement is solved; the one that explains the views best is taken
+  /// [S06 footnote 10].
+  int starting_estimates = 2;
+  /// Displacements up to two thirds of R are tried first, as hs_ei tries them, and the best is
+  /// where the least squares start: so views from far away are compared as they would look from
+  /// there, with the heading that fits there.
+  bool displacement_search = true;
+  /// Rows off the horizon: things move up and down in the image as the robot comes nearer, too.
+  /// Only where elevations are known.
+  bool vertical_motion = true;
+  /// Two more unknowns: the robot may lean by a degree or two against the home view, as on uneven
+  /// ground. Only where elevations are known.
+  bool lean = true;
+};
+void visit_options(FourierHomingOptions& options, OptionVisitor& visitor);
+
+/// hs_Fi as published, with K = `highest`.
+[[nodiscard]] FourierHomingOptions published_homing(int highest, int iterations = 0);
+
+/// The home vector by Fourier homing [S06 section 2.3, eq. 16-30; signs and missing terms as in
+/// docs/equations.md]. Heading first, then displacement and a correction of the heading in least
+/// squares over the components of all rows. Iterations move the current view by what was found and
+/// solve again.
+/// Turning either robot on the spot turns the vector's frame and nothing else. Identical views give
+/// the zero vector with confidence 0; views without structure give all zeros and residual 1.
+/// Throws ContractError when the views differ in rows or share fewer than K + 2 components;
+/// OptionError. Cost: O(rows K) and no allocation for K <= 62; for one row and K = 5 less than a
+/// microsecond.
+[[nodiscard]] HomeVector home_vector(const HomingView& home, const HomingView& current,
+                                     const FourierHomingOptions& options = {});
+
+/// The same, but only headings within `within_rad` of `heading_rad` are considered, before least
+/// squares correct them: where something else has told the turn coarsely, as in places that look
+/// alike when turned by a quarter. No heading there that fits better than its neighbours: all zeros
+/// and residual 1. Throws ContractError also unless 0 < within_rad <= pi and the turn estimate is
+/// global.
+[[nodiscard]] HomeVector home_vector_near(const HomingView& home, const HomingView& current,
+                                          double heading_rad, double within_rad,
+                                          const FourierHomingOptions& options = {});
+
+/// The same with options already checked, for loops.
+[[nodiscard]] HomeVector home_vector_unchecked(const HomingView& home, const HomingView& current,
+                                               const FourierHomingOptions& options);
+
+/// Sum of squared differences of the first K components at the heading of their best correlation
+/// [S06 eq. 15, 28], relative to the energy of both views: 0 for the same place, about 1 for
+/// unrelated views. Where elevations are known, a lean of the robot by a few degrees is no
+/// difference: what it explains is left out. Throws ContractError as `home_vector`.
+[[nodiscard]] double image_difference(const HomingView& home, const HomingView& current,
+                                      int highest = 0);
+
+}  // namespace panonav

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include "panonav/relative_pose/turn_correlation.hpp"
+
+namespace panonav {
+
+/// One of the displacements that are tried before the least squares: the present place, or one of
+/// twelve directions at a sixth, a third, a half or two thirds of R [S06 section 3 tries about 200
+/// within two thirds]. Neighbours are at most a sixth of R apart, outwards, or 0.35 R, along the
+/// outermost ring: the least squares reach that far with the frequencies searched.
+struct Displacement {
+  static constexpr int rings = 4;
+  static constexpr int directions = 12;
+  int ring = 0;  ///< 0: none, else 1 .. rings
+  int direction = 0;
+
+  [[nodiscard]] double length() const noexcept;  ///< in units of R
+  [[nodiscard]] double direction_rad() const noexcept;
+};
+
+/// Frequencies that the search compares, at most: at half the distance between two rings, a twelfth
+/// of R, the phase of frequency 8 is off by at most 8 / 12, well within its linear range.
+inline constexpr int searched_frequencies = 8;
+
+/// The highest frequency that `displace` can take or give.
+inline constexpr int most_displaced_frequencies = 63;
+
+/// The coefficients of the expected image [S06 eq. 3, no turn] for one row: what a robot sees there
+/// when all things are at distance R. `from_a`, `from_b`: frequencies 0 .. from_a.size() - 1 of the
+/// current view; fills as many as `to_a` holds. Frequency 0 is kept: it counts for nothing. Throws
+/// nothing. Cost: 2 from to multiplications.
+void displace(Displacement displacement, std::span<const float> from_a,
+              std::span<const float> from_b, std::span<float> to_a, std::span<float> to_b) noexcept;
+
+/// A displacement and the turn at which the displaced view fits best.
+struct BestDisplacement {
+  Displacement displacement;
+  float turn_rad = 0.0F;  ///< heading of home minus heading of the current view
+};
+
+/// The displacement whose expected image differs least from the home view at its best turn within
+/// the window: hs_ei [S06 section 2.2] in the Fourier domain; far ones must differ a little less
+/// than near ones. `rows` rows of `frequencies` + 1 coefficients each, one row after the other.
+/// Cost: for one row 49 expected images of 8 frequencies, about 15 microseconds; each further row
+/// adds as much as a fifth.
+[[nodiscard]] BestDisplacement best_displacement(std::span<const float> home_a,
+                                                 std::span<const float> home_b,
+                                                 std::span<const float> current_a,
+                                                 std::span<const float> current_b, int rows,
+                                                 int frequencies, const TurnWindow& window = {});
+
+}  // namespace panonav

@@ -1,0 +1,165 @@
+#include "panonav/relative_pose/turn_correlation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+
+namespace panonav {
+
+namespace {
+
+constexpr float pi = std::numbers::pi_v<float>;
+constexpr int most_points = 512;  // 8 for each of 62 frequencies, rounded up to a power of two
+
+struct Point {
+  float value, slope, curvature;
+};
+
+Point evaluate(const TurnCorrelation& correlation, float turn_rad) noexcept {
+  const float step_real = std::cos(turn_rad);
+  const float step_imaginary = -std::sin(turn_rad);
+  float real = 1.0F;
+  float imaginary = 0.0F;
+  Point point{0.0F, 0.0F, 0.0F};
+  for (int k = 1; k <= correlation.highest; ++k) {
+    const float next = real * step_real - imaginary * step_imaginary;
+    imaginary = real * step_imaginary + imaginary * step_real;
+    real = next;
+    const auto i = static_cast<std::size_t>(k);
+    const float cosine = correlation.real[i] * real - correlation.imaginary[i] * imaginary;
+    const float sine = correlation.real[i] * imaginary + correlation.imaginary[i] * real;
+    const auto frequency = static_cast<float>(k);
+    point.value += cosine;
+    point.slope += frequency * sine;
+    point.curvature -= frequency * frequency * cosine;
+  }
+  return point;
+}
+
+// From a point of the grid to the maximum beside it.
+float refine(const TurnCorrelation& correlation, float turn_rad, float half_step_rad) noexcept {
+  float turn = turn_rad;
+  for (int i = 0; i < 3; ++i) {
+    const Point point = evaluate(correlation, turn);
+    if (!(point.curvature < 0.0F)) break;
+    const float next = std::clamp(turn - point.slope / point.curvature,
+                                  turn_rad - 2.0F * half_step_rad, turn_rad + 2.0F * half_step_rad);
+    const bool done = std::abs(next - turn) < 1e-6F;
+    turn = next;
+    if (done) break;
+  }
+  return turn;
+}
+
+struct Circle {
+  std::array<float, most_points> cosine, sine;
+};
+
+const Circle& circle() {
+  static const Circle made = [] {
+    Circle table{};
+    for (int i = 0; i < most_points; ++i) {
+      const double angle = 2.0 * std::numbers::pi * i / most_points;
+      table.cosine[static_cast<std::size_t>(i)] = static_cast<float>(std::cos(angle));
+      table.sine[static_cast<std::size_t>(i)] = static_cast<float>(std::sin(angle));
+    }
+    return table;
+  }();
+  return made;
+}
+
+}  // namespace
+
+float TurnCorrelation::at(float turn_rad) const noexcept {
+  return evaluate(*this, turn_rad).value;
+}
+
+float sequential_turn(const TurnCorrelation& correlation) noexcept {
+  std::array<float, TurnCorrelation::most_frequencies + 1> differences{};
+  std::array<float, TurnCorrelation::most_frequencies + 1> weights{};
+  float all = 0.0F;
+  for (int k = 1; k <= correlation.highest; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    differences[i] = std::atan2(correlation.imaginary[i], correlation.real[i]);
+    const auto frequency = static_cast<float>(k);
+    weights[i] = frequency * frequency *
+                 std::sqrt(correlation.real[i] * correlation.real[i] +
+                           correlation.imaginary[i] * correlation.imaginary[i]);
+    all += weights[i];
+  }
+  const auto refined_from = [&](float first_rad) {
+    float turn = first_rad;
+    float sum = weights[1];
+    for (int k = 2; k <= correlation.highest; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      if (!(weights[i] > 0.0F)) continue;
+      const auto frequency = static_cast<float>(k);
+      const float turns = std::nearbyint((frequency * turn - differences[i]) / (2.0F * pi));
+      const float told = (differences[i] + 2.0F * pi * turns) / frequency;
+      turn = (sum * turn + weights[i] * told) / (sum + weights[i]);
+      sum += weights[i];
+    }
+    return turn;
+  };
+  const float first = refined_from(differences[1]);
+  if (weights[1] >= 0.1F * all / static_cast<float>(correlation.highest)) return first;
+  const float opposite = refined_from(differences[1] + pi);
+  return correlation.at(opposite) > correlation.at(first) ? opposite : first;
+}
+
+int highest_turns(const TurnCorrelation& correlation, std::span<float> turns,
+                  const TurnWindow& window) noexcept {
+  std::size_t count = 16;
+  while (count < 8 * static_cast<std::size_t>(correlation.highest)) count *= 2;
+  const std::size_t stride = most_points / count;
+  const Circle& table = circle();
+  std::array<float, most_points> cosine, sine, real, imaginary;
+  for (std::size_t i = 0; i < count; ++i) {
+    cosine[i] = table.cosine[i * stride];
+    sine[i] = table.sine[i * stride];
+    real[i] = imaginary[i] = 0.0F;
+  }
+  // Horner's rule for all points at once: (sum + term) exp(-j sigma).
+  for (int k = correlation.highest; k >= 1; --k) {
+    const float term_real = correlation.real[static_cast<std::size_t>(k)];
+    const float term_imaginary = correlation.imaginary[static_cast<std::size_t>(k)];
+    for (std::size_t i = 0; i < count; ++i) {
+      const float a = real[i] + term_real;
+      const float b = imaginary[i] + term_imaginary;
+      real[i] = a * cosine[i] + b * sine[i];
+      imaginary[i] = b * cosine[i] - a * sine[i];
+    }
+  }
+  struct Peak {
+    float value;
+    float turn_rad;
+  };
+  // A maximum may lie between two points: more are refined than are asked for.
+  std::array<Peak, 8> peaks{};
+  std::size_t found = 0;
+  const std::size_t wanted = std::min(peaks.size(), turns.size() + 2);
+  for (std::size_t i = 0; i < count; ++i) {
+    const float value = real[i];
+    if (!(value > real[(i + count - 1) % count] && value >= real[(i + 1) % count])) continue;
+    if (!window.contains(2.0F * pi * static_cast<float>(i) / static_cast<float>(count))) continue;
+    std::size_t at = std::min(found, wanted);
+    while (at > 0 && peaks[at - 1].value < value) --at;
+    if (at >= wanted) continue;
+    found = std::min(found + 1, wanted);
+    for (std::size_t j = found - 1; j > at; --j) peaks[j] = peaks[j - 1];
+    peaks[at] = {value, 2.0F * pi * static_cast<float>(i) / static_cast<float>(count)};
+  }
+  const float half_step_rad = pi / static_cast<float>(count);
+  for (std::size_t i = 0; i < found; ++i) {
+    peaks[i].turn_rad = refine(correlation, peaks[i].turn_rad, half_step_rad);
+    peaks[i].value = correlation.at(peaks[i].turn_rad);
+  }
+  std::stable_sort(peaks.begin(), peaks.begin() + static_cast<std::ptrdiff_t>(found),
+                   [](const Peak& a, const Peak& b) { return a.value > b.value; });
+  const std::size_t given = std::min(found, turns.size());
+  for (std::size_t i = 0; i < given; ++i) turns[i] = peaks[i].turn_rad;
+  return static_cast<int>(given);
+}
+
+}  // namespace panonav

@@ -1,0 +1,33 @@
+#include "panonav/relative_pose/view_pair.hpp"
+
+#include <cmath>
+#include <numbers>
+
+#include "panonav/geometry/angles.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
+
+namespace panonav {
+
+std::optional<PhaseReading> read_phases(const HomingView& a, const HomingView& b,
+                                        const std::optional<TurnHint>& hint) {
+  const HomeVector from_a =
+      hint ? home_vector_near(b, a, hint->turn_rad, hint->within_rad) : home_vector(b, a);
+  const HomeVector from_b =
+      hint ? home_vector_near(a, b, -hint->turn_rad, hint->within_rad) : home_vector(a, b);
+  if (!(from_a.correlation > 0.0) || !(from_b.correlation > 0.0)) return std::nullopt;
+  const double turns_differ = angle_difference(from_a.heading_rad, -from_b.heading_rad);
+  PhaseReading reading;
+  reading.turn_rad = wrap_angle(-from_b.heading_rad + 0.5 * turns_differ);
+  reading.turn_disagreement_rad = std::abs(turns_differ);
+  // As likely as not the vector is but the error of reading it.
+  reading.points = from_a.confidence > 0.5 && from_b.confidence > 0.5;
+  if (!reading.points) return reading;
+  reading.length = 0.5 * (from_a.length() + from_b.length());
+  reading.direction_a_rad = from_a.direction_rad();
+  reading.direction_b_rad = from_b.direction_rad();
+  reading.disagreement_rad = std::abs(wrap_angle(reading.direction_b_rad + reading.turn_rad -
+                                                 reading.direction_a_rad - std::numbers::pi));
+  return reading;
+}
+
+}  // namespace panonav

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+
+#include "panonav/relative_pose/homing_view.hpp"
+
+namespace panonav {
+
+/// What the phases of two views tell of how they lie to each other [M04 sections 3.4 and 3.5].
+struct PhaseReading {
+  double turn_rad = 0.0;         ///< heading of b minus heading of a
+  double direction_a_rad = 0.0;  ///< towards b, in the frame of the robot that took a
+  double direction_b_rad = 0.0;  ///< towards a, in the frame of the robot that took b
+  /// Distance between the places in units of R, the typical distance of the things around.
+  double length = 0.0;
+  /// Each view by itself says where the other one lies. By how much the two answers differ: small
+  /// for places near to each other, any angle for places that have nothing in common. In [0, pi].
+  double disagreement_rad = 0.0;
+  /// The same for the headings.
+  double turn_disagreement_rad = 0.0;
+  /// False for pictures of one place, where no direction is meant; directions and length are then
+  /// 0.
+  bool points = false;
+};
+
+/// A turn that something else has told.
+struct TurnHint {
+  double turn_rad = 0.0;    ///< heading of b minus heading of a
+  double within_rad = 0.5;  ///< > 0 and <= pi
+};
+
+/// Reads both ways, from a to b and back. Empty when either view has no structure. Throws
+/// ContractError when the views differ in shape or have fewer than three components. Cost: that of
+/// two home vectors.
+/// With `hint` only turns within its bounds are considered: places that look alike when turned by a
+/// quarter are then not mistaken for each other; empty also when no turn within them fits.
+[[nodiscard]] std::optional<PhaseReading> read_phases(
+    const HomingView& a, const HomingView& b, const std::optional<TurnHint>& hint = std::nullopt);
+
+}  // namespace panonav

@@ -1,0 +1,161 @@
+#include "panonav/storage/internal/memory_file_access.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/storage/internal/memory_schema.hpp"
+#include "panonav/storage/memory_header.hpp"
+
+namespace panonav {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string cause() {
+  return std::generic_category().message(errno);
+}
+
+fs::path folder_of(const fs::path& path) {
+  const fs::path folder = path.parent_path();
+  return folder.empty() ? fs::path(".") : folder;
+}
+
+fs::path with_suffix(const fs::path& path, const char* suffix) {
+  fs::path result = path;
+  result += suffix;
+  return result;
+}
+
+bool writable(const fs::path& path) {
+  return ::faccessat(AT_FDCWD, path.c_str(), W_OK, AT_EACCESS) == 0;
+}
+
+// A new name is on the disk once its folder is.
+void sync_folder(const fs::path& folder) {
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;  // a folder that may be written but not read: nothing to be done
+  static_cast<void>(::fsync(descriptor));
+  ::close(descriptor);
+}
+
+// Removes a database that never got its name, with what SQLite may have laid beside it.
+class UnfinishedFile {
+ public:
+  explicit UnfinishedFile(fs::path path) : path_(std::move(path)) {}
+  ~UnfinishedFile() {
+    for (const char* suffix : {"", "-journal", "-wal", "-shm"}) {
+      ::unlink(with_suffix(path_, suffix).c_str());
+    }
+  }
+  UnfinishedFile(const UnfinishedFile&) = delete;
+  UnfinishedFile& operator=(const UnfinishedFile&) = delete;
+  [[nodiscard]] const fs::path& path() const noexcept { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+}  // namespace
+
+void make_memory_file(const fs::path& path, const MemoryHeader& header) {
+  validate(header);
+  std::error_code ignored;
+  const std::string name = path.string();
+  const auto refuse_existing = [&] {
+    throw FileError(name, "is there already; allowed: a name that is free");
+  };
+  if (fs::exists(fs::symlink_status(path, ignored))) refuse_existing();
+  const fs::path folder = folder_of(path);
+  if (!fs::is_directory(folder, ignored)) {
+    throw FileError(name, "cannot be made: there is no folder " + folder.string());
+  }
+  if (!writable(folder)) {
+    throw FileError(name, "cannot be made: no permission to write in " + folder.string());
+  }
+  // A log without its file would be taken for this file's own.
+  for (const char* suffix : {"-wal", "-shm", "-journal"}) {
+    const fs::path stray = with_suffix(path, suffix);
+    if (fs::exists(fs::symlink_status(stray, ignored))) {
+      throw FileError(name, "cannot be made: " + stray.string() +
+                                " of an earlier file of that name is in the way");
+    }
+  }
+
+  std::string hidden_name(1, '.');
+  hidden_name += path.filename().string() + "." + std::to_string(::getpid()) + ".new";
+  const UnfinishedFile unfinished(folder / hidden_name);
+  {
+    Database database(unfinished.path(), DatabaseMode::create);
+    database.execute("PRAGMA synchronous=FULL");
+    // Three views of 80 x 15 fit on a page; larger pages cost more bytes per append.
+    database.execute("PRAGMA page_size=8192");
+    Transaction transaction(database, Transaction::Kind::writing);
+    create_schema(database);
+    for (const auto& [key, value] : settings_of(header)) write_setting(database, key, value);
+    transaction.commit();
+    database.execute("PRAGMA journal_mode=WAL");
+  }
+  // A link refuses a name that was taken meanwhile; a rename would replace that file.
+  if (::link(unfinished.path().c_str(), path.c_str()) != 0) {
+    if (errno == EEXIST) refuse_existing();
+    if ((errno != EPERM && errno != EOPNOTSUPP && errno != ENOSYS) ||
+        ::rename(unfinished.path().c_str(), path.c_str()) != 0) {
+      throw FileError(name, "cannot be made: " + cause());
+    }
+  }
+  sync_folder(folder);
+}
+
+Database open_memory_database(const fs::path& path, Access access) {
+  require_memory_file(path);
+  const std::string name = path.string();
+  // SQLite lays its log beside the file that a link points at.
+  std::error_code ignored;
+  const fs::path file = fs::weakly_canonical(path, ignored);
+  const bool may_write = writable(file) && writable(folder_of(file));
+  if (access == Access::read_write) {
+    if (!may_write) {
+      throw FileError(name, "cannot be changed: no permission to write the file and its folder");
+    }
+    Database database(file, DatabaseMode::change);
+    database.execute("PRAGMA synchronous=FULL");
+    return database;
+  }
+  const fs::path log = with_suffix(file, "-wal");
+  const auto empty = [&](const fs::path& part) {
+    return !fs::exists(part, ignored) || fs::file_size(part, ignored) == 0;
+  };
+  // Nobody has the file open for writing and nobody left changes behind.
+  const auto at_rest = [&] { return empty(log) && empty(with_suffix(file, "-shm")); };
+  // A reader without permission cannot make the log that SQLite wants to find.
+  if (!may_write && at_rest()) {
+    return {file, DatabaseMode::immutable};
+  }
+  try {
+    // Opened for writing, where that is possible, so that SQLite can clear its log away in the end;
+    // no statement may write.
+    Database database(file, may_write ? DatabaseMode::change : DatabaseMode::read);
+    database.execute("PRAGMA query_only=ON");
+    // The first look at the file: now SQLite makes or finds its log.
+    static_cast<void>(database.integer("PRAGMA schema_version"));
+    return database;
+  } catch (const FileError&) {
+    // No room for a log on a full disk, or a file system that cannot share one. A file that is
+    // damaged is found to be so again.
+    if (at_rest()) return {file, DatabaseMode::immutable};
+    if (may_write || empty(log)) throw;
+    throw FileError(name,
+                    "has changes in " + log.string() +
+                        " that can be read only with permission to write the folder; open the "
+                        "file once with that permission");
+  }
+}
+
+}  // namespace panonav

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <vector>
+
+#include "panonav/storage/checksum.hpp"
+#include "panonav/storage/internal/database.hpp"
+#include "panonav/storage/memory_file.hpp"
+
+namespace panonav {
+
+/// A row of the table of views, checked. `signature` points into the statement's row.
+struct StoredView {
+  ViewId id;
+  ReferenceInfo info;
+  std::span<const std::uint8_t> signature;
+};
+
+/// Throws the ContractError for a view that is not in the file.
+[[noreturn]] void refuse_view(ViewId view);
+
+struct MemoryFile::Implementation {
+  Implementation(std::filesystem::path path_, Database database_, MemoryHeader header_);
+
+  [[nodiscard]] ViewId id_in(const Statement& row, int column);
+  /// Reads and checks a row of all columns of the table of views.
+  [[nodiscard]] StoredView view_in(const Statement& row);
+  /// Appends such a row to a memory.
+  void append_row(const Statement& row, VisualMemory& memory);
+  ViewId insert(const NewView& view);
+  [[nodiscard]] bool contains(ViewId view);
+  [[nodiscard]] Link link_in(const Statement& row);
+  /// Passes each link to `take`, ascending.
+  template <class Take>
+  void for_links(const Take& take) {
+    Statement check(database, "PRAGMA quick_check(links)");
+    if (!check.step() || check.text(0) != "ok") database.fail_damaged("table links");
+    check.reset();
+    Statement rows(database, "SELECT a, b, kind, checksum FROM links ORDER BY a, b");
+    while (rows.step()) take(link_in(rows));
+  }
+
+  std::filesystem::path path;
+  Database database;
+  MemoryHeader header;
+  RecordBytes scratch;
+  std::vector<std::uint8_t> signature;
+  PackedSignature packed;
+  Statement insert_view;
+  Statement next_id;
+  Statement insert_thumbnail;
+  Statement find_name;
+};
+
+}  // namespace panonav

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "panonav/storage/internal/database.hpp"
+#include "panonav/storage/memory_header.hpp"
+
+namespace panonav {
+
+/// "PNAV": marks an SQLite file as a memory file.
+inline constexpr std::uint32_t memory_application_id = 0x504E4156;
+/// The user_version of files is at most this; a reader refuses files of a larger one. New files
+/// have 1; saving the first chain of snapshots adds its tables and makes it 2, saving the first map
+/// adds the table of maps, and those of chains, and makes it 3, the first route likewise its tables
+/// and 4, so that who has none of them can give the file to an older reader.
+inline constexpr int memory_format_version = 4;
+
+/// Looks at the first bytes alone, without SQLite, so that nothing that is not ours is ever opened
+/// for writing. Throws FileError: missing, no SQLite file, of another program, newer.
+void require_memory_file(const std::filesystem::path& path);
+
+/// Makes the tables in an empty database.
+void create_schema(Database& database);
+/// Adds the tables of chains where the file has none yet. Within the caller's transaction.
+void add_chain_tables(Database& database);
+[[nodiscard]] bool has_chain_tables(Database& database);
+/// The same of the table of maps, which comes with those of chains.
+void add_map_table(Database& database);
+[[nodiscard]] bool has_map_table(Database& database);
+/// The same of the tables of routes, which come with those of chains and maps.
+void add_route_tables(Database& database);
+[[nodiscard]] bool has_route_tables(Database& database);
+/// Throws FileError unless the tables are exactly those of the file's version.
+void require_schema(Database& database);
+
+/// All rows of the table of settings; throws FileError when one is damaged.
+[[nodiscard]] Settings read_settings(Database& database);
+/// Replaces the value that the key had. Within the caller's transaction, if there is one.
+void write_setting(Database& database, const std::string& key, const SettingValue& value);
+
+}  // namespace panonav

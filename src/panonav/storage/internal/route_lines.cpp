@@ -1,0 +1,115 @@
+#include "panonav/storage/internal/route_lines.hpp"
+
+#include <zlib.h>
+
+#include <bit>
+#include <cmath>
+#include <new>
+#include <numbers>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav {
+
+namespace {
+
+// A line's words: x_m, y_m, heading_rad (8 bytes each) and its turn (2 bytes). Byte k of all lines
+// stands together, so that what hardly changes along the route lies side by side.
+constexpr std::size_t reals_of_pose = 3;
+constexpr std::size_t head_bytes = 8 * reals_of_pose + 2;
+
+double& real_of(Pose2& pose, std::size_t i) {
+  return i == 0 ? pose.x_m : i == 1 ? pose.y_m : pose.heading_rad;
+}
+
+// Columns by which the line before is turned to look as from the heading of this one.
+std::size_t turn_between(const Pose2& before, const Pose2& now, std::size_t columns) {
+  const auto size = static_cast<long long>(columns);
+  const auto turn = std::llround((now.heading_rad - before.heading_rad) *
+                                 static_cast<double>(columns) / (2.0 * std::numbers::pi));
+  return static_cast<std::size_t>((turn % size + size) % size);
+}
+
+// What a column is likely to hold: the mean of its left neighbour and of the line before there.
+int guess(std::span<const std::uint8_t> before, std::size_t turn,
+          std::span<const std::uint8_t> line, std::size_t column) {
+  const int above = before.empty() ? 0 : before[(column + turn) % before.size()];
+  return (above + (column == 0 ? above : line[column - 1])) / 2;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> pack_route_lines(const RoutePanorama& route, std::size_t first,
+                                           std::size_t count) {
+  const auto columns = static_cast<std::size_t>(route.columns());
+  std::vector<std::uint8_t> plain(count * (head_bytes + columns));
+  for (std::size_t n = 0; n < count; ++n) {
+    Pose2 pose = route.poses()[first + n];
+    for (std::size_t i = 0; i < reals_of_pose; ++i) {
+      const auto word = std::bit_cast<std::uint64_t>(real_of(pose, i));
+      for (std::size_t k = 0; k < 8; ++k) {
+        plain[(8 * i + k) * count + n] = static_cast<std::uint8_t>((word >> (8 * k)) & 255U);
+      }
+    }
+    std::span<const std::uint8_t> before;
+    std::size_t turn = 0;
+    if (n > 0) {
+      before = route.line(first + n - 1);
+      turn = turn_between(route.poses()[first + n - 1], pose, columns);
+    }
+    plain[8 * reals_of_pose * count + n] = static_cast<std::uint8_t>(turn & 255U);
+    plain[(8 * reals_of_pose + 1) * count + n] = static_cast<std::uint8_t>(turn >> 8U);
+    const auto line = route.line(first + n);
+    std::uint8_t* const to = plain.data() + count * head_bytes + n * columns;
+    for (std::size_t c = 0; c < columns; ++c) {
+      to[c] = static_cast<std::uint8_t>((line[c] - guess(before, turn, line, c)) & 255);
+    }
+  }
+  uLongf size = compressBound(static_cast<uLong>(plain.size()));
+  std::vector<std::uint8_t> packed(size);
+  if (compress2(packed.data(), &size, plain.data(), static_cast<uLong>(plain.size()),
+                Z_DEFAULT_COMPRESSION) != Z_OK) {
+    throw std::bad_alloc();  // the bound leaves room for anything
+  }
+  packed.resize(size);
+  return packed;
+}
+
+bool unpack_route_lines(std::span<const std::uint8_t> bytes, std::size_t count,
+                        RoutePanorama& route) {
+  const auto columns = static_cast<std::size_t>(route.columns());
+  std::vector<std::uint8_t> plain(count * (head_bytes + columns));
+  auto size = static_cast<uLongf>(plain.size());
+  auto read = static_cast<uLong>(bytes.size());
+  if (uncompress2(plain.data(), &size, bytes.data(), &read) != Z_OK || size != plain.size() ||
+      read != bytes.size()) {
+    return false;
+  }
+  std::vector<std::uint8_t> before;
+  std::vector<std::uint8_t> line(columns);
+  for (std::size_t n = 0; n < count; ++n) {
+    Pose2 pose;
+    for (std::size_t i = 0; i < reals_of_pose; ++i) {
+      std::uint64_t word = 0;
+      for (std::size_t k = 0; k < 8; ++k) {
+        word |= std::uint64_t{plain[(8 * i + k) * count + n]} << (8 * k);
+      }
+      real_of(pose, i) = std::bit_cast<double>(word);
+    }
+    const std::size_t turn = plain[8 * reals_of_pose * count + n] +
+                             256U * std::size_t{plain[(8 * reals_of_pose + 1) * count + n]};
+    const std::uint8_t* const from = plain.data() + count * head_bytes + n * columns;
+    for (std::size_t c = 0; c < columns; ++c) {
+      line[c] = static_cast<std::uint8_t>((guess(before, turn, line, c) + from[c]) & 255);
+    }
+    try {
+      if (!route.append(pose, std::span<const std::uint8_t>(line))) return false;
+    } catch (const ContractError&) {
+      return false;
+    }
+    before = line;
+  }
+  return true;
+}
+
+}  // namespace panonav

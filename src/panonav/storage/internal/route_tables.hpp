@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "panonav/route/route_panorama.hpp"
+#include "panonav/storage/internal/database.hpp"
+
+namespace panonav {
+
+/// Named route panoramas in a memory file, within the caller's transaction. The tables must be
+/// there (memory_schema.hpp). All throw FileError on damage.
+
+/// Adds the lines of `more` behind those of the route of that name, which is made where there is
+/// none, and returns how many: the first ones are left out while they lie within a millimetre of
+/// the last line there. Throws ContractError on an empty name, a route without lines, and another
+/// number of columns than the route's. Cost: that of `more` and at most one block of lines.
+std::size_t append_to_route(Database& database, std::string_view name, const RoutePanorama& more);
+/// Empty when there is no such route.
+[[nodiscard]] std::optional<RoutePanorama> read_route(Database& database, std::string_view name);
+/// Bytes of the lines and poses as they are kept; 0 when there is no such route.
+[[nodiscard]] std::size_t route_bytes(Database& database, std::string_view name);
+/// Whether there was one.
+bool erase_route(Database& database, std::string_view name);
+/// All names, ascending.
+[[nodiscard]] std::vector<std::string> route_names(Database& database);
+/// Passes every part to `check` that may throw; `check` keeps what it threw.
+void verify_routes(Database& database,
+                   const std::function<void(const std::function<void()>&)>& check);
+
+}  // namespace panonav

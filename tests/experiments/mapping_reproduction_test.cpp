@@ -1,0 +1,91 @@
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "experiments/reproduction.hpp"
+#include "experiments/runs/mapping_run.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/simulation/scenes.hpp"
+#include "support/sanitizers.hpp"
+
+namespace panonav {
+namespace {
+
+MappingRecording small_loop(int views, std::uint64_t seed) {
+  Executor executor(1);
+  const PlaceRecording place = empty_place(make_scene("loop", {.seed = seed}), seed, 128, executor);
+  return record_for_mapping(place, drive(place, {}, 0.1, static_cast<std::size_t>(views)), 17,
+                            cheap_wheels(), seed, executor);
+}
+
+TEST(MappingRun, FewerViewsAndComponentsAreThoseOfTheRecording) {
+  const MappingRecording recording = small_loop(12, 3);
+  ASSERT_EQ(recording.views.size(), 12U);
+  const MappingRecording thinned = every_nth(recording, 5);
+  ASSERT_EQ(thinned.views.size(), 3U);
+  EXPECT_EQ(thinned.views[2], recording.views[10]);
+  EXPECT_EQ(thinned.truth[2], recording.truth[10]);
+  const auto few = first_components(recording.views[0], 4);
+  EXPECT_EQ(few.components(), 4);
+  EXPECT_EQ(few.magnitude(7, 3), recording.views[0].magnitude(7, 3));
+  EXPECT_EQ(few.phase_rad(7, 3), recording.views[0].phase_rad(7, 3));
+  EXPECT_THROW((void)first_components(recording.views[0], 18), ContractError);
+  EXPECT_THROW((void)every_nth(recording, 0), ContractError);
+}
+
+TEST(MappingRun, ARoundTripIsClosedAndMeasured) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  const MappingRecording recording = small_loop(200, 4);
+  const auto open = map_recording(recording, {.mapping = {.close_loops = false}});
+  const auto closed = map_recording(recording, {.wheels = true});
+  ASSERT_EQ(open.estimate.size(), 200U);
+  EXPECT_EQ(open.right_closures + open.wrong_closures, 0U);
+  EXPECT_LT(shape_error(open.estimate, open.truth), 0.1);
+  EXPECT_LT(shape_error(closed.estimate, closed.truth), shape_error(open.estimate, open.truth));
+  EXPECT_EQ(closed.wrong_closures, 0U);
+  EXPECT_GT(closed.mean_step_s, 0.0);
+  const auto captured =
+      map_recording(recording, {.mapping = {.capture_difference = 0.1}, .most_nodes = 20});
+  EXPECT_LE(captured.number.size(), 20U);
+  EXPECT_TRUE(std::ranges::is_sorted(captured.number));
+  const auto alone =
+      map_recording({.truth = {{}}, .wheels = {{}}, .views = {recording.views[0]}}, {});
+  EXPECT_EQ(alone.estimate.size(), 1U);
+  EXPECT_EQ(shape_error(alone.estimate, alone.truth), 1.0);
+  EXPECT_THROW((void)map_recording({}, {}), ContractError);
+}
+
+TEST(MappingReproduction, SameRowsOnOneAndTwoThreads) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  const auto folder =
+      std::filesystem::path(::testing::TempDir()) / ("f11." + std::to_string(getpid()));
+  const auto reproduce = [&](int threads) {
+    Executor executor(threads);
+    return reproduce_f11(
+        {.out = folder, .scenes = 2, .runs = 1, .views = 40, .most_views = 100, .columns = 132},
+        executor);
+  };
+  const Reproduction one = reproduce(1);
+  const Reproduction two = reproduce(2);
+  std::filesystem::remove_all(folder);
+  ASSERT_GT(one.rows.size(), 30U);
+  ASSERT_EQ(one.rows.size(), two.rows.size());
+  for (std::size_t i = 0; i < one.rows.size(); ++i) {
+    EXPECT_EQ(one.rows[i].id, two.rows[i].id);
+    EXPECT_TRUE(std::isfinite(one.rows[i].ours)) << one.rows[i].id;
+    EXPECT_EQ(std::ranges::count_if(one.rows,
+                                    [&](const ResultRow& row) { return row.id == one.rows[i].id; }),
+              1)
+        << one.rows[i].id;
+    if (one.rows[i].unit == "ms") continue;
+    EXPECT_EQ(one.rows[i].ours, two.rows[i].ours) << one.rows[i].id;
+  }
+  Executor executor(1);
+  EXPECT_THROW((void)reproduce_f11({.out = folder, .scenes = 1}, executor), ContractError);
+}
+
+}  // namespace
+}  // namespace panonav
