@@ -46,6 +46,13 @@ function(panonav_library name)
   panonav_precompile(panonav_${name})
 endfunction()
 
+# panonav_compile_quickly(TARGET): for tests, which take longer to compile than to run.
+function(panonav_compile_quickly target)
+  if(CMAKE_CXX_COMPILER_ID MATCHES "GNU|Clang")
+    target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
+  endif()
+endfunction()
+
 # panonav_precompile(TARGET [HEADER ...]): the standard headers that most sources include, and these, are parsed once
 # for the whole target.
 function(panonav_precompile target)
@@ -84,6 +91,7 @@ function(panonav_module_tests name)
   target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
   target_link_libraries(test_${name} PRIVATE panonav::${name} ${ARG_LINK} GTest::gtest_main)
   panonav_warnings(test_${name})
+  panonav_compile_quickly(test_${name})
   panonav_precompile(test_${name} <gtest/gtest.h>)
   gtest_discover_tests(test_${name} TEST_PREFIX ${name}. DISCOVERY_MODE PRE_TEST
                        PROPERTIES LABELS unit)
