@@ -64,11 +64,13 @@ void count_images(benchmark::State& state) {
 
 void image_to_packed_signature(benchmark::State& state, const PreprocessingOptions& preprocessing) {
   const auto views = images();
-  SignatureExtractor extractor(Unwarper(mirror_camera(), {rows, columns}), components,
-                               preprocessing);
+  const Unwarper unwarper(mirror_camera(), {rows, columns});
+  const SignatureExtractor extractor({rows, columns}, components, preprocessing);
+  SignatureExtractor::Workspace workspace;
   std::size_t next = 0;
   for (auto _ : state) {
-    benchmark::DoNotOptimize(pack(extractor.signature_from_image(views[next].view()), 1.0F));
+    benchmark::DoNotOptimize(
+        pack(extractor.signature(unwarper, views[next].view(), workspace), 1.0F));
     next = (next + 1) % views.size();
   }
   count_images(state);

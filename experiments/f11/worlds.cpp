@@ -225,13 +225,15 @@ void measure_step_time(const MappingReproductionOptions& options, Executor& exec
   for (std::size_t i = 0; i < poses.size(); ++i) {
     images.push_back(take_picture(*place.renderer, poses[i], camera, {}, {}, i, executor));
   }
-  SignatureExtractor extractor(Unwarper(camera, {80, 512}), components);
+  const Unwarper unwarper(camera, {80, 512});
+  const SignatureExtractor extractor({80, 512}, components);
+  SignatureExtractor::Workspace workspace;
   VisualOdometry odometry;
   std::vector<double> all_us;
   std::vector<double> step_us;
   for (const Image& image : images) {
     const auto start = Clock::now();
-    FourierSignature signature = extractor.signature_from_image(image.view());
+    FourierSignature signature = extractor.signature(unwarper, image.view(), workspace);
     const auto middle = Clock::now();
     static_cast<void>(odometry.add(OdometryView(std::move(signature))));
     step_us.push_back(microseconds_since(middle));
@@ -249,11 +251,11 @@ void measure_step_time(const MappingReproductionOptions& options, Executor& exec
   // Figure 6 shows the influence of the components on the time, too.
   Series times{.label = "signature to pose", .x = {}, .y = {}};
   for (const int count : {6, 10, 15, 20, 32, 64}) {
-    SignatureExtractor extract(Unwarper(camera, {80, 512}), count);
+    const SignatureExtractor extract({80, 512}, count);
     VisualOdometry steps;
     std::vector<double> taken_us;
     for (const Image& image : images) {
-      FourierSignature signature = extract.signature_from_image(image.view());
+      FourierSignature signature = extract.signature(unwarper, image.view(), workspace);
       const auto start = Clock::now();
       static_cast<void>(steps.add(OdometryView(std::move(signature))));
       taken_us.push_back(microseconds_since(start));

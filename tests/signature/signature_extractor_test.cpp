@@ -68,14 +68,16 @@ TEST(SignatureExtractor, AgreesWithTheStepsOneByOne) {
                                          .edge_channel = (bits & 2) != 0,
                                          .remove_mean = (bits & 4) != 0,
                                          .normalise_gain = (bits & 8) != 0};
-      SignatureExtractor extractor(unwarper, 15, options);
+      const SignatureExtractor extractor({cylinder.rows, cylinder.columns}, 15, options);
+      SignatureExtractor::Workspace workspace;
       EXPECT_EQ(extractor.shape(), (SignatureShape{cylinder.rows, 15}));
       // Twice, the second time with low contrast: nothing of the first image may be left.
       for (const double contrast : {1.0, 0.1}) {
         const Image image = blotchy_image(static_cast<std::uint64_t>(bits) + 1, contrast);
         const FourierSignature expected =
             compute_signature(preprocess(unwarper.unwrap(image.view()), options), 15);
-        const FourierSignature found = extractor.signature_from_image(image.view());
+        const FourierSignature found = extractor.signature(unwarper, image.view(), workspace);
+        EXPECT_EQ(extractor.signature(unwarper.unwrap(image.view()), workspace), found);
         ASSERT_EQ(found.shape(), expected.shape());
         EXPECT_EQ(found.elevations(), expected.elevations());
         // Removing the mean leaves the rounding of what was there before.
@@ -100,9 +102,11 @@ TEST(SignatureExtractor, AgreesWithTheDefinitionInDoublePrecision) {
   const UnwarperOptions cylinder{
       .rows = 150, .columns = 1536, .elevations = ElevationBand{radians(-50), radians(20)}};
   const Image image = blotchy_image(9);
-  const FourierSignature found = SignatureExtractor(Unwarper(camera, cylinder), 15,
-                                                    {.remove_mean = false, .normalise_gain = false})
-                                     .signature_from_image(image.view());
+  SignatureExtractor::Workspace workspace;
+  const FourierSignature found =
+      SignatureExtractor({cylinder.rows, cylinder.columns}, 15,
+                         {.remove_mean = false, .normalise_gain = false})
+          .signature(Unwarper(camera, cylinder), image.view(), workspace);
   const Panorama angles(150, 1536, cylinder.elevations);
   double worst = 0.0;
   for (int y = 0; y < 150; y += 7) {
@@ -133,26 +137,37 @@ TEST(SignatureExtractor, AgreesWithTheDefinitionInDoublePrecision) {
   EXPECT_GT(largest_magnitude(found), 0.3);
 }
 
-TEST(SignatureExtractor, CopiesAreIndependentAndRepeatable) {
-  SignatureExtractor first{Unwarper(mirror_camera(), {.rows = 20, .columns = 128})};
+TEST(SignatureExtractor, AWorkspaceKeepsNothingOfThePictureBefore) {
+  const Unwarper unwarper(mirror_camera(), {.rows = 20, .columns = 128});
+  const SignatureExtractor extractor({20, 128});
+  SignatureExtractor::Workspace workspace;
   const Image image = blotchy_image(3);
   const Image other = blotchy_image(4);
-  const FourierSignature expected = first.signature_from_image(image.view());
-  SignatureExtractor second = first;
-  EXPECT_NE(second.signature_from_image(other.view()), expected);
-  EXPECT_EQ(first.signature_from_image(image.view()), expected);
-  EXPECT_EQ(second.signature_from_image(image.view()), expected);
+  const FourierSignature expected = extractor.signature(unwarper, image.view(), workspace);
+  EXPECT_NE(extractor.signature(unwarper, other.view(), workspace), expected);
+  EXPECT_EQ(extractor.signature(unwarper, image.view(), workspace), expected);
+  SignatureExtractor::Workspace fresh;
+  EXPECT_EQ(extractor.signature(unwarper, image.view(), fresh), expected);
 }
 
 TEST(SignatureExtractor, RefusesBadInput) {
   const Unwarper unwarper(mirror_camera(), {.rows = 4, .columns = 32});
-  EXPECT_THROW(SignatureExtractor(unwarper, 0), ContractError);
-  EXPECT_THROW(SignatureExtractor(unwarper, 17), ContractError);
-  EXPECT_THROW(SignatureExtractor(unwarper, 15, {.masked_rows_top = 4}), ContractError);
-  EXPECT_THROW(SignatureExtractor(unwarper, 15, {.masked_rows_top = -1}), OptionError);
-  SignatureExtractor extractor(unwarper);
-  const Image other(64, 48);
-  EXPECT_THROW(static_cast<void>(extractor.signature_from_image(other.view())), ContractError);
+  const PanoramaShape cylinder{4, 32};
+  EXPECT_THROW(SignatureExtractor(cylinder, 0), ContractError);
+  EXPECT_THROW(SignatureExtractor(cylinder, 17), ContractError);
+  EXPECT_THROW(SignatureExtractor({0, 32}), ContractError);
+  EXPECT_THROW(SignatureExtractor(cylinder, 15, {.masked_rows_top = 4}), ContractError);
+  EXPECT_THROW(SignatureExtractor(cylinder, 15, {.masked_rows_top = -1}), OptionError);
+  const SignatureExtractor extractor(cylinder);
+  SignatureExtractor::Workspace workspace;
+  const auto refused = [&](const Unwarper& by, const Image& image) {
+    EXPECT_THROW(static_cast<void>(extractor.signature(by, image.view(), workspace)),
+                 ContractError);
+  };
+  refused(unwarper, Image(64, 48));
+  refused(Unwarper(mirror_camera(), {.rows = 5, .columns = 32}), Image(640, 480));
+  EXPECT_THROW(static_cast<void>(extractor.signature(Panorama(4, 64, {}), workspace)),
+               ContractError);
 }
 
 }  // namespace

@@ -21,6 +21,11 @@ class PanoramaReader {
   PanoramaReader(PictureSource source, PanoramaShape shape);
 
   [[nodiscard]] const PictureSource& source() const noexcept { return source_; }
+  /// The table that turns mirror pictures into panoramas where that is all there is to do: null for
+  /// other pictures and where a mask hides a part of the mirror.
+  [[nodiscard]] const Unwarper* unwarper() const noexcept {
+    return unwarper_ && hidden_.empty() ? &*unwarper_ : nullptr;
+  }
   /// Throws ContractError on a picture whose size is not the camera's.
   [[nodiscard]] Panorama convert(ImageView picture) const;
   /// Reads and converts. Throws FileError that names the file and what is wrong with it.

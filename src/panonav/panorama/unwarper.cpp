@@ -132,7 +132,6 @@ Panorama Unwarper::unwrap(ImageView image, Workspace& workspace) const {
 void Unwarper::unwrap_blocks(ImageView image, Workspace& workspace,
                              const std::function<void(int, std::span<const float>)>& take) const {
   check(image);
-  constexpr int rows_per_block = 4;
   if (std::holds_alternative<EquirectangularModel>(camera_.model)) {
     const Panorama panorama = unwrap_picture(camera_, image, elevations_, rows_, columns_);
     for (int y = 0; y < rows_; y += rows_per_block) {
@@ -148,7 +147,8 @@ void Unwarper::unwrap_blocks(ImageView image, Workspace& workspace,
     image = grey->view();
   }
   prepare(image, workspace);
-  std::vector<float> block(static_cast<std::size_t>(rows_per_block) * columns_);
+  std::vector<float>& block = workspace.block;
+  block.resize(static_cast<std::size_t>(rows_per_block) * columns_);
   for (int y = 0; y < rows_; y += rows_per_block) {
     const int count = std::min(rows_per_block, rows_ - y);
     for (int i = 0; i < count; ++i) {

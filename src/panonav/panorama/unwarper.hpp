@@ -46,10 +46,13 @@ void visit_options(UnwarperOptions& options, OptionVisitor& visitor);
 /// Workspace.
 class Unwarper {
  public:
+  static constexpr int rows_per_block = 4;
+
   /// Buffers that are reused from image to image; what they hold between calls does not matter.
   struct Workspace {
     std::vector<std::uint8_t> halved;
     std::vector<std::uint16_t> pairs;
+    std::vector<float> block;
   };
 
   /// Throws ContractError on a camera, size or band that is not valid, or when the camera sees
@@ -71,8 +74,9 @@ class Unwarper {
   [[nodiscard]] Panorama unwrap(ImageView image) const;
   [[nodiscard]] Panorama unwrap(ImageView image, Workspace& workspace) const;
 
-  /// The same values, handed over in blocks of at most four rows from the top while they are in the
-  /// cache: take(first row, values of whole rows). Throws as `unwrap`.
+  /// The same values, handed over in blocks of `rows_per_block` rows (the last may be smaller) from
+  /// the top while they are in the cache: take(first row, values of whole rows). Throws as
+  /// `unwrap`.
   void unwrap_blocks(ImageView image, Workspace& workspace,
                      const std::function<void(int, std::span<const float>)>& take) const;
 

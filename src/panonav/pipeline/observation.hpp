@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
@@ -31,7 +32,9 @@ struct Observation {
 
   /// As the camera delivered it, or a panoramic cylinder already.
   std::variant<Image, Panorama> picture;
-  std::string name;  ///< the picture's file or topic; it stands in messages
+  std::string name;  ///< of the view that a memory keeps; messages name it
+  /// Where the picture was read from; then errors about it are FileErrors that name the file.
+  std::filesystem::path file;
   std::optional<double> stamp_s;
   /// Absolute, in the frame of the odometry, which drifts against the world.
   std::optional<Pose2> odometry;

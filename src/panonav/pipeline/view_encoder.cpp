@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 #include <numbers>
 #include <string_view>
 #include <utility>
@@ -58,12 +59,74 @@ void require_same(std::string_view field, int value, int remembered) {
   }
 }
 
+void require_upright(const Observation& observation) {
+  const auto& tilt = observation.tilt;
+  if (!tilt) return;
+  if (std::max(std::abs(tilt->roll_rad), std::abs(tilt->pitch_rad)) <= tolerated_tilt_rad) return;
+  throw ContractError("tilt of " + observation.name,
+                      short_number(degrees(tilt->roll_rad)) + ", " +
+                          short_number(degrees(tilt->pitch_rad)) + " degrees",
+                      "-0.5 to 0.5 degrees, as pictures are taken as upright");
+}
+
+/// What `encode` makes of the picture, an Image or a Panorama.
+template <class Encode>
+auto encoded(const Observation& observation, Encode encode) {
+  try {
+    require_upright(observation);
+    return std::visit(encode, observation.picture);
+  } catch (const ContractError& error) {
+    if (observation.file.empty()) throw;
+    throw FileError(observation.file.string(), error.what());
+  }
+}
+
 }  // namespace
 
+/// Buffers of the threads that encode at the moment, kept for those that will.
+class ViewEncoder::Workspaces {
+ public:
+  class Taken {
+   public:
+    explicit Taken(Workspaces& from) : from_(from), workspace_(from.take()) {}
+    ~Taken() { from_.give_back(std::move(workspace_)); }
+    Taken(const Taken&) = delete;
+    Taken& operator=(const Taken&) = delete;
+    SignatureExtractor::Workspace& operator*() { return *workspace_; }
+
+   private:
+    Workspaces& from_;
+    std::unique_ptr<SignatureExtractor::Workspace> workspace_;
+  };
+
+ private:
+  std::unique_ptr<SignatureExtractor::Workspace> take() {
+    const std::lock_guard lock(mutex_);
+    if (free_.empty()) return std::make_unique<SignatureExtractor::Workspace>();
+    auto workspace = std::move(free_.back());
+    free_.pop_back();
+    return workspace;
+  }
+  void give_back(std::unique_ptr<SignatureExtractor::Workspace> workspace) {
+    const std::lock_guard lock(mutex_);
+    free_.push_back(std::move(workspace));
+  }
+
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<SignatureExtractor::Workspace>> free_;
+};
+
 ViewEncoder::ViewEncoder(const MemoryHeader& header, const PictureSource& source)
-    : header_(header), reader_(cut_to(header, source), shape_for(header, source)) {
+    : header_(header),
+      reader_(cut_to(header, source), shape_for(header, source)),
+      extractor_({header.shape.rows, header.panorama_columns}, header.shape.components,
+                 header.preprocessing),
+      workspaces_(std::make_unique<Workspaces>()) {
   if (both_ready_made(header, source)) picture_shape_ = header.picture_shape;
 }
+ViewEncoder::~ViewEncoder() = default;
+ViewEncoder::ViewEncoder(ViewEncoder&&) noexcept = default;
+ViewEncoder& ViewEncoder::operator=(ViewEncoder&&) noexcept = default;
 
 Panorama ViewEncoder::panorama(ImageView picture) const {
   if (picture_shape_) {
@@ -76,27 +139,56 @@ Panorama ViewEncoder::panorama(ImageView picture) const {
 Panorama ViewEncoder::checked(Panorama panorama) const {
   require_same("rows", panorama.rows(), header_.shape.rows);
   require_same("columns", panorama.columns(), header_.panorama_columns);
-  if (!same_band(panorama.elevations(), header_.elevations)) {
-    throw ContractError("elevation band", band_text(panorama.elevations()),
-                        band_text(header_.elevations) + std::string(as_remembered));
-  }
+  check_band(panorama.elevations());
   return panorama;
 }
 
+void ViewEncoder::check_band(const std::optional<ElevationBand>& band) const {
+  if (same_band(band, header_.elevations)) return;
+  throw ContractError("elevation band", band_text(band),
+                      band_text(header_.elevations) + std::string(as_remembered));
+}
+
 Panorama ViewEncoder::panorama(const Observation& observation) const {
-  const auto& tilt = observation.tilt;
-  if (tilt && std::max(std::abs(tilt->roll_rad), std::abs(tilt->pitch_rad)) > tolerated_tilt_rad) {
-    throw ContractError("tilt of " + observation.name,
-                        short_number(degrees(tilt->roll_rad)) + ", " +
-                            short_number(degrees(tilt->pitch_rad)) + " degrees",
-                        "-0.5 to 0.5 degrees, as pictures are taken as upright");
-  }
-  if (const auto* ready = std::get_if<Panorama>(&observation.picture)) return checked(*ready);
-  return panorama(std::get<Image>(observation.picture).view());
+  struct Encode {
+    const ViewEncoder& encoder;
+    Panorama operator()(const Image& image) { return encoder.panorama(image.view()); }
+    Panorama operator()(const Panorama& ready) { return encoder.checked(ready); }
+  };
+  return encoded(observation, Encode{*this});
+}
+
+FourierSignature ViewEncoder::signature(const Observation& observation) const {
+  struct Encode {
+    const ViewEncoder& encoder;
+    FourierSignature operator()(const Image& image) { return encoder.signature(image.view()); }
+    FourierSignature operator()(const Panorama& ready) { return encoder.signature(ready); }
+  };
+  return encoded(observation, Encode{*this});
+}
+
+FourierSignature ViewEncoder::signature(ImageView picture) const {
+  const Unwarper* const unwarper = reader_.unwarper();
+  if (unwarper == nullptr) return signature(panorama(picture));
+  check_band(unwarper->elevations());
+  Workspaces::Taken workspace(*workspaces_);
+  return extractor_.signature(*unwarper, picture, *workspace);
 }
 
 FourierSignature ViewEncoder::signature(const Panorama& panorama) const {
-  return compute_signature(preprocess(panorama, header_.preprocessing), header_.shape.components);
+  require_same("rows", panorama.rows(), header_.shape.rows);
+  require_same("columns", panorama.columns(), header_.panorama_columns);
+  check_band(panorama.elevations());
+  Workspaces::Taken workspace(*workspaces_);
+  return extractor_.signature(panorama, *workspace);
+}
+
+PackedSignature ViewEncoder::packed(const Observation& observation) const {
+  return pack(signature(observation), header_.full_scale);
+}
+
+PackedSignature ViewEncoder::packed(ImageView picture) const {
+  return pack(signature(picture), header_.full_scale);
 }
 
 PackedSignature ViewEncoder::packed(const Panorama& panorama) const {

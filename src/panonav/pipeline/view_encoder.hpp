@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -10,6 +11,7 @@
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/panorama_reader.hpp"
 #include "panonav/pipeline/observation.hpp"
+#include "panonav/signature/signature_extractor.hpp"
 #include "panonav/storage/memory_file.hpp"
 
 namespace panonav {
@@ -23,31 +25,45 @@ struct SignatureOptions {
 };
 void visit_options(SignatureOptions& options, OptionVisitor& visitor);
 
-/// From a picture to what a memory compares, as the memory's header says. Several threads may use
-/// one at a time.
+/// From a picture to what a memory compares, as the memory's header says. Tables are made once and
+/// buffers are kept for the next picture. Several threads may use one at a time.
 class ViewEncoder {
  public:
   /// Pictures lie as `source` says; those of the memory's own camera: `header.source`. Throws
   /// ContractError when the elevations of the pictures are not the memory's.
   ViewEncoder(const MemoryHeader& header, const PictureSource& source);
+  ~ViewEncoder();
+  ViewEncoder(ViewEncoder&&) noexcept;
+  ViewEncoder& operator=(ViewEncoder&&) noexcept;
 
   [[nodiscard]] const MemoryHeader& header() const noexcept { return header_; }
 
-  /// The panoramic cylinder. Throws ContractError on a picture of another size or band than the
-  /// memory's, and on a tilt (`Observation::tilt`).
+  /// The panoramic cylinder. Throws ContractError (FileError where the observation has a file) on a
+  /// picture of another size or band than the memory's, and on a tilt (`Observation::tilt`).
   [[nodiscard]] Panorama panorama(const Observation& observation) const;
   [[nodiscard]] Panorama panorama(ImageView picture) const;
   /// Throws FileError on a picture that is missing, damaged or of another size than the memory's.
   [[nodiscard]] Panorama read(const DatasetEntry& entry) const;
 
+  /// Of an observation, of a picture as the camera delivers it, or of a panorama that is at hand
+  /// because it is needed for something else: the same bits. Mirror pictures go through the fused
+  /// `SignatureExtractor` without a panorama. Throws as `panorama`.
+  [[nodiscard]] FourierSignature signature(const Observation& observation) const;
+  [[nodiscard]] FourierSignature signature(ImageView picture) const;
   [[nodiscard]] FourierSignature signature(const Panorama& panorama) const;
+  [[nodiscard]] PackedSignature packed(const Observation& observation) const;
+  [[nodiscard]] PackedSignature packed(ImageView picture) const;
   [[nodiscard]] PackedSignature packed(const Panorama& panorama) const;
 
  private:
   [[nodiscard]] Panorama checked(Panorama panorama) const;
+  void check_band(const std::optional<ElevationBand>& band) const;
 
+  class Workspaces;
   MemoryHeader header_;
   PanoramaReader reader_;
+  SignatureExtractor extractor_;
+  std::unique_ptr<Workspaces> workspaces_;
   std::optional<PanoramaShape> picture_shape_;  ///< of panoramas that are resampled
 };
 

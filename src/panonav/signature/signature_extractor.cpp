@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -56,68 +57,117 @@ class Moments {
 
 }  // namespace
 
-SignatureExtractor::SignatureExtractor(Unwarper unwarper, int components,
-                                       const PreprocessingOptions& preprocessing)
-    : unwarper_(std::move(unwarper)),
-      transform_(unwarper_.columns(), components),
-      preprocessing_(preprocessing),
-      real_(shape().size()),
-      imaginary_(shape().size()) {
-  validate(preprocessing_);
-  check_masks(preprocessing_, unwarper_.rows());
-}
-
-FourierSignature SignatureExtractor::signature_from_image(ImageView image) {
-  if (preprocessing_.edge_channel) {
-    return compute_signature(preprocess(unwarper_.unwrap(image, workspace_), preprocessing_),
-                             transform_);
+/// Takes a panorama's rows in blocks from the top, then gives its signature.
+class SignatureExtractor::Rows {
+ public:
+  Rows(const SignatureExtractor& extractor, Workspace& workspace)
+      : extractor_(extractor),
+        rows_(static_cast<std::size_t>(extractor.rows_)),
+        columns_(static_cast<std::size_t>(extractor.transform_.columns())),
+        first_kept_(static_cast<std::size_t>(extractor.preprocessing_.masked_rows_top)),
+        end_kept_(rows_ - static_cast<std::size_t>(extractor.preprocessing_.masked_rows_bottom)),
+        real_(workspace.real),
+        imaginary_(workspace.imaginary) {
+    real_.resize(extractor.shape().size());
+    imaginary_.resize(extractor.shape().size());
   }
-  const auto rows = static_cast<std::size_t>(unwarper_.rows());
-  const auto columns = static_cast<std::size_t>(unwarper_.columns());
-  const auto first_kept = static_cast<std::size_t>(preprocessing_.masked_rows_top);
-  const std::size_t end_kept = rows - static_cast<std::size_t>(preprocessing_.masked_rows_bottom);
-  const bool needs_moments = preprocessing_.remove_mean || preprocessing_.normalise_gain;
-  const kernels::Instructions instructions = kernels::chosen_instructions();
 
-  Moments moments;
-  unwarper_.unwrap_blocks(image, workspace_, [&](int first_row, std::span<const float> values) {
-    const auto first = static_cast<std::size_t>(first_row);
-    transform_(values, std::span(real_).subspan(first), std::span(imaginary_).subspan(first), rows,
-               instructions);
-    if (needs_moments) {
-      const std::size_t begin = std::max(first, first_kept);
-      const std::size_t end = std::min(first + values.size() / columns, end_kept);
-      if (begin < end)
-        moments.add(values.subspan((begin - first) * columns, (end - begin) * columns));
+  void take(std::size_t first, std::span<const float> values) {
+    extractor_.transform_(values, std::span(real_).subspan(first),
+                          std::span(imaginary_).subspan(first), rows_, instructions_);
+    const auto& preprocessing = extractor_.preprocessing_;
+    if (!preprocessing.remove_mean && !preprocessing.normalise_gain) return;
+    const std::size_t begin = std::max(first, first_kept_);
+    const std::size_t end = std::min(first + values.size() / columns_, end_kept_);
+    if (begin < end) {
+      moments_.add(values.subspan((begin - first) * columns_, (end - begin) * columns_));
     }
-  });
+  }
 
-  // The steps of `preprocess` are linear in each row, so they may as well follow the transform.
-  if (preprocessing_.remove_mean) {
-    // k = 0 is twice the mean of its row.
-    const auto offset = static_cast<float>(2.0 * moments.mean());
-    for (std::size_t y = first_kept; y < end_kept; ++y) real_[y] -= offset;
+  /// The steps of `preprocess` are linear in each row, so they may as well follow the transform.
+  [[nodiscard]] FourierSignature finish(const std::optional<ElevationBand>& elevations) {
+    if (extractor_.preprocessing_.remove_mean) {
+      // k = 0 is twice the mean of its row.
+      const auto offset = static_cast<float>(2.0 * moments_.mean());
+      for (std::size_t y = first_kept_; y < end_kept_; ++y) real_[y] -= offset;
+    }
+    if (extractor_.preprocessing_.normalise_gain) {
+      const auto gain = static_cast<float>(normalising_gain(moments_.standard_deviation()));
+      for (float& value : real_) value *= gain;
+      for (float& value : imaginary_) value *= gain;
+    }
+    if (first_kept_ > 0 || end_kept_ < rows_) clear_masked_rows();
+
+    const SignatureShape shape = extractor_.shape();
+    std::vector<float> magnitudes(shape.size());
+    std::vector<float> phases(shape.size());
+    kernels::to_polar(real_, imaginary_, magnitudes, phases, instructions_);
+    return {shape, std::move(magnitudes), std::move(phases), elevations};
   }
-  if (preprocessing_.normalise_gain) {
-    const auto gain = static_cast<float>(normalising_gain(moments.standard_deviation()));
-    for (float& value : real_) value *= gain;
-    for (float& value : imaginary_) value *= gain;
-  }
-  if (first_kept > 0 || end_kept < rows) {
-    for (std::size_t k = 0; k < static_cast<std::size_t>(transform_.components()); ++k) {
+
+ private:
+  void clear_masked_rows() {
+    for (std::size_t at = 0; at < real_.size(); at += rows_) {
       for (std::vector<float>* part : {&real_, &imaginary_}) {
-        const auto begin = part->begin() + static_cast<std::ptrdiff_t>(k * rows);
-        std::fill(begin, begin + static_cast<std::ptrdiff_t>(first_kept), 0.0F);
-        std::fill(begin + static_cast<std::ptrdiff_t>(end_kept),
-                  begin + static_cast<std::ptrdiff_t>(rows), 0.0F);
+        const auto component = std::span(*part).subspan(at, rows_);
+        std::ranges::fill(component.first(first_kept_), 0.0F);
+        std::ranges::fill(component.subspan(end_kept_), 0.0F);
       }
     }
   }
 
-  std::vector<float> magnitudes(shape().size());
-  std::vector<float> phases(shape().size());
-  kernels::to_polar(real_, imaginary_, magnitudes, phases, instructions);
-  return {shape(), std::move(magnitudes), std::move(phases), unwarper_.elevations()};
+  const SignatureExtractor& extractor_;
+  std::size_t rows_, columns_, first_kept_, end_kept_;
+  std::vector<float>& real_;
+  std::vector<float>& imaginary_;
+  Moments moments_;
+  kernels::Instructions instructions_ = kernels::chosen_instructions();
+};
+
+SignatureExtractor::SignatureExtractor(PanoramaShape cylinder, int components,
+                                       const PreprocessingOptions& preprocessing)
+    : rows_(cylinder.rows),
+      transform_(cylinder.columns, components),
+      preprocessing_(preprocessing) {
+  require(rows_ >= 1, "rows", rows_, ">= 1");
+  validate(preprocessing_);
+  check_masks(preprocessing_, rows_);
+}
+
+void SignatureExtractor::require_shape(int rows, int columns) const {
+  require(rows == rows_, "panorama rows", rows, std::to_string(rows_));
+  require(columns == transform_.columns(), "panorama columns", columns,
+          std::to_string(transform_.columns()));
+}
+
+FourierSignature SignatureExtractor::signature(const Panorama& panorama,
+                                               Workspace& workspace) const {
+  require_shape(panorama.rows(), panorama.columns());
+  if (preprocessing_.edge_channel) {
+    return compute_signature(preprocess(panorama, preprocessing_), transform_);
+  }
+  Rows rows(*this, workspace);
+  const auto values = panorama.values();
+  const auto columns = static_cast<std::size_t>(panorama.columns());
+  const std::size_t block = Unwarper::rows_per_block * columns;
+  for (std::size_t at = 0; at < values.size(); at += block) {
+    rows.take(at / columns, values.subspan(at, std::min(block, values.size() - at)));
+  }
+  return rows.finish(panorama.elevations());
+}
+
+FourierSignature SignatureExtractor::signature(const Unwarper& unwarper, ImageView image,
+                                               Workspace& workspace) const {
+  require_shape(unwarper.rows(), unwarper.columns());
+  if (preprocessing_.edge_channel) {
+    return signature(unwarper.unwrap(image, workspace.unwarping), workspace);
+  }
+  Rows rows(*this, workspace);
+  unwarper.unwrap_blocks(image, workspace.unwarping,
+                         [&](int first_row, std::span<const float> values) {
+                           rows.take(static_cast<std::size_t>(first_row), values);
+                         });
+  return rows.finish(unwarper.elevations());
 }
 
 }  // namespace panonav
