@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 namespace panonav {
 
@@ -19,6 +20,31 @@ std::string plain(const std::string& text) {
     result += c;
   }
   return result;
+}
+
+// An item of a list, broken between words.
+std::string list_item(const std::string& text) {
+  constexpr std::size_t width = 120;
+  std::string result = "-";
+  std::size_t column = result.size();
+  std::istringstream words(text);
+  for (std::string word; words >> word;) {
+    if (column + 1 + word.size() > width) {
+      result += "\n ";
+      column = 1;
+    }
+    result += " " + word;
+    column += 1 + word.size();
+  }
+  return result + "\n";
+}
+
+// "**what**: 0.02 (0.01 .. 0.03) m, median of 20; published 0.04; target at most 0.1: holds."
+std::string row_line(const ResultRow& row) {
+  std::string text = "**" + plain(row.what) + "**: " + shown_figure(row);
+  if (!row.over.empty()) text += ", " + plain(row.over);
+  if (row.published) text += "; published " + shown_published(row);
+  return text + "; target " + shown_target(row) + (row.holds() ? ": holds." : ": **missed**.");
 }
 
 }  // namespace
@@ -72,30 +98,27 @@ std::string to_markdown(const ResultsDocument& document) {
   std::string text = "# Results: published and measured\n\n";
   text += "Written by panonav " + document.version + ":\n\n    " + document.command + "\n\n";
   text += "**" + std::to_string(count.held) + " of " +
-          counted(count.judged, "target holds", "targets hold") + ".** " +
-          std::to_string(rows - count.judged) + " more figures are reported without a target.\n\n";
-  text += "| experiments | targets | hold | figures without a target |\n|---|---|---|---|\n";
+          counted(count.judged, "target holds", "targets hold") + ".**\n\n";
+  text += "| experiments | targets | hold |\n|---|---|---|\n";
   for (const PaperResults& paper : document.papers) {
     const TargetCount of_paper = count_targets(paper.rows);
     text += "| [" + plain(paper.title) + "](#" + paper.paper + ") | " +
-            std::to_string(of_paper.judged) + " | " + std::to_string(of_paper.held) + " | " +
-            std::to_string(paper.rows.size() - of_paper.judged) + " |\n";
+            std::to_string(of_paper.judged) + " | " + std::to_string(of_paper.held) + " |\n";
   }
   text += "\n## Rows that do not hold\n\n";
   const auto misses = miss_lines(document);
-  for (const std::string& line : misses) text += "- " + plain(line) + "\n";
+  for (const std::string& line : misses) text += list_item(plain(line));
   if (misses.empty()) text += "None.\n";
   for (const PaperResults& paper : document.papers) {
-    std::vector<ResultRow> ordered = paper.rows;
-    const std::size_t judged = put_targets_first(ordered);
-    const std::span<const ResultRow> all(ordered);
     text += "\n<a name=\"" + paper.paper + "\"></a>\n\n## " + plain(paper.title) + "\n\n";
     text += "`panonav reproduce " + paper.paper + "`\n\n";
-    if (judged > 0) text += to_markdown(all.first(judged)) + "\n";
-    if (judged == all.size()) continue;
-    text += "<details><summary>" + counted(all.size() - judged, "figure", "figures") +
-            " without a target</summary>\n\n" + to_markdown(all.subspan(judged)) + "\n</details>\n";
+    if (count_targets(paper.rows).judged == 0) text += "No row has a target.\n";
+    for (const ResultRow& row : paper.rows) {
+      if (row.target) text += list_item(row_line(row));
+    }
   }
+  text +=
+      "\n`results.json` holds " + counted(rows, "row", "rows") + ", those without a target too.\n";
   return text;
 }
 

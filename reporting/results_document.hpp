@@ -33,8 +33,9 @@ std::size_t put_targets_first(std::vector<ResultRow>& rows);
 
 /// One object: `version`, `command`, `targets`, `held`, `papers` (by name, an array of rows each).
 [[nodiscard]] std::string to_json(const ResultsDocument& document);
-/// GitHub-flavoured Markdown: title, command, counts, the rows that do not hold with their reasons,
-/// then for each paper the table of the rows with a target and, folded up, that of the others.
+/// Markdown: title, command, counts, the rows that do not hold with their reasons, then for each
+/// paper its rows with a target, and how many rows the JSON document holds. Lines are at most 120
+/// bytes long where words allow it.
 [[nodiscard]] std::string to_markdown(const ResultsDocument& document);
 
 }  // namespace panonav

@@ -32,14 +32,6 @@ std::string shown(const std::pair<double, double>& range) {
                                      : shown(range.first) + " .. " + shown(range.second);
 }
 
-// A vertical bar would end a cell of the table.
-std::string cell(std::string text) {
-  for (std::size_t i = text.find('|'); i != std::string::npos; i = text.find('|', i + 2)) {
-    text.insert(i, "\\");
-  }
-  return text;
-}
-
 }  // namespace
 
 bool ResultRow::holds() const {
@@ -65,6 +57,10 @@ std::string shown_figure(const ResultRow& row) {
   return row.unit.empty() ? text : text + " " + row.unit;
 }
 
+std::string shown_published(const ResultRow& row) {
+  return row.published ? shown(*row.published) : "-";
+}
+
 std::string shown_target(const ResultRow& row) {
   if (!row.target) return "-";
   return (row.target->comparison == Comparison::at_most ? "at most " : "at least ") +
@@ -86,7 +82,7 @@ std::string miss_text(const ResultRow& row) {
   if (!row.reason.empty()) {
     parts.push_back(row.reason);
   } else if (row.unit == "ms" || row.unit == "us") {
-    parts.emplace_back("a time on this machine, with whatever else it did");
+    parts.emplace_back("a time depends on the machine and on its other load");
   } else if (parts.size() == 1) {
     parts.emplace_back("no reason is known");
   }
@@ -104,9 +100,14 @@ std::span<const std::string> table_header() {
 std::vector<std::string> table_cells(const ResultRow& row) {
   ResultRow bare = row;
   bare.unit.clear();
-  return {row.what,           row.published ? shown(*row.published) : "-",
-          shown_figure(bare), row.unit.empty() ? "-" : row.unit,
-          shown_target(row),  !row.target ? "-" : row.holds() ? "yes" : "no"};
+  return {row.over.empty() ? row.what : row.what + " (" + row.over + ")",
+          shown_published(row),
+          shown_figure(bare),
+          row.unit.empty() ? "-" : row.unit,
+          shown_target(row),
+          !row.target   ? "-"
+          : row.holds() ? "yes"
+                        : "no"};
 }
 
 std::string to_json(std::span<const ResultRow> rows) {
@@ -115,6 +116,7 @@ std::string to_json(std::span<const ResultRow> rows) {
     nlohmann::ordered_json entry;
     entry["id"] = row.id;
     entry["what"] = row.what;
+    entry["over"] = row.over;
     if (!row.published) {
       entry["published"] = nullptr;
     } else if (row.published->first == row.published->second) {
@@ -143,23 +145,6 @@ std::string to_json(std::span<const ResultRow> rows) {
     list.push_back(std::move(entry));
   }
   return list.dump(1) + "\n";
-}
-
-std::string to_markdown(std::span<const ResultRow> rows) {
-  const auto line = [](std::span<const std::string> cells) {
-    std::string text = "|";
-    for (const std::string& one : cells) text += " " + cell(one) + " |";
-    return text + "\n";
-  };
-  std::string text = line(table_header()) + "|";
-  for (std::size_t i = 0; i < table_header().size(); ++i) text += "---|";
-  text += "\n";
-  for (const ResultRow& row : rows) {
-    auto cells = table_cells(row);
-    if (row.target && !row.holds()) cells.back() = "**" + cells.back() + "**";
-    text += line(cells);
-  }
-  return text;
 }
 
 }  // namespace panonav

@@ -21,7 +21,7 @@ struct Target {
 /// One line of "published / ours / holds".
 struct ResultRow {
   std::string id;    ///< short and stable, "m04.fig6.success_15"
-  std::string what;  ///< for people
+  std::string what;  ///< for people; the same in every run
   std::optional<std::pair<double, double>>
       published;  ///< low, high; equal when the paper gives one number
   double ours = 0.0;
@@ -29,6 +29,8 @@ struct ResultRow {
       interval;      ///< 95 % interval of `ours` where it is a statistic
   std::string unit;  ///< "" for pure numbers
   std::optional<Target> target;
+  /// What the figure was taken over, "median of 120", and what else belongs to it alone.
+  std::string over = {};
   /// Why the target is missed, as far as it is known: one plain sentence. Read only where the row
   /// does not hold.
   std::string reason = {};
@@ -47,6 +49,8 @@ struct TargetCount {
 
 /// Our figure for people, with its interval and unit: "0.02 (0.012 .. 0.036) m".
 [[nodiscard]] std::string shown_figure(const ResultRow& row);
+/// "5 .. 6", or "-" where the paper gives nothing.
+[[nodiscard]] std::string shown_published(const ResultRow& row);
 /// "at most 0.02", or "-" for none.
 [[nodiscard]] std::string shown_target(const ResultRow& row);
 /// By how much a row misses its target, and why: the known reason, else what the figures tell, else
@@ -61,10 +65,7 @@ struct TargetCount {
 /// The array that `reproduce --json` prints (docs/formats.md). The reason of a row that holds is
 /// left out.
 [[nodiscard]] std::string to_json(std::span<const ResultRow> rows);
-/// Reads what `to_json` writes; rows without `reason` too. Throws FileError, which names `file`,
-/// the row and the field.
+/// Reads what `to_json` writes; rows without `over` or `reason` too. Throws FileError, which names
+/// `file`, the row and the field.
 [[nodiscard]] std::vector<ResultRow> from_json(std::string_view text, std::string_view file);
-/// A GitHub-flavoured Markdown table.
-[[nodiscard]] std::string to_markdown(std::span<const ResultRow> rows);
-
 }  // namespace panonav

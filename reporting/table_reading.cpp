@@ -92,6 +92,7 @@ std::vector<ResultRow> from_json(std::string_view text, std::string_view file) {
                   .interval = reader.range("interval"),
                   .unit = reader.text("unit"),
                   .target = reader.target()};
+    if (entry.contains("over")) row.over = reader.text("over");
     if (entry.contains("reason") && !entry["reason"].is_null()) row.reason = reader.text("reason");
     if (reader.member("holds") != row.holds()) {
       reader.fail("holds",

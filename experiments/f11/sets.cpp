@@ -251,9 +251,9 @@ void reproduce_first_set(const MappingReproductionOptions& options, Executor& ex
                closed_by_spacing[every]);
   }
   add_median(result, "f11.loop.heading_30cm", "loop: heading error between views 30 cm apart",
-             "degrees", headings_deg, at_most(2.0));
+             "deg", headings_deg, at_most(2.0));
   add_median(result, "f11.loop.compass_30cm",
-             "loop: heading error of the compass alone between views 30 cm apart", "degrees",
+             "loop: heading error of the compass alone between views 30 cm apart", "deg",
              compass_deg);
   plot_grid(grid, "First set: shape difference by the published rule, median",
             options.out / "f11_figure6a.png");
@@ -316,8 +316,8 @@ void reproduce_second_set(const MappingReproductionOptions& options, Executor& e
   // Loops that close take errors of length away, as those of heading.
   if (median(errors.closed) <= 0.01) {
     result.rows.back().reason =
-        "the views' unit of length is another beside every piece of furniture; closed loops make "
-        "up for it";
+        "the unit of length of the views changes beside every piece of furniture; loop closures "
+        "correct it";
   }
   add_median(result, "f11.lab.closed", what + ": shape difference with closure", "", errors.closed,
              at_most(0.01));

@@ -202,9 +202,9 @@ void reproduce_corridor(const TrackingReproductionOptions& options, Executor& ex
       std::to_string(distinct_degrees) + " degrees of the view";
   if (before > 0) {
     add_rate(result, "m03.corridor.kept_before",
-             what + "; before it, images after which a mode is within 0.5 m of the truth; " +
-                 single_images_text(corridors.sets),
-             kept, before, at_least(0.99));
+             what + "; before it, images after which a mode is within 0.5 m of the truth", kept,
+             before, at_least(0.99));
+    tell_single_images(result.rows.back(), corridors.sets);
     add_rate(result, "m03.corridor.sure_before",
              "corridor: before the first distinct place, images at which it says localised",
              sure_before, before);

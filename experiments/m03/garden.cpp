@@ -100,10 +100,9 @@ void reproduce_garden(const TrackingReproductionOptions& options, Executor& exec
     const auto runs = track_sets(sets, setting, seed_of_garden, executor);
     const std::string what = "garden, 50 cm grid, " + light;
     const auto needed = capped_images(runs, garden_spacing_m);
-    add_median(
-        result, "m03.garden." + id + ".images",
-        what + ": images until the error is below 50 cm from then on; " + single_images_text(sets),
-        "images", needed);
+    add_median(result, "m03.garden." + id + ".images",
+               what + ": images until the error is below 50 cm from then on", "images", needed);
+    tell_single_images(result.rows.back(), sets);
     add_rate(result, "m03.garden." + id + ".within_10", what + ": runs localised within 10 images",
              localised_within(runs, garden_spacing_m, 10), runs.size());
     add_median(result, "m03.garden." + id + ".error_10", what + ": error after 10 images", "m",

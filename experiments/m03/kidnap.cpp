@@ -40,11 +40,11 @@ void reproduce_kidnapping(const TrackingReproductionOptions& options,
     const bool judged = redraw != Redraw::uniform;
     const auto target = [&](Target value) { return judged ? std::optional(value) : std::nullopt; };
     const auto images = capped_images(runs, m03_spacing_m, first_after);
-    add_median(
-        result, row + ".images",
-        what + ": images until the error is below 25 cm from then on; " + single_images_text(sets),
-        "images", images, target(at_most(3.0)),
-        redraw == Redraw::topological ? std::optional(std::pair{3.0, 4.0}) : std::nullopt);
+    add_median(result, row + ".images",
+               what + ": images until the error is below 25 cm from then on", "images", images,
+               target(at_most(3.0)),
+               redraw == Redraw::topological ? std::optional(std::pair{3.0, 4.0}) : std::nullopt);
+    tell_single_images(result.rows.back(), sets);
     add_mean(result, row + ".images_mean", what + ": images", "images", images);
     add_rate(result, row + ".within_8", what + ": runs localised within 8 images",
              localised_within(runs, m03_spacing_m, 8, first_after), runs.size(),

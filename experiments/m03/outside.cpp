@@ -164,11 +164,12 @@ void add_run(Reports& reports, const TrackedRun& run, std::span<const double> wa
 }
 
 void add_rows(Reproduction& result, const std::string& id, const std::string& what,
-              const Reports& reports, const std::string& single) {
+              const Reports& reports, std::span<const RunSet> sets) {
   if (reports.inside > 0) {
     add_rate(result, id + ".lost_inside",
-             what + ": images before it leaves, from the sixth on, that are called lost; " + single,
+             what + ": images before it leaves, from the sixth on, that are called lost",
              reports.lost_inside, reports.inside);
+    tell_single_images(result.rows.back(), sets);
   }
   if (reports.outside > 0) {
     add_rate(result, id + ".lost_outside",
@@ -204,7 +205,7 @@ void reproduce_leaving(const TrackingReproductionOptions& options, const std::st
   for (std::size_t r = 0; r < runs.size(); ++r) add_run(reports, runs[r], outside.ways_m[r]);
   add_rows(result, "m03.leaving." + name,
            name + ", one half memorised, the robot drives out of it and back", reports,
-           single_images_text(outside.sets));
+           outside.sets);
   add_confidently_wrong(result, "m03.leaving." + name + ".wrong", name + ", leaving and returning",
                         runs);
   Series lost_series{.label = "called lost"};

@@ -59,9 +59,9 @@ void add_rows(Reproduction& result, const std::string& id, const std::string& wh
   const std::string centimetres = std::to_string(std::lround(100.0 * radius_m)) + " cm";
   const auto needed = capped_images(runs, radius_m);
   add_median(result, id + ".images",
-             what + ": images until the error is below " + centimetres + " from then on; " +
-                 single_images_text(sets),
-             "images", needed);
+             what + ": images until the error is below " + centimetres + " from then on", "images",
+             needed);
+  tell_single_images(result.rows.back(), sets);
   add_mean(result, id + ".images_mean", what + ": images", "images", needed);
   add_rate(result, id + ".within_10", what + ": runs localised within 10 images",
            localised_within(runs, radius_m, 10), runs.size());

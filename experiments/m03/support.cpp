@@ -75,6 +75,8 @@ OfficeRuns record_office(const TrackingReproductionOptions& options, int number,
   return office;
 }
 
+namespace {
+
 std::string single_images_text(std::span<const RunSet> sets) {
   SingleImages sum;
   for (const RunSet& set : sets) sum.add(set.single_images);
@@ -87,6 +89,12 @@ std::string single_images_text(std::span<const RunSet> sets) {
   return "one image alone: right " + percent(sum.right) + " % (by dissimilarity only " +
          percent(sum.right_by_dissimilarity) + " %), within " + std::to_string(spacing) + " cm " +
          percent(sum.near) + " %";
+}
+
+}  // namespace
+
+void tell_single_images(ResultRow& row, std::span<const RunSet> sets) {
+  row.over += "; " + single_images_text(sets);
 }
 
 std::vector<double> capped_images(std::span<const TrackedRun> runs, double radius_m,
@@ -123,35 +131,38 @@ void add_rate(Reproduction& result, const std::string& id, const std::string& wh
               std::size_t successes, std::size_t trials, std::optional<Target> target) {
   const Proportion rate = success_rate(successes, trials);
   result.rows.push_back({.id = id,
-                         .what = what + " (" + std::to_string(trials) + ")",
+                         .what = what,
                          .published = std::nullopt,
                          .ours = rate.value,
                          .interval = std::pair{rate.low, rate.high},
                          .unit = "",
-                         .target = target});
+                         .target = target,
+                         .over = "of " + std::to_string(trials)});
 }
 
 void add_median(Reproduction& result, const std::string& id, const std::string& what,
                 const std::string& unit, std::span<const double> values,
                 std::optional<Target> target, std::optional<std::pair<double, double>> published) {
   result.rows.push_back({.id = id,
-                         .what = what + " (median of " + std::to_string(values.size()) + ")",
+                         .what = what,
                          .published = published,
                          .ours = median(values),
                          .interval = median_interval(values, 1),
                          .unit = unit,
-                         .target = target});
+                         .target = target,
+                         .over = "median of " + std::to_string(values.size())});
 }
 
 void add_mean(Reproduction& result, const std::string& id, const std::string& what,
               const std::string& unit, std::span<const double> values) {
   result.rows.push_back({.id = id,
-                         .what = what + " (mean of " + std::to_string(values.size()) + ")",
+                         .what = what,
                          .published = std::nullopt,
                          .ours = mean(values),
                          .interval = mean_interval(values, 1),
                          .unit = unit,
-                         .target = std::nullopt});
+                         .target = std::nullopt,
+                         .over = "mean of " + std::to_string(values.size())});
 }
 
 void add_confidently_wrong(Reproduction& result, const std::string& id, const std::string& what,

@@ -51,8 +51,9 @@ inline constexpr std::size_t m03_images_before_kidnapping = 10;
 [[nodiscard]] OfficeRuns record_office(const TrackingReproductionOptions& options, int number,
                                        Executor& executor);
 
-/// "one image alone: right 74 % (by dissimilarity only 54 %), within 25 cm 96 %".
-[[nodiscard]] std::string single_images_text(std::span<const RunSet> sets);
+/// Adds what one image alone gives to what `row` was taken over: "one image alone: right 74 % (by
+/// dissimilarity only 54 %), within 25 cm 96 %".
+void tell_single_images(ResultRow& row, std::span<const RunSet> sets);
 
 /// Images until localised, each at most `m03_most_images`.
 [[nodiscard]] std::vector<double> capped_images(std::span<const TrackedRun> runs, double radius_m,

@@ -70,10 +70,10 @@ void reproduce_position_tracking(const TrackingReproductionOptions& options,
     for (const TrackedRun& run : known) {
       back += images_until_first_right(run, m03_spacing_m, first_after).value_or(3) <= 2 ? 1 : 0;
     }
-    add_rate(result, row + ".back_2",
-             what + ": error below 25 cm at the first or second image; " + single_images_text(sets),
+    add_rate(result, row + ".back_2", what + ": error below 25 cm at the first or second image",
              back, known.size(),
              redraw == Redraw::none ? std::nullopt : std::optional(at_least(0.99)));
+    tell_single_images(result.rows.back(), sets);
     add_rate(result, row + ".back_2_for_good",
              what +
                  ": error below 25 cm within 2 images and "

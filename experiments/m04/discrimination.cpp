@@ -206,9 +206,9 @@ class Discrimination final : public Experiment {
     const double high = mean(disturbance_[3]);
     if (low <= high) return "";
     const auto hundredths = [](double value) { return to_text(std::round(100.0 * value) / 100.0); };
-    return "hiding 10 % changes components 2 to 14 by " + hundredths(low) +
-           " times what a step of 25 cm changes there, 50 to 255 only by " + hundredths(high) +
-           ", so more components help";
+    return "hiding 10 % of the azimuths changes components 2 to 14 " + hundredths(low) +
+           " times as much as a step of 25 cm does, and components 50 to 255 only " +
+           hundredths(high) + " times as much; so more components help";
   }
 
   // What the hidden azimuths change in a view, against what the way to a reference one spacing

@@ -110,7 +110,7 @@ class LatticeExperiment {
          .published = std::pair{18.0, 36.0},
          .ours = median(turn_error_deg_),
          .interval = median_interval(turn_error_deg_, 1),
-         .unit = "degrees",
+         .unit = "deg",
          .target = Target{Comparison::at_most, 2.0}});
     for (std::size_t i = 0; i < error_.size(); ++i) {
       add_row(

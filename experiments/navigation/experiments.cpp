@@ -74,10 +74,10 @@ std::string other_ends(const Measures& measured, NavigationState wanted) {
   std::string text;
   const auto add = [&](std::size_t count, const std::string& end) {
     if (count == 0) return;
-    text += (text.empty() ? "the other runs: " : ", ") + std::to_string(count) + " " + end;
+    text += (text.empty() ? "of the other runs, " : ", ") + std::to_string(count) + " " + end;
   };
   if (wanted == NavigationState::arrived) {
-    add(measured.wrongly, "say that they arrived and are farther off");
+    add(measured.wrongly, "report an arrival but are farther off");
   }
   for (const auto& [end, count] : measured.ends) {
     if (end != wanted) add(count, "end as " + std::string(name_of(end)));
@@ -91,7 +91,7 @@ void report(const std::string& id, const std::string& what, const Measures& meas
            measured.arrived, measured.runs, arrival);
   result.rows.back().reason = other_ends(measured, NavigationState::arrived);
   if (!measured.lengths.empty()) {
-    add_median(result, id + ".length", what + ": way driven against the shortest", "x",
+    add_median(result, id + ".length", what + ": way driven against the shortest", "",
                measured.lengths, length);
   }
   add_rate(result, id + ".wrongly", what + ": say that they arrived, and are farther off",

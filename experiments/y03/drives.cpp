@@ -94,13 +94,13 @@ void report(Reproduction& result, std::uint64_t seed, const std::string& id,
   std::vector<std::size_t> all(errors.images_cm.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
   result.rows.push_back({.id = "y03." + id + ".error",
-                         .what = what + ": mean error of the position (mean of " +
-                                 std::to_string(errors.mean_cm.size()) + " variants)",
+                         .what = what + ": mean error of the position",
                          .published = pair(published),
                          .ours = mean(errors.mean_cm),
                          .interval = mean_interval(errors.mean_cm, seed),
                          .unit = "cm",
-                         .target = target});
+                         .target = target,
+                         .over = "mean of " + std::to_string(errors.mean_cm.size()) + " variants"});
   result.rows.push_back({.id = "y03." + id + ".sigma",
                          .what = what + ": standard deviation of the error, all images",
                          .published = pair(published_sigma),

@@ -57,7 +57,7 @@ TEST(ResultsDocument, JsonHasTheRowsOfEveryPaper) {
   EXPECT_EQ(to_json(read), to_json(made.papers[0].rows));
 }
 
-TEST(ResultsDocument, MarkdownTellsEveryMissAndThenAllRows) {
+TEST(ResultsDocument, MarkdownTellsEveryMissAndThenAllRowsWithATarget) {
   const auto made = document();
   ASSERT_EQ(miss_lines(made).size(), 1U);
   EXPECT_EQ(miss_lines(made)[0],
@@ -69,12 +69,29 @@ TEST(ResultsDocument, MarkdownTellsEveryMissAndThenAllRows) {
        {"panonav 1.2.3", "    panonav reproduce all --quick", "1 of 2 targets hold",
         "Rows that do not hold",
         "- a01: far\\_off: 3 m, target at most 1: missed by 2; the floor is \\*wet\\*.",
-        "## Walking | running", "| far_off |", "**no**", "| kept |", "<details>", "| reported |",
-        "</details>", "## Standing", "| still |"}) {
+        "## Walking | running", "- **far\\_off**: 3 m; target at most 1: **missed**.\n",
+        "- **kept**: 0.5 m; target at most 1: holds.\n", "## Standing", "No row has a target.\n",
+        "`results.json` holds 4 rows, those without a target too.\n"}) {
     const std::size_t found = text.find(part, at);
     ASSERT_NE(found, std::string::npos) << part << " after\n" << text.substr(0, at);
     at = found;
   }
+  EXPECT_EQ(text.find("reported"), std::string::npos) << "it has no target";
+}
+
+TEST(ResultsDocument, MarkdownTellsAllOfARowOnShortLines) {
+  ResultsDocument made = document();
+  ResultRow& kept = made.papers[0].rows[2];
+  kept.published = std::pair{5.0, 6.0};
+  kept.interval = std::pair{0.4, 0.6};
+  kept.over = "median of 7";
+  kept.what += " over a way whose name is long enough for more than one line, as some names are";
+  EXPECT_NE(to_markdown(made).find(
+                "- **kept over a way whose name is long enough for more than one line, as some "
+                "names are**: 0.5 (0.4 .. 0.6) m, median of\n  7; published 5 .. 6; target at most "
+                "1: holds.\n"),
+            std::string::npos)
+      << to_markdown(made);
 }
 
 TEST(ResultsDocument, SaysSoWhenNothingIsMissed) {

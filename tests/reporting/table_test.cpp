@@ -56,6 +56,7 @@ TEST(ResultRow, ReadsBackWhatItWrites) {
   bare.unit = "";
   ResultRow range = missed();
   range.published = std::pair{-1.0, 1e-300};
+  range.over = "median of 7";
   const double nan = std::numeric_limits<double>::quiet_NaN();
   ResultRow nothing = row(nan, Comparison::at_most, 1.0);
   nothing.interval = std::pair{nan, 4.0};
@@ -65,6 +66,7 @@ TEST(ResultRow, ReadsBackWhatItWrites) {
   for (std::size_t i = 0; i < rows.size(); ++i) {
     EXPECT_EQ(read[i].id, rows[i].id);
     EXPECT_EQ(read[i].what, rows[i].what);
+    EXPECT_EQ(read[i].over, rows[i].over);
     EXPECT_EQ(read[i].unit, rows[i].unit);
     EXPECT_EQ(read[i].target, rows[i].target);
     EXPECT_EQ(read[i].reason, rows[i].reason);
@@ -94,9 +96,11 @@ TEST(ResultRow, AReasonIsToldOnlyWhereTheTargetIsMissed) {
 TEST(ResultRow, ReadsRowsOfBeforeReasonsWereTold) {
   auto list = nlohmann::json::parse(to_json(std::vector{missed()}));
   list[0].erase("reason");
+  list[0].erase("over");
   const auto read = from_json(list.dump(), "x.json");
   ASSERT_EQ(read.size(), 1U);
   EXPECT_EQ(read[0].reason, "");
+  EXPECT_EQ(read[0].over, "");
 }
 
 TEST(ResultRow, ReadingNamesFileRowAndField) {
@@ -147,6 +151,9 @@ TEST(ResultRow, ReadingNamesFileRowAndField) {
   list = nlohmann::json::parse(good);
   list[0]["reason"] = 7;
   EXPECT_NE(fault(list.dump()).find("reason is 7; allowed: a text"), std::string::npos);
+  list = nlohmann::json::parse(good);
+  list[0]["over"] = 7;
+  EXPECT_NE(fault(list.dump()).find("over is 7; allowed: a text"), std::string::npos);
 }
 
 TEST(ResultRow, TellsByHowMuchAndWhyItIsMissed) {
@@ -164,16 +171,18 @@ TEST(ResultRow, TellsByHowMuchAndWhyItIsMissed) {
   one.interval = std::pair{0.9, 2.2};
   EXPECT_EQ(miss_text(one), "by 0.25; no reason is known");
   one.unit = "ms";
-  EXPECT_EQ(miss_text(one), "by 0.25; a time on this machine, with whatever else it did");
+  EXPECT_EQ(miss_text(one), "by 0.25; a time depends on the machine and on its other load");
   one.ours = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(miss_text(one), "nothing could be measured");
 }
 
-TEST(ResultRow, MarkdownKeepsItsColumns) {
-  const std::vector<ResultRow> rows{row(2.0, Comparison::at_most, 1.0)};
-  const std::string text = to_markdown(rows);
-  EXPECT_NE(text.find("error \\| at the goal"), std::string::npos);
-  EXPECT_NE(text.find("**no**"), std::string::npos);
+TEST(ResultRow, CellsTellWhatTheFigureWasTakenOver) {
+  ResultRow one = missed();
+  one.over = "median of 7";
+  EXPECT_EQ(table_cells(one),
+            (std::vector<std::string>{"error | at the goal (median of 7)", "5 .. 6",
+                                      "2 (1.5 .. 2.5)", "m", "at most 1", "no"}));
+  EXPECT_EQ(table_cells(one).size(), table_header().size());
 }
 
 }  // namespace

@@ -111,7 +111,11 @@ Reproduction reproduce_paper(const ReproducedPaper& paper, const ReproduceArgume
   remove_file(out / results_file);
   auto [lead, result] = paper.run(wanted, out, session.executor(), report);
   progress.clear();
-  write_file(out / "results.md", to_markdown(result.rows));
+  const std::string name(paper.name);
+  write_file(out / "results.md",
+             to_markdown({.version = PANONAV_VERSION,
+                          .command = "panonav reproduce " + name,
+                          .papers = {{name, std::string(paper.title), result.rows}}}));
   write_paper_page(out, paper, lead, result);
   write_file(out / results_file, to_json(result.rows));
   return std::move(result);
