@@ -28,10 +28,10 @@ struct AlignmentOptions {
 [[nodiscard]] Alignment align(std::span<const Point2> from, std::span<const Point2> to,
                               const AlignmentOptions& options = {});
 
-/// How much two shapes differ when translation, rotation and size do not count: mu = 1 - (s_1 + d
-/// s_2)^2 with s the singular values of the product of the two centred, unit-norm sets, d = +-1 so
-/// that the best proper rotation is meant. The measure that [F11 section 4] names but does not
-/// print.
+/// Procrustes disparity of two shapes, the "shape difference" mu that [F11 section 4] names but
+/// does not print: how much they differ after the best translation, rotation and scale. mu = 1 -
+/// (s_1 + d s_2)^2 with s the singular values of the product of the two centred, unit-norm sets,
+/// and d = +-1 such that the rotation is proper.
 struct ShapeDifference {
   double value = 0.0;            ///< 0 (same shape) .. 1
   double with_reflection = 0.0;  ///< the same when a mirror image is allowed

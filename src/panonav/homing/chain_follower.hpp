@@ -13,18 +13,18 @@ namespace panonav {
 enum class ChainDirection { forward, back };
 
 struct ChainFollowerOptions {
-  /// The robot goes on for the next snapshot where the vector to the present one is shorter, in
-  /// units of R.
+  /// The robot continues to the next snapshot where the vector to the present one is shorter than
+  /// this, in units of R.
   double switch_length = 0.1;
   /// A vector that points farther from where odometry expects the snapshot is not followed.
   double mistrust_rad = 1.0;
-  /// The same of the heading that the compass finds, whatever the distance: odometry loses less
-  /// over the way between two snapshots.
+  /// The same for the heading that the compass finds, at any distance: odometry drifts less between
+  /// two snapshots.
   double mistrust_heading_rad = 0.5;
   /// Nearer than this to where odometry expects the snapshot, vectors are followed in any
-  /// direction: there the drift of odometry decides its direction.
+  /// direction, because the drift of odometry dominates there.
   double near_m = 0.4;
-  /// The robot is lost after so long a way without reaching a snapshot.
+  /// The robot is lost after this distance without reaching a snapshot.
   double longest_unseen_m = 10.0;
 };
 void visit_options(ChainFollowerOptions& options, OptionVisitor& visitor);
@@ -35,7 +35,7 @@ enum class ChainState {
   lost,      ///< it stopped elsewhere, or reached no snapshot for too long a way
 };
 
-/// What the robot is to do after a view.
+/// The next motion of the robot after a view.
 struct ChainDecision {
   ChainState state = ChainState::following;
   std::size_t target = 0;  ///< snapshot that is homed to
@@ -45,15 +45,14 @@ struct ChainDecision {
   bool by_odometry = false;
 };
 
-/// Drives a route again: homes to one snapshot after the other, in the order of recording or back.
-/// Begins with the snapshot that looks most like the first view. While homing to one it looks for
-/// the next: it goes on for it where the present one is near (by the vector's length), or where the
-/// view has become more alike to the next than to the present one, so that none is searched for
-/// that the robot has passed. Odometry since the last snapshot, which drifts little over such a
-/// way, is the second opinion: a vector that contradicts it is not followed, no snapshot is near of
-/// which it expects more than half of the way still to go, and one that is not found within three
-/// times the steps of its way is given up for the next. The last snapshot is reached by a
-/// `HomingPursuit`.
+/// Repeats a route: homes to one snapshot after the other, in the order of recording or back. It
+/// begins with the snapshot that is most similar to the first view. It continues to the next
+/// snapshot where the present one is near (by the vector's length), or where the view has become
+/// more similar to the next one, so that a snapshot that was passed is not searched for. Odometry
+/// since the last snapshot is the second opinion, because it drifts little over that distance: a
+/// vector that contradicts it is not followed, a snapshot is not near while odometry expects more
+/// than half of the distance still to go, and a snapshot that is not found within three times the
+/// expected steps is skipped. The last snapshot is reached by a `HomingPursuit`.
 class ChainFollower {
  public:
   /// Throws OptionError, ContractError as `validate(chain)`.

@@ -12,24 +12,23 @@ namespace panonav {
 struct ChainRecorderOptions {
   /// Vectors between a candidate and the last snapshot may be off by this much.
   double direction_tolerance_rad = 0.6;
-  /// A snapshot is taken at this share of the way on which homing worked, so that a robot beside
-  /// the route or in other light is still drawn to it.
+  /// A snapshot is taken at this share of the distance over which homing worked, so that a robot
+  /// beside the route or in other light still reaches it.
   double margin = 0.7;
   double shortest_spacing_m = 0.3;
   double longest_spacing_m = 5.0;
-  /// Views nearer to a snapshot are not asked for its direction, which noise decides there.
+  /// Views nearer to a snapshot are not used for its direction, which is dominated by noise there.
   double near_m = 0.15;
-  /// Between the views that are compared; a view nearer to the one before is passed over.
+  /// Between the views that are compared; a view nearer to the one before is skipped.
   double view_spacing_m = 0.1;
 };
 void visit_options(ChainRecorderOptions& options, OptionVisitor& visitor);
 
-/// Memorises a route while the robot drives it, and decides by itself when to take the next
-/// snapshot: where the views since the last one tell that homing between the two would begin to
-/// fail. A candidate is good as long as from each view on the way to it the home vector to the last
-/// snapshot points back along the way, and the one to the candidate forward, both within the
-/// tolerance of what odometry says. So the spacing follows the catchment areas: wide in a hall,
-/// narrow in a doorway.
+/// Memorises a route while the robot drives it, and takes the next snapshot where homing between
+/// the two would begin to fail. A candidate is good as long as, from each view on the way to it,
+/// the home vector to the last snapshot points back along the path and the one to the candidate
+/// points forward, both within the tolerance around odometry. The spacing therefore follows the
+/// catchment areas: wide in a hall, narrow in a doorway.
 ///
 /// Holds the views since the last snapshot, at most longest_spacing_m / view_spacing_m of them. A
 /// view costs two home vectors for each of these.

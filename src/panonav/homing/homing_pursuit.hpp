@@ -8,14 +8,14 @@
 
 namespace panonav {
 
-/// Which frequencies count at which stage of a run home.
+/// Which frequencies are used at which stage of a run home.
 enum class PursuitStrategy {
   steady,          ///< as the options of the home vector say, all the way
   coarse_to_fine,  ///< few frequencies first; when homing stops, more [S06 section 5]
-  /// Ours: steady; where homing stops and the difference of the views says that this is not home,
-  /// coarse to fine from there, and in the end once more as the options say. The home vector
-  /// weighs frequencies by their coherence, so what is left at a wrong place is mostly a view too
-  /// far from home for any but the lowest ones.
+  /// Ours: steady. Where homing stops and the difference of the views says that this is not home,
+  /// coarse to fine from there, and at last once more as the options say. The home vector weights
+  /// frequencies by their coherence, so a wrong end is mostly a place too far from home for any but
+  /// the lowest ones.
   recovering,
 };
 
@@ -30,14 +30,14 @@ struct HomingPursuitOptions {
   double longest_step_m = 0.3;      ///< l_max [S06 section 3]
   /// Homing stops when the vector is shorter, in units of R: the root of S06's epsilon.
   double stop_length = 0.01;
-  /// Homing stops as well when the way of a step has become shorter, because successive vectors
-  /// pointed against each other.
+  /// Homing also stops when steps have become shorter than this, because successive vectors opposed
+  /// each other.
   double shortest_step_m = 0.01;
-  /// And when the views have not become more alike for so many steps: the robot runs in circles, or
-  /// along an obstacle.
+  /// Homing also stops when the views have not become more similar for this many steps: the robot
+  /// runs in circles or along an obstacle.
   int patience = 10;
   int most_steps = 60;
-  /// The robot is at home when the views differ by no more where homing stops, by
+  /// The robot has arrived when the views differ by no more than this where homing stops, by
   /// `image_difference` [S06 section 4.3].
   double arrived_difference = 0.08;
 };
@@ -50,7 +50,7 @@ enum class PursuitState {
   exhausted,    ///< the most steps were made
 };
 
-/// What the robot is to do after a view.
+/// The next motion of the robot after a view.
 struct PursuitDecision {
   PursuitState state = PursuitState::moving;
   double turn_rad = 0.0;    ///< direction in which to go, in the current robot frame
@@ -61,13 +61,12 @@ struct PursuitDecision {
 };
 
 /// The run home of S06 section 3: one view in, one step out. Direction by the home vector, length
-/// min(l_max, R_typ length) [S06 section 3, step 3]. Where R is not what was assumed, and at any
-/// noise, that alone runs to and fro around the goal for ever; so the step is halved when a vector
-/// points against the one before it, both in the frame of the home view, and grows by a quarter
-/// when they agree.
+/// min(l_max, R_typ length) [S06 section 3, step 3]. Where R is not what was assumed, or with
+/// noise, that alone oscillates around the goal. The step is therefore halved when a vector opposes
+/// the one before it, both in the frame of the home view, and grows by a quarter when they agree.
 ///
-/// Holds the state of one run. Knows nothing of how the robot moves: a differential robot turns and
-/// drives, a holonomic one drives sideways; how the robot faces does not count.
+/// Holds the state of one run. It does not depend on how the robot moves: a differential robot
+/// turns and drives, a holonomic one drives sideways, and the heading does not matter.
 class HomingPursuit {
  public:
   /// Throws OptionError.

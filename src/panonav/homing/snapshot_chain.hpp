@@ -8,19 +8,19 @@
 
 namespace panonav {
 
-/// A view remembered on the way along a route.
+/// A view remembered along a route.
 struct Snapshot {
   HomingView view;
-  /// Length of the way from the start of the route to here, by the odometry of the recording.
+  /// Distance from the start of the route to here, by the odometry of the recording.
   double travelled_m = 0.0;
   /// Pose of the robot here in the frame of the robot at the snapshot before, by the same odometry;
-  /// the first snapshot's is zero. A hint where to look for the next snapshot, no more.
+  /// the first snapshot's is zero. It only hints where the next snapshot is.
   Pose2 previous_from_this;
   friend bool operator==(const Snapshot&, const Snapshot&) = default;
 };
 
-/// A route as a few snapshots, in the order in which they were taken: each can be reached by homing
-/// from those beside it, in both directions.
+/// A route as a few snapshots, in the order in which they were taken. Each can be reached by homing
+/// from its neighbours, in both directions.
 struct SnapshotChain {
   std::vector<Snapshot> snapshots;
   friend bool operator==(const SnapshotChain&, const SnapshotChain&) = default;
@@ -31,11 +31,11 @@ struct SnapshotChain {
 /// poses are finite.
 void validate(const SnapshotChain& chain);
 
-/// What the chain takes up: per snapshot the coefficients of its view (`snapshot_bytes`), and four
-/// floats for the way.
+/// Size of the chain: for each snapshot the coefficients of its view (`snapshot_bytes`) and four
+/// floats for the odometry.
 [[nodiscard]] std::size_t chain_bytes(const SnapshotChain& chain) noexcept;
 
-/// Length of the way from the first snapshot to the last; 0 for fewer than two.
+/// Distance along the route from the first snapshot to the last; 0 for fewer than two.
 [[nodiscard]] double chain_length_m(const SnapshotChain& chain) noexcept;
 
 /// `chain_bytes` over `chain_length_m`; 0 where the chain has no length.

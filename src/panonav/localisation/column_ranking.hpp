@@ -14,18 +14,17 @@ struct RankedMatch {
   Match match;
   ColumnMatch columns;
 
-  /// By what matches are put in order; the least is the best. Columns carry most of it. The
-  /// dissimilarity, at an eighth of the weight, adds what columns are freed of: how bright each is.
-  /// What hides a part of the view raises the dissimilarity to all references, so it then tells
-  /// them apart less and counts less by itself.
+  /// The re-ranking score; the minimum is the best. Most of it comes from the columns. The
+  /// dissimilarity, with exponent 1/8, adds what columns are freed of: their brightness. An
+  /// occlusion raises the dissimilarity to all references, so that its influence falls by itself.
   [[nodiscard]] double score() const { return score_of(columns.difference); }
   /// The same for another measure of the columns' difference.
   [[nodiscard]] double score_of(double difference) const;
 };
 
-/// Puts what the search found in the order of how well it fits column by column. The search looks
-/// at magnitudes only, all of which change when a part of the view is hidden; columns tell hidden
-/// parts from others and use the phases too.
+/// Re-ranking: orders what the search found by a comparison column by column. The search compares
+/// magnitudes only, all of which change when a part of the view is occluded; columns separate
+/// occluded parts from others and use the phases too.
 class ColumnRanking {
  public:
   /// Keeps the column profiles of all views of a memory of at most `most_kept` views, 2.5 kB each;

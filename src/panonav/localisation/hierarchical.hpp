@@ -11,9 +11,9 @@
 
 namespace panonav {
 
-/// How much of the floor each reference view of a memory stands for: the Voronoi cells of the posed
-/// views, clipped at half the spacing. Copy of what it needs: the memory may change afterwards, and
-/// views that came later have no cell.
+/// The area of floor that each reference view of a memory stands for: the Voronoi cells of the
+/// posed views, clipped at half the spacing. Copy of what it needs: the memory may change
+/// afterwards, and views that came later have no cell.
 class ReferenceAreas {
  public:
   /// Cost: the Voronoi cells of all posed views; some microseconds each.
@@ -48,8 +48,8 @@ struct WantedAccuracy {
 };
 void visit_options(WantedAccuracy& accuracy, OptionVisitor& visitor);
 
-/// What is known of the place when so many components have been compared. Every level's candidates,
-/// area and radius are at most those of the level before.
+/// What is known of the place after a number of components has been compared. Every level's
+/// candidates, area and radius are at most those of the level before.
 struct LocalisationLevel {
   int components = 0;
   std::vector<Match> candidates;  ///< ascending (partial dissimilarity, view)
@@ -60,8 +60,8 @@ struct LocalisationLevel {
 
 /// Hierarchical localisation [M04 section 2.3, figures 9 and 10]: few components give a large area,
 /// more components a smaller one, and only what the wanted accuracy needs is computed. Empty for an
-/// empty memory. Whether the place is known at all is not asked here (`Localiser`). Throws
-/// OptionError, ContractError on a query of another shape.
+/// empty memory. Unknown places are not detected here (see `Localiser`). Throws OptionError,
+/// ContractError on a query of another shape.
 [[nodiscard]] std::vector<LocalisationLevel> localise_hierarchically(
     const VisualMemory& memory, const ReferenceAreas& areas, const PackedSignature& query,
     const WantedAccuracy& accuracy = {}, const SearchMask& mask = {});

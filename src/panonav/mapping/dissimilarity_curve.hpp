@@ -6,8 +6,8 @@
 
 namespace panonav {
 
-/// What a pair of views says of the curve: how different they look, and how far apart they lie in
-/// the arrangement so far.
+/// One sample of the curve, from a pair of views: their dissimilarity and their distance in the
+/// arrangement so far.
 struct DissimilarityAtDistance {
   double dissimilarity = 0.0;
   double distance = 0.0;
@@ -18,23 +18,22 @@ struct DissimilarityAtDistance {
 /// Invariant: rising (not strictly) with the dissimilarity, nowhere negative.
 class DissimilarityCurve {
  public:
-  /// Proportional: distance = dissimilarity * slope, known without error and without end. What one
-  /// starts with, before there is an arrangement. Throws ContractError unless slope is finite and >
-  /// 0.
+  /// Proportional: distance = dissimilarity * slope, without error and without a limit. It is the
+  /// start, before there is an arrangement. Throws ContractError unless slope is finite and > 0.
   explicit DissimilarityCurve(double slope);
 
-  /// The mean distance of pairs that look so different, by isotonic regression over groups of
-  /// pairs of about equal dissimilarity, and the root mean square of what it misses there. Below
-  /// the first group the curve is straight down to zero at dissimilarity 0. `level`: dissimilarity
-  /// of far views, where the curve is flat; correlation ends at 95 % of it. Throws ContractError on
-  /// no pairs, or values that are not finite and >= 0. Cost: n log n.
+  /// The mean distance of pairs of equal dissimilarity, by isotonic regression over groups of
+  /// pairs, and the root mean square of its residuals. Below the first group the curve is straight
+  /// down to zero at dissimilarity 0. `level`: dissimilarity of far views, where the curve is flat;
+  /// correlation ends at 95 % of it. Throws ContractError on no pairs, or values that are not
+  /// finite and >= 0. Cost: n log n.
   DissimilarityCurve(std::span<const DissimilarityAtDistance> pairs, double level);
 
   [[nodiscard]] double distance(double dissimilarity) const;
   /// E of [M04 eq. 5]: root mean square error of a distance read as `distance`; rising with it.
   [[nodiscard]] double error(double distance) const;
-  /// x_1 of [M04 eq. 5]: the largest distance that can be read. Views that look more different than
-  /// `largest_dissimilarity` have nothing to do with each other.
+  /// x_1 of [M04 eq. 5]: the largest distance that can be read. Views above `largest_dissimilarity`
+  /// are unrelated.
   [[nodiscard]] double range() const noexcept { return range_; }
   [[nodiscard]] double largest_dissimilarity() const noexcept { return largest_dissimilarity_; }
   /// K of [M04 eq. 5]: stiffness of a spring of this rest length, 1 .. 0 and 0.1 at `range`.

@@ -9,16 +9,16 @@ namespace panonav {
 
 struct VisualStep;
 
-/// Lengths of steps from the ground, one step after the other: the latest tell where to look for
-/// the next one, and stand in for it where the ground shows nothing.
+/// Lengths of steps from the ground, one step after the other. The latest steps predict the next
+/// one and replace it where the ground shows nothing.
 class GroundLengths {
  public:
   /// Throws ContractError unless the height is above 0.
   explicit GroundLengths(double camera_height_m);
 
-  /// Puts the displacement that the ground shows, in metres, into `step`, which must be that of
-  /// these views; or else the length that the latest steps suggest. False where neither is there:
-  /// then the step stays as it is.
+  /// Writes the displacement that the ground shows, in metres, into `step`, which must be that of
+  /// these views; else the length that the latest steps suggest. False where neither is known; the
+  /// step then stays as it is.
   bool correct(const HomingView& before, const HomingView& after, VisualStep& step);
 
   /// Metres for each unit of length of the views, by the latest steps; empty before the first.

@@ -15,7 +15,7 @@
 namespace panonav {
 
 struct LatticeOptions {
-  int neighbours = 12;  ///< springs that each view asks for
+  int neighbours = 12;  ///< springs that each view gets
   int components = 0;   ///< of the signatures; 0 takes all
   bool phases = true;   ///< directions and headings from phases [M04 section 3.4]
   int landmarks = 150;  ///< views from which the start is laid out
@@ -23,7 +23,7 @@ struct LatticeOptions {
 };
 void visit_options(LatticeOptions& options, OptionVisitor& visitor);
 
-/// What a robot without good odometry knows of its way from one view to another [M04 section 3.4].
+/// The coarse motion of a robot from one view to another [M04 section 3.4].
 struct CoarseMotion {
   ViewId from;
   ViewId to;
@@ -33,7 +33,7 @@ struct CoarseMotion {
   double turn_deviation_rad = 0.2;       ///< > 0
 };
 
-/// How far the motion of a robot is trusted; the defaults are those of wheels that slip.
+/// Uncertainty of a robot's motion; the defaults are those of wheels that slip.
 struct CoarseMotionOptions {
   double distance_deviation = 0.06;       ///< standard deviation, share of the distance
   double direction_deviation_rad = 0.15;  ///< of the direction of travel
@@ -49,7 +49,7 @@ void visit_options(CoarseMotionOptions& options, OptionVisitor& visitor);
 /// A view in the arrangement.
 struct LatticeNode {
   ViewId view;
-  Pose2 pose;            ///< in the frame of its part; heading 0 where no phases were asked for
+  Pose2 pose;            ///< in its component's frame; heading 0 without phases
   std::size_t part = 0;  ///< index of its group
 };
 
@@ -59,11 +59,11 @@ struct LatticeSpring {
   double dissimilarity = 0.0;
   double length = 0.0;     ///< rest length, read from the dissimilarity
   double stiffness = 1.0;  ///< K of [M04 eq. 5]
-  double weight = 1.0;     ///< what is left of it, 1 .. 0: near 0 it contradicts the others
+  double weight = 1.0;     ///< robust weight, 1 .. 0: near 0 it is an outlier
   std::optional<PhaseReading> phases;
 };
 
-/// How far springs are off, as the arrangement itself tells; lengths in its unit.
+/// Standard deviations of springs, estimated from the arrangement itself; lengths in its unit.
 struct SpringErrors {
   double length = 0.25;        ///< of the rest length of a spring of stiffness 1
   double direction_rad = 0.1;  ///< of a direction in which both views agree
@@ -73,15 +73,15 @@ struct SpringErrors {
   double phase_length = 0.25;
 };
 
-/// Views that springs hold together. Different parts lie in frames of their own: nothing is known
-/// of how they lie to each other.
+/// A connected component: views that springs join. Each component has its own frame, and nothing is
+/// known of their relative poses.
 struct LatticePart {
   std::size_t views = 0;
   /// False: it may as well be the mirror image.
   bool handedness_known = false;
 };
 
-/// Views arranged as they lie in space.
+/// Views with the poses that their springs give them.
 struct Lattice {
   std::vector<LatticeNode> nodes;      ///< one for each view of the memory, in its order
   std::vector<LatticeSpring> springs;  ///< ascending (a, b)
@@ -95,37 +95,38 @@ struct Lattice {
   int iterations = 0;
 };
 
-/// Arranges the views of a memory by their likeness alone [M04 section 3], in whatever order they
-/// came; poses that the memory may hold are not looked at.
+/// Arranges the views of a memory by their similarity alone [M04 section 3], in any order. Poses
+/// that the memory may hold are not used.
 ///
-/// 1. Each view asks for springs to its `neighbours` most alike views, so cost grows with the views
+/// 1. Each view gets springs to its `neighbours` most similar views, so cost grows with the views
 ///    and not with their pairs.
-/// 2. With phases, both views of a spring say where the other one lies and how it is turned. Pairs
-///    whose answers differ by more than 45 degrees have nothing in common and get no spring; nor do
-///    those of whose triangles with third views not more than half close.
-/// 3. The start is deterministic: multidimensional scaling of the shortest ways along the springs.
-///    A mirror image is told by the directions; without phases it cannot be.
-/// 4. Springs and, with phases, directions and turns are brought to their least energy, and those
-///    that contradict the others are given up (lattice_solver.hpp).
+/// 2. With phases, both views of a spring give direction and turn of the other one. Pairs whose
+///    answers differ by more than 45 degrees are unrelated and get no spring; nor do pairs of whose
+///    triangles with third views not more than half close.
+/// 3. The start is deterministic: multidimensional scaling of the shortest paths along the springs.
+///    Directions distinguish a mirror image; without phases it cannot be distinguished.
+/// 4. The energy of springs and, with phases, of directions and turns is minimised; outliers are
+///    rejected (internal/lattice_solver.hpp).
 /// 5. The curve from dissimilarity to distance is fitted to the arrangement, pairs beyond its range
 ///    are left out, views that came to lie near each other get springs too, and 3 or 4 are done
 ///    again, `rounds` times in all.
 ///
-/// `motion` [M04 section 3.4]: ways of the robot between views, any number. Views that it connects
-/// are laid out by it first, and only what fits is taken from likeness: so places that look alike
-/// are not mistaken for each other. It makes the map metric. Throws OptionError, and ContractError
-/// on a motion with an unknown view or numbers that are not finite. The same input gives the same
-/// bits on any number of threads.
+/// `motion` [M04 section 3.4]: motions of the robot between views, any number. Views that it
+/// connects are laid out by it first, and only consistent springs are taken from similarity, so
+/// that places that look alike are not confused. It makes the map metric. Throws OptionError, and
+/// ContractError on a motion with an unknown view or numbers that are not finite. The same input
+/// gives the same bits on any number of threads.
 [[nodiscard]] Lattice arrange(const VisualMemory& memory, const LatticeOptions& options,
                               std::span<const CoarseMotion> motion, Executor& executor);
 
-/// Adds the views that the memory has and the lattice has not, one after the other: springs to the
-/// most alike views of the lattice, the place of least energy among those that they point to, then
-/// a few nodes around give way. Other views stay where they are, so the cost of a view does not
-/// grow with the lattice but for the search (and one look at each spring). A view joins the one
-/// part to which most of its springs lead; without springs it is a part of its own, which is last.
-/// `arrange` joins parts, this does not. The lattice must come from the same memory, of which views
-/// may only have been added. Throws OptionError, ContractError.
+/// Adds the views of the memory that the lattice does not have, one after the other. A view gets
+/// springs to the most similar views of the lattice and the place of minimum energy among those
+/// that they point to; then a few nodes around it are adjusted. Other views stay where they are, so
+/// the cost of a view grows with the lattice only by the search (and one pass over the springs). A
+/// view joins the connected component to which most of its springs lead; without springs it is a
+/// component of its own, the last one. `arrange` joins components, this function does not. The
+/// lattice must come from the same memory, of which views may only have been added. Throws
+/// OptionError, ContractError.
 void extend(Lattice& lattice, const VisualMemory& memory, const LatticeOptions& options = {});
 
 }  // namespace panonav

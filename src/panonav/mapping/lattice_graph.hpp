@@ -8,14 +8,14 @@
 
 namespace panonav {
 
-/// A way between two nodes, usable both ways.
+/// An undirected edge between two nodes.
 struct GraphEdge {
   std::size_t a = 0;
   std::size_t b = 0;
   double length = 1.0;  ///< >= 0
 };
 
-/// Nodes with their edges, for walking along them.
+/// A graph of nodes and edges.
 class LatticeGraph {
  public:
   /// Throws ContractError on a node that is not below `nodes` or a length below 0.
@@ -31,11 +31,12 @@ class LatticeGraph {
     return std::span(neighbours_).subspan(begins_[node], begins_[node + 1] - begins_[node]);
   }
 
-  /// Number of each node's part: nodes that edges connect. Parts are numbered by size, the largest
-  /// first, then by their first node.
+  /// Number of each node's connected component. Components are numbered by size, the largest first,
+  /// then by their first node.
   [[nodiscard]] std::vector<std::size_t> parts() const;
 
-  /// Length of the shortest way from `from` to every node, infinite where there is none (Dijkstra).
+  /// Length of the shortest path from `from` to every node, infinite where there is none
+  /// (Dijkstra).
   [[nodiscard]] std::vector<double> shortest_ways(std::size_t from) const;
 
  private:

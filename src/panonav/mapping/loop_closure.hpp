@@ -12,29 +12,29 @@
 
 namespace panonav {
 
-/// When two views are taken for the same place. Wrong closures are worse than missing ones: a
-/// candidate must pass every check.
+/// Conditions of a loop closure. Wrong closures are worse than missing ones, so a candidate must
+/// pass every check.
 struct LoopClosureOptions {
-  /// Places looked at for each view, from the memory's search.
+  /// Candidates for each view, from the memory's search.
   int candidates = 5;
-  /// Views nearer than this along the way are no candidates: there is no loop to close.
+  /// Views nearer than this along the path are no candidates: there is no loop to close.
   double shortest_loop_m = 3.0;
   /// The view explains the candidate up to this share of the energy of both.
   double most_residual = 0.2;
-  /// Farther apart, in units of R, the views tell too little.
+  /// Farther apart, in units of R, the views are not reliable.
   double most_length = 0.3;
-  /// Compass, the way there and the way back agree on the heading.
+  /// Largest disagreement on the heading between the compass and the home vectors there and back.
   double heading_tolerance_rad = 0.15;
-  /// The way there and back leave the robot where it was, in units of R.
+  /// Largest distance between start and end after both home vectors, in units of R.
   double return_tolerance = 0.1;
   /// Another place that explains the view nearly as well makes it ambiguous: the residual of the
   /// best must be smaller by this factor.
   double distinctness = 1.5;
   /// The search from the candidate must lead back to here among so many views.
   int reciprocal_rank = 5;
-  /// So many successive views must have closures that agree with the way between them.
+  /// This many successive views must have closures that agree with the motion between them.
   int sequence = 3;
-  /// Way between closures that are told: closer ones would say nothing new and cost time.
+  /// Distance along the path between reported closures: closer ones add nothing and cost time.
   double spacing_m = 0.5;
   /// Drift of the odometry, in metres for each metre, beyond which no closure is believed: counted
   /// from the last closure, and a fifth of it along the rest of the loop. One R comes on top.
@@ -42,7 +42,7 @@ struct LoopClosureOptions {
 };
 void visit_options(LoopClosureOptions& options, OptionVisitor& visitor);
 
-/// A node of the map as the search for closures sees it.
+/// A node of the map for the search for closures.
 struct PassedNode {
   ViewId view;
   double way_m = 0.0;  ///< along the way of the robot from its first view to here
@@ -57,11 +57,10 @@ struct LoopClosure {
   friend bool operator==(const LoopClosure&, const LoopClosure&) = default;
 };
 
-/// Looks for closures while the robot goes on: candidates from the memory's search, then home
-/// vectors in both directions whose turn must be the compass's and which must be each other's
-/// inverse; the reciprocal search, which must lead back from the candidate to here; no other place
-/// that explains the view as well; odometry that may have drifted so far; and a sequence of such
-/// views.
+/// Finds loop closures while the robot drives. Candidates come from the memory's search. Home
+/// vectors in both directions must agree with the compass and be each other's inverse; the search
+/// from the candidate must lead back to here; no other place may explain the view as well; the
+/// drift of the odometry must allow it; and a sequence of views must agree.
 class LoopClosureFinder {
  public:
   /// `memory` must outlive the finder. Throws OptionError.

@@ -10,8 +10,8 @@
 
 namespace panonav {
 
-/// How well a map keeps who is next to whom (Venna and Kaski 2001); 1 is perfect, 0.5 about what
-/// chance gives.
+/// How well a map preserves neighbourhoods (Venna and Kaski 2001); 1 is perfect, chance gives about
+/// 0.5.
 struct NeighbourPreservation {
   double trustworthiness = 1.0;  ///< neighbours in the map are neighbours in truth
   double continuity = 1.0;       ///< neighbours in truth are neighbours in the map

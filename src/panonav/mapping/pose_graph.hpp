@@ -17,16 +17,17 @@ struct PoseEdge {
   Pose2 a_from_b;
   double position_deviation_m = 0.1;    ///< standard deviation of x and of y, > 0
   double heading_deviation_rad = 0.05;  ///< > 0
-  /// It may be plainly wrong, as a loop closure may: its weight falls where the others contradict.
+  /// The edge may be an outlier, as a loop closure may: its weight falls where the others
+  /// contradict it.
   bool doubtful = false;
   friend bool operator==(const PoseEdge&, const PoseEdge&) = default;
 };
 
 struct PoseGraphOptions {
   int most_iterations = 40;
-  /// The solution is found when no position changes by more.
+  /// The optimisation has converged when no position changes by more than this.
   double settled_m = 1e-3;
-  /// A doubtful edge counts half when its error is so many standard deviations.
+  /// An edge that may be an outlier has half its weight at this many standard deviations.
   double doubt_deviations = 5.0;
 };
 void visit_options(PoseGraphOptions& options, OptionVisitor& visitor);
@@ -38,24 +39,23 @@ struct PoseGraphReport {
   std::vector<double> edge_weights;  ///< one per edge, 0 .. 1; 1 for edges that are not doubtful
 };
 
-/// Moves `nodes` to where all edges are contradicted least: Gauss-Newton on the sparse normal
-/// equations. Doubtful edges have a robust cost (Geman and McClure), which is approached from the
-/// quadratic one (graduated non-convexity), so that the drift before the first closure does not
-/// speak against it. Nodes without edges, those whose
-/// entry in `fixed` is not 0, and the first node of each connected part without a fixed one stay
-/// where they are. Deterministic. Throws ContractError on an edge to a
-/// node that is not there or to itself, a value that is not finite or a deviation not above 0;
-/// a number of entries in `fixed` that is neither 0 nor that of the nodes; OptionError. Cost: an
-/// iteration is about linear in nodes and edges for maps of paths: 10 ms for 10,000 nodes.
+/// Optimises the poses of `nodes`: Gauss-Newton on the sparse normal equations. Edges that may be
+/// outliers have a robust cost (Geman and McClure), which is approached from the quadratic one
+/// (graduated non-convexity), so that the drift before the first closure does not reject it. Nodes
+/// without edges, those whose entry in `fixed` is not 0, and the first node of each connected
+/// component without a fixed one stay where they are. Deterministic. Throws ContractError on an
+/// edge to a node that is not there or to itself, a value that is not finite or a deviation not
+/// above 0; a number of entries in `fixed` that is neither 0 nor that of the nodes; OptionError.
+/// Cost: an iteration is about linear in nodes and edges for maps of paths: 10 ms for 10,000 nodes.
 PoseGraphReport optimise_pose_graph(std::span<Pose2> nodes, std::span<const PoseEdge> edges,
                                     const PoseGraphOptions& options = {},
                                     std::span<const std::uint8_t> fixed = {});
 
-/// The connected part of each node, numbered from 0 in the order of their first nodes.
+/// The connected component of each node, numbered from 0 in the order of their first nodes.
 [[nodiscard]] std::vector<std::size_t> connected_parts(std::size_t nodes,
                                                        std::span<const PoseEdge> edges);
 
-/// How far an edge is from what the nodes say, in standard deviations. The edge must be valid.
+/// Residual of an edge at the nodes' poses, in standard deviations. The edge must be valid.
 [[nodiscard]] double edge_tension(const PoseEdge& edge, std::span<const Pose2> nodes);
 
 }  // namespace panonav

@@ -14,11 +14,11 @@
 
 namespace panonav {
 
-/// A place of the map: a view and where it was taken.
+/// A node of the map: a view and its pose.
 struct MapNode {
   ViewId view;
-  Pose2 pose;            ///< in the frame of its part
-  std::size_t part = 0;  ///< nodes of different parts have no common frame
+  Pose2 pose;            ///< in the frame of its connected component
+  std::size_t part = 0;  ///< its connected component; components have no common frame
   friend bool operator==(const MapNode&, const MapNode&) = default;
 };
 
@@ -28,7 +28,7 @@ struct MapEdge {
   ViewId b;
   Pose2 a_from_b;
   LinkKind kind = LinkKind::sequence;
-  double weight = 1.0;  ///< 0 .. 1: a closure that the rest of the map contradicts has little
+  double weight = 1.0;  ///< 0 .. 1; small for a closure that the rest of the map contradicts
   friend bool operator==(const MapEdge&, const MapEdge&) = default;
 };
 
@@ -43,7 +43,7 @@ struct TopologicalMap {
 /// poses are finite and weights lie in 0 .. 1.
 void validate(const TopologicalMap& map);
 
-/// How many parts have no common frame.
+/// The number of connected components.
 [[nodiscard]] std::size_t number_of_parts(const TopologicalMap& map);
 
 struct MappingOptions {
@@ -51,9 +51,9 @@ struct MappingOptions {
   /// capture by threshold, as in F11's second set. 0 keeps every view.
   double capture_difference = 0.0;
   bool close_loops = true;
-  /// Where neither views nor wheels show a step, it counts as so long, straight ahead and as
-  /// uncertain as it is long: for recordings in order whose pictures stand far apart. 0: a new part
-  /// begins.
+  /// Where neither views nor wheels give a step, it is taken as this long, straight ahead and as
+  /// uncertain as it is long: for recordings whose pictures are far apart. 0: a new connected
+  /// component begins.
   double bridge_m = 0.0;
   /// Lengths of steps are taken from the wheels where these are known; turns and directions come
   /// from the views all the same.
@@ -67,7 +67,7 @@ struct MappingOptions {
 };
 void visit_options(MappingOptions& options, OptionVisitor& visitor);
 
-/// What became of a view.
+/// What the mapper did with a view.
 struct MapUpdate {
   std::optional<VisualStep> step;     ///< from the node before
   bool new_part = false;              ///< nothing connects the view with the node before
@@ -76,11 +76,12 @@ struct MapUpdate {
 };
 
 /// Makes a map from one view after the other: a node for each, linked with the one before by visual
-/// odometry; loops closed by `LoopClosureFinder`. A closure moves what came since the closure
-/// before to where it fits the older map; where that leaves it contradicted, the whole is optimised
-/// as a pose graph, if it has grown by a hundredth since the last time: so the cost of a view stays
-/// small however large the map. Where neither views nor wheels tell the step, a part begins
-/// that has its own frame, unless it is bridged; a closure joins it with the others.
+/// odometry; loops are closed by `LoopClosureFinder`. A closure moves the nodes since the closure
+/// before so that they fit the older map. Where a contradiction remains and the map has grown by a
+/// hundredth since the last time, the whole is optimised as a pose graph. The cost of a view
+/// therefore stays small in large maps. Where neither views nor wheels give a step, a new connected
+/// component begins with a frame of its own, unless it is bridged; a closure joins it with the
+/// others.
 class TopologicalMapper {
  public:
   /// `memory` must outlive the mapper. Throws OptionError.
@@ -98,16 +99,16 @@ class TopologicalMapper {
   /// is not finite.
   MapUpdate add(ViewId view, OdometryView seen, const std::optional<Pose2>& moved = std::nullopt);
 
-  /// Optimises what is not yet.
+  /// Optimises what is not optimised yet.
   void finish();
 
   [[nodiscard]] std::size_t size() const noexcept { return poses_.size(); }
-  /// Of each node, in the frame of its part.
+  /// Of each node, in the frame of its connected component.
   [[nodiscard]] std::span<const Pose2> poses() const noexcept { return poses_; }
-  /// The parts are numbered in the order of their first nodes.
+  /// Components are numbered in the order of their first nodes.
   [[nodiscard]] TopologicalMap map() const;
-  /// Metres for each unit of length of the views: as the wheels tell, or else as the visual
-  /// odometry has it.
+  /// Metres for each unit of length of the views: from the wheels, or else from the visual
+  /// odometry.
   [[nodiscard]] double scale_m() const;
 
  private:

@@ -13,14 +13,14 @@
 
 namespace panonav {
 
-/// How the motion between two views is read from them.
+/// How the motion between two views is estimated.
 enum class StepRule {
   /// As published: the distance is that of the signatures [F11 eq. 2], the turn that of the compass
   /// [F11 section 3.2], and the robot goes the way it faces at the middle of the step.
   published,
-  /// Ours: the home vector [S06] from the one view to the other gives direction, turn and length.
-  /// So a robot that drives sideways is followed, too, and the turn is freed of what displacement
-  /// does to the phases.
+  /// Ours: the home vector [S06] from the one view to the other gives direction, turn and length. A
+  /// robot that drives sideways is therefore followed, too, and the turn is corrected for the
+  /// effect of displacement on the phases.
   home_vector,
 };
 
@@ -38,8 +38,8 @@ struct VisualOdometryOptions {
   /// Times that the solution of `home_vector` is refined.
   int iterations = 1;
   /// Turn and direction of `home_vector` are refined by the flow over azimuth (`refine_flow`),
-  /// which tells a turn from things that are nearer on one side of the way. Along a wall that is
-  /// most of the drift.
+  /// which separates a turn from things that are nearer on one side of the path. Along a wall this
+  /// is most of the drift.
   bool nearer_side = true;
   /// A step is not believed when turn and displacement leave more than this share of the energy of
   /// the views unexplained.
@@ -56,7 +56,7 @@ struct OdometryView {
   explicit OdometryView(FourierSignature view);
 };
 
-/// The motion that two views show.
+/// The motion between two views.
 struct VisualStep {
   Pose2 before_from_after;
   double length_in_views = 0.0;  ///< before it is multiplied by the scale
@@ -77,8 +77,8 @@ struct KnownLength {
   double length_m = 0.0;
 };
 
-/// The scale that known steps tell: the median of their ratios, so that single wrong ones do not
-/// count. Steps of no length are left out; empty when none remains. Throws ContractError on a
+/// The scale from known steps: the median of their ratios, which is robust against single wrong
+/// ones. Steps of no length are left out; empty when none remains. Throws ContractError on a
 /// negative length or one that is not finite.
 [[nodiscard]] std::optional<double> length_scale_m(std::span<const KnownLength> steps);
 
@@ -94,7 +94,7 @@ class VisualOdometry {
 
   /// The view added last; empty before the first.
   [[nodiscard]] const std::optional<OdometryView>& last() const noexcept { return last_; }
-  /// Metres for each unit of length of the views: as the ground tells, or as it was given.
+  /// Metres for each unit of length of the views: from the ground, or as it was given.
   [[nodiscard]] double scale_m() const;
   /// start_from_robot.
   [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }

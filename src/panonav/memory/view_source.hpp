@@ -6,14 +6,14 @@
 
 namespace panonav {
 
-/// Where views come from when not all of a memory is to be held at once: a large memory, a file.
+/// A source of views for memories that are not held whole, such as a large file.
 class ViewSource {
  public:
   virtual ~ViewSource() = default;
-  /// All views that there are, ascending.
+  /// All views, ascending.
   [[nodiscard]] virtual std::span<const ViewId> views() const = 0;
   /// A memory of these views under their ids, without links. The views must ascend. Throws
-  /// ContractError on a view that there is not.
+  /// ContractError on an unknown view.
   [[nodiscard]] virtual VisualMemory load(std::span<const ViewId> views) const = 0;
 };
 

@@ -7,10 +7,11 @@
 
 namespace panonav {
 
-/// Positions with headings along the way, for a robot that drove forwards through them: at each the
-/// direction of the line that fits those within `reach_m` of way to either side in least squares,
-/// at least the neighbours. Positions of a tracker scatter by a centimetre or so; over 0.6 m that
-/// is a degree. Throws ContractError unless reach_m >= 0. Cost: O(positions within reach).
+/// Positions with headings along the path, for a robot that drove forwards through them. Each
+/// heading is the direction of the least-squares line through the positions within `reach_m` of
+/// path to either side, at least the neighbours. Positions of a tracker scatter by about a
+/// centimetre, which is a degree over 0.6 m. Throws ContractError unless reach_m >= 0. Cost:
+/// O(positions within reach).
 [[nodiscard]] std::vector<Pose2> headed_along_way(std::span<const Point2> positions,
                                                   double reach_m = 0.3);
 

@@ -47,10 +47,9 @@ struct OdometryNoise {
 };
 void visit_options(OdometryNoise& options, OptionVisitor& visitor);
 
-/// Draws of what truly happened when odometry says `step`, or of what odometry says when `step`
-/// truly happened (the random part only; zero mean in travel and turn). Differential drive: the
-/// chord of the step keeps its angle to the heading at the middle of the step, as wheels without
-/// slip demand.
+/// Draws the true motion when odometry reports `step`, or the reported one when `step` is true (the
+/// random part only, with zero mean in travel and turn). Differential drive: the chord of the step
+/// keeps its angle to the heading at the middle of the step, as wheels without slip demand.
 class StepSampler {
  public:
   /// `noise` must be valid.
@@ -61,7 +60,7 @@ class StepSampler {
   /// microseconds.
   [[nodiscard]] Pose2 move(const Pose2& world_from_robot, Random& random) const;
 
-  /// The same in parts, for many poses at once: the step with its heading in [-pi, pi),
+  /// The same in its parts, for many poses at once: the step with its heading in [-pi, pi),
   [[nodiscard]] const Pose2& step() const noexcept { return step_; }
   [[nodiscard]] bool holonomic() const noexcept { return holonomic_; }
   /// the error of travel and turn that normal deviates of mean 0 and deviation 1 stand for (the
@@ -88,8 +87,8 @@ class StepSampler {
 /// One draw: the step itself.
 [[nodiscard]] Pose2 sample_step(const Pose2& step, const OdometryNoise& noise, Random& random);
 
-/// What the odometry of one run shows: an absolute pose in the odometry frame, which is the robot's
-/// frame at the start of the run. The scale errors are drawn once, at construction.
+/// The odometry of one run: an absolute pose in the odometry frame, which is the robot's frame at
+/// the start of the run. The scale errors are drawn once, at construction.
 class SimulatedOdometry {
  public:
   /// Throws OptionError.

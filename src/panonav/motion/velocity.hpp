@@ -14,8 +14,8 @@ struct Velocity {
   friend bool operator==(const Velocity&, const Velocity&) = default;
 };
 
-/// The one way out to a robot: whatever moves implements it, a real base or a simulated one. A
-/// command holds until the next one; a base should stop by itself when none comes for a while.
+/// The interface to a robot that moves, real or simulated. A command holds until the next one; a
+/// base should stop by itself when none comes for a while.
 class RobotBase {
  public:
   virtual ~RobotBase() = default;
@@ -48,8 +48,8 @@ void visit_options(BaseOptions& options, OptionVisitor& visitor);
 /// chord of the step has half its turn. Throws ContractError.
 [[nodiscard]] Velocity velocity_for(const Pose2& step, double duration_s);
 
-/// What is left of a way to a point (in the old robot frame) after the robot moved by
-/// `robot_old_from_robot_new`: the point in the new frame.
+/// A point of the old robot frame in the new one, after the robot moved by
+/// `robot_old_from_robot_new`.
 [[nodiscard]] inline Point2 remaining_way(Point2 target, const Pose2& robot_old_from_robot_new) {
   return inverse(robot_old_from_robot_new) * target;
 }

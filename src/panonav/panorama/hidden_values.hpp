@@ -10,10 +10,10 @@
 
 namespace panonav {
 
-/// Which values of the unwarped panorama take anything from pixels of `mask` that are 0, because
-/// the robot itself is seen there: rows x columns entries, row-major, 1 where hidden. `mask` has
-/// one channel and the size of the camera's images. Throws ContractError on another mask, and on
-/// one that hides everything.
+/// Which values of the unwarped panorama depend on pixels of `mask` that are 0, where the robot
+/// itself is seen: rows x columns entries, row-major, 1 where hidden. `mask` has one channel and
+/// the size of the camera's images. Throws ContractError on another mask, and on one that hides
+/// everything.
 [[nodiscard]] std::vector<std::uint8_t> values_hidden_by(ImageView mask, const Unwarper& unwarper);
 
 /// Replaces the hidden values of each row by the straight line, round the cylinder, between the

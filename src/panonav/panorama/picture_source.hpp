@@ -15,16 +15,15 @@ enum class PictureKind {
   mirror            ///< raw images of a mirror or fisheye camera with a vertical axis
 };
 
-/// How the pictures of a recording become panoramic cylinders: everything that is known of the
-/// camera.
+/// How the pictures of a recording become panoramic cylinders: all that is known of the camera.
 struct PictureSource {
   PictureKind kind = PictureKind::panorama;
-  /// Panorama and equirectangular: how columns and rows lie. Mirror: only `kept_elevations` counts,
-  /// the band that is unwarped (empty: all that the camera sees at every azimuth).
+  /// Panorama and equirectangular: the layout of columns and rows. Mirror: only `kept_elevations`
+  /// is used, the band that is unwarped (empty: all that the camera sees at every azimuth).
   PictureLayout layout;
   std::optional<Camera> camera;  ///< mirror, and only there
-  /// Mirror: grey, of the camera's size; pixels of value 0 show the robot itself. What
-  /// looks at them is filled from both sides (see `fill_hidden_values`).
+  /// Mirror: grey, of the camera's size; pixels of value 0 show the robot itself. Values that come
+  /// from them are filled from both sides (see `fill_hidden_values`).
   std::optional<Image> mask;
   friend bool operator==(const PictureSource&, const PictureSource&) = default;
 };

@@ -5,14 +5,14 @@
 
 namespace panonav {
 
-/// What is done to a panorama before its signature is taken. Every step is indifferent to a turn of
-/// the robot: a turned view preprocessed is the preprocessed view turned. Steps run in the order of
-/// the members. There is no low-pass step: taking the first components of a signature is one.
-/// Mean and gain are on by default: on real routes they change nothing while the light stays the
-/// same, and keep the place found when it does not (figures in docs/decisions.md).
+/// What is done to a panorama before its signature is taken. Every step commutes with a turn of the
+/// robot: preprocessing a turned view gives the preprocessed view turned. Steps run in the order of
+/// the members. There is no low-pass step: taking the first components of a signature is one. Mean
+/// and gain are on by default: on real routes they cost nothing in constant light, and places are
+/// still found when the light changes (figures in docs/decisions.md).
 struct PreprocessingOptions {
-  /// Rows at the upper and lower edge that are set to 0 and count for nothing: a mirror's rim, the
-  /// robot's body.
+  /// Rows at the upper and lower edge that are set to 0 and ignored: a mirror's rim, the robot's
+  /// body.
   int masked_rows_top = 0;
   int masked_rows_bottom = 0;
   /// Replaces each value by the length of the gradient of grey there (central differences, per row
@@ -22,8 +22,8 @@ struct PreprocessingOptions {
   /// Subtracts the mean over all rows that are not masked.
   bool remove_mean = true;
   /// Scales all values so that their standard deviation over all rows that are not masked is 0.25:
-  /// what exposure and the brightness of the light multiply cancels. A view of one colour (standard
-  /// deviation below a quarter of an 8-bit grey level) has no contrast to scale and stays as it is.
+  /// a factor from exposure or brightness cancels. A view of one colour (standard deviation below a
+  /// quarter of an 8-bit grey level) has no contrast to scale and stays as it is.
   bool normalise_gain = true;
   friend bool operator==(const PreprocessingOptions&, const PreprocessingOptions&) = default;
 };

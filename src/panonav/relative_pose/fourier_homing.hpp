@@ -5,7 +5,7 @@
 
 namespace panonav {
 
-/// What two views tell about the way from one to the other.
+/// The displacement and turn between two views.
 struct HomeVector {
   /// Towards home in the frame of the robot that took the current view, in units of the distance R
   /// at which all things are assumed to be.
@@ -13,15 +13,15 @@ struct HomeVector {
   double eta = 0.0;
   /// Heading of the home view minus heading of the current view, in [-pi, pi).
   double heading_rad = 0.0;
-  /// Correlation of the views at the heading that the compass found, -1 .. 1 [S06 eq. 33 over its
-  /// largest possible value]: how alike the views are.
+  /// Similarity of the views: their correlation at the heading that the compass found, -1 .. 1 [S06
+  /// eq. 33 over its largest possible value].
   double correlation = 0.0;
   /// Share of the energy of both views that turn and displacement leave unexplained, 0 .. 1.
   double residual = 1.0;
-  /// How far the vector stands out of what the residual would do to it, 0 .. 1: the square of its
-  /// length over that square plus its variance. Near 0 at home, where there is no way to point to.
+  /// Confidence 0 .. 1: the square of the vector's length over that square plus its variance, which
+  /// follows from the residual. Near 0 at home, where there is no direction to point to.
   double confidence = 0.0;
-  /// Frequencies that counted, summed by their weights.
+  /// Effective number of frequencies: the sum of their weights.
   double frequencies = 0.0;
 
   [[nodiscard]] double length() const noexcept;         ///< in units of R
@@ -40,16 +40,16 @@ enum class HomingGradient {
   both,     ///< the mean of both views: errors of second order in the displacement cancel
 };
 
-/// How much a component and a row count.
+/// Weights of components and rows.
 enum class HomingWeights {
   equal,  ///< as published: all alike
-  /// By how well both views agree there: components fade out where their phases have nothing to do
-  /// with each other any more, which moves towards lower frequencies with the distance. So a far
-  /// view is compared coarsely and a near one finely, without knowing the distance.
+  /// By the coherence of both views: components fade out where their phases are unrelated, which
+  /// happens at lower frequencies the farther the views are apart. A far view is thus compared
+  /// coarsely and a near one finely, without a known distance.
   coherence,
 };
 
-/// So many headings can be tried at most.
+/// The largest number of headings that can be tried.
 inline constexpr int most_starting_estimates = 6;
 
 /// The defaults are our own rule; `published_homing` is S06's.
@@ -65,15 +65,14 @@ struct FourierHomingOptions {
   /// Headings from which the displacement is solved; the one that explains the views best is taken
   /// [S06 footnote 10].
   int starting_estimates = 2;
-  /// Displacements up to two thirds of R are tried first, as hs_ei tries them, and the best is
-  /// where the least squares start: so views from far away are compared as they would look from
-  /// there, with the heading that fits there.
+  /// Displacements up to two thirds of R are tried first, as hs_ei tries them, and least squares
+  /// start from the best. Views from far away are thus compared as they would look from there.
   bool displacement_search = true;
-  /// Rows off the horizon: things move up and down in the image as the robot comes nearer, too.
-  /// Only where elevations are known.
+  /// Rows off the horizon: things also move up and down in the image as the robot comes nearer.
+  /// Used only where elevations are known.
   bool vertical_motion = true;
-  /// Two more unknowns: the robot may lean by a degree or two against the home view, as on uneven
-  /// ground. Only where elevations are known.
+  /// Two more unknowns: the robot's tilt against the home view, a degree or two on uneven ground.
+  /// Used only where elevations are known.
   bool lean = true;
 };
 void visit_options(FourierHomingOptions& options, OptionVisitor& visitor);
@@ -94,10 +93,10 @@ void visit_options(FourierHomingOptions& options, OptionVisitor& visitor);
                                      const FourierHomingOptions& options = {});
 
 /// The same, but only headings within `within_rad` of `heading_rad` are considered, before least
-/// squares correct them: where something else has told the turn coarsely, as in places that look
-/// alike when turned by a quarter. No heading there that fits better than its neighbours: all zeros
-/// and residual 1. Throws ContractError also unless 0 < within_rad <= pi and the turn estimate is
-/// global.
+/// squares correct them: for a turn that is known coarsely from another source, as in places that
+/// look alike after a quarter turn. Where no heading there fits better than its neighbours, the
+/// vector is all zeros with residual 1. Throws ContractError also unless 0 < within_rad <= pi and
+/// the turn estimate is global.
 [[nodiscard]] HomeVector home_vector_near(const HomingView& home, const HomingView& current,
                                           double heading_rad, double within_rad,
                                           const FourierHomingOptions& options = {});
@@ -108,8 +107,8 @@ void visit_options(FourierHomingOptions& options, OptionVisitor& visitor);
 
 /// Sum of squared differences of the first K components at the heading of their best correlation
 /// [S06 eq. 15, 28], relative to the energy of both views: 0 for the same place, about 1 for
-/// unrelated views. Where elevations are known, a lean of the robot by a few degrees is no
-/// difference: what it explains is left out. Throws ContractError as `home_vector`.
+/// unrelated views. Where elevations are known, what a tilt of the robot by a few degrees explains
+/// is left out. Throws ContractError as `home_vector`.
 [[nodiscard]] double image_difference(const HomingView& home, const HomingView& current,
                                       int highest = 0);
 

@@ -7,15 +7,15 @@
 
 namespace panonav {
 
-/// What the phases of two views tell of how they lie to each other [M04 sections 3.4 and 3.5].
+/// Relative pose of two views from their phases [M04 sections 3.4 and 3.5].
 struct PhaseReading {
   double turn_rad = 0.0;         ///< heading of b minus heading of a
   double direction_a_rad = 0.0;  ///< towards b, in the frame of the robot that took a
   double direction_b_rad = 0.0;  ///< towards a, in the frame of the robot that took b
   /// Distance between the places in units of R, the typical distance of the things around.
   double length = 0.0;
-  /// Each view by itself says where the other one lies. By how much the two answers differ: small
-  /// for places near to each other, any angle for places that have nothing in common. In [0, pi].
+  /// Each view by itself gives the direction of the other one. This is the angle between the two
+  /// answers, in [0, pi]: small for neighbouring places, anything for unrelated ones.
   double disagreement_rad = 0.0;
   /// The same for the headings.
   double turn_disagreement_rad = 0.0;
@@ -24,7 +24,7 @@ struct PhaseReading {
   bool points = false;
 };
 
-/// A turn that something else has told.
+/// A turn that is known coarsely from another source.
 struct TurnHint {
   double turn_rad = 0.0;    ///< heading of b minus heading of a
   double within_rad = 0.5;  ///< > 0 and <= pi

@@ -16,11 +16,12 @@ struct HorizonLineOptions {
 };
 void visit_options(HorizonLineOptions& options, OptionVisitor& visitor);
 
-/// What a robot sees in the plane of its camera [Y03 section 2.2]: `columns` values from column 0,
-/// straight ahead, counter-clockwise. Rows within the band are averaged, or the two next to the
-/// horizon interpolated where the band holds none; without elevations all rows count as on the
-/// horizon. Columns are averaged where the panorama has more than asked for, interpolated where it
-/// has fewer. Throws OptionError, and ContractError when the horizon lies outside the panorama.
+/// The horizon scanline: the view in the plane of the camera [Y03 section 2.2]: `columns` values
+/// from column 0, straight ahead, counter-clockwise. Rows within the band are averaged, or the two
+/// next to the horizon interpolated where the band holds none; without elevations all rows are
+/// taken as on the horizon. Columns are averaged where the panorama has more than asked for,
+/// interpolated where it has fewer. Throws OptionError, and ContractError when the horizon lies
+/// outside the panorama.
 [[nodiscard]] std::vector<float> horizon_line(const Panorama& panorama,
                                               const HorizonLineOptions& options = {});
 

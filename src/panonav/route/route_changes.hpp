@@ -15,16 +15,15 @@ struct AzimuthRange {
 };
 
 /// Finds what has changed since a route was remembered: directions that fits leave unexplained
-/// picture after picture. Noise leaves something here and there, a thing that was moved stays where
-/// it is. A direction (one of 72, 5 degrees wide) counts where at least half of its columns are off
-/// by more than three deviations of the noise, which is what a fit takes for usual itself; it is
-/// named once it has counted in five pictures one after the other, or the direction next to it,
-/// where the thing was one picture before.
+/// picture after picture, unlike noise. A direction (one of 72, 5 degrees wide) is unexplained
+/// where at least half of its columns are off by more than three deviations of the noise. It is
+/// reported once it, or the direction next to it one picture before, was unexplained in five
+/// pictures one after the other.
 class RouteChanges {
  public:
-  /// What has changed as far as this picture and those before it tell. Cost: O(columns).
+  /// The changes according to this picture and those before it. Cost: O(columns).
   std::vector<AzimuthRange> add(const RouteFix& fix);
-  /// There was a picture without a fix: all begins anew.
+  /// There was a picture without a fix: counting starts again.
   void reset() noexcept { pictures_.fill(0); }
 
  private:

@@ -35,7 +35,7 @@ struct ContourPoint {
   double along = 0.0;    ///< line, with its fraction
 };
 
-/// Where both contours ended, and the pose that fits them.
+/// The final contours and the pose that fits them.
 struct RouteContourFix {
   Pose2 pose;
   std::array<double, 9> covariance{};  ///< of x, y, heading; row-major

@@ -12,7 +12,7 @@
 
 namespace panonav {
 
-/// How a line is fitted into a route panorama.
+/// Options of fitting a scanline into a route panorama.
 struct RouteFitOptions {
   double coarse_deg = 8.0;  ///< standard deviation of the smoothing where a fit starts, in azimuth
   int levels = 3;           ///< from coarse to not smoothed at all
@@ -23,14 +23,15 @@ struct RouteFitOptions {
 };
 void visit_options(RouteFitOptions& options, OptionVisitor& visitor);
 
-/// Where a line was seen from.
+/// The pose from which a scanline was seen.
 struct RouteFix {
   Pose2 pose;
   /// Of x, y and heading in metres and radians, row-major, as far as the noise of the lines goes.
   std::array<double, 9> covariance{};
-  /// Root mean square of what the fit leaves over the deviation of what the route shows; robust.
+  /// Robust root mean square of the residuals over the standard deviation of what the route shows.
   double residual = 1.0;
-  /// Of the line and what the route shows from there, -1 .. 1; changed parts count less, too.
+  /// Of the scanline and what the route shows from there, -1 .. 1; changed parts have less weight
+  /// here, too.
   double correlation = 0.0;
   int columns = 0;  ///< directions in which the line of sight crosses the path
   /// Standard deviation of what is seen from what is shown, 0 .. 1; robust, at least a grey level.
@@ -51,9 +52,9 @@ class RouteLines {
   /// The pose from which the path shows what `line` shows: least squares of all directions at once
   /// over x, y and heading, gain and offset of the light, from coarse to fine, starting at
   /// `predicted`. No contour is needed: the intensities themselves are fitted. Empty where the
-  /// prediction is out of reach of the path or the line has no structure. A fit far from the truth
-  /// ends somewhere, too: judge it by its correlation. Throws ContractError on a wrong length.
-  /// Cost: some ten steps of O(columns + lines in reach).
+  /// prediction is out of reach of the path or the line has no structure. A fit that starts far
+  /// from the truth also ends somewhere: judge it by its correlation. Throws ContractError on a
+  /// wrong length. Cost: some ten steps of O(columns + lines in reach).
   [[nodiscard]] std::optional<RouteFix> fit(std::span<const float> line,
                                             const Pose2& predicted) const;
 

@@ -9,11 +9,11 @@
 
 namespace panonav {
 
-/// A view for comparison column by column: for each of 128 directions around the robot, how
-/// brightness runs from top to bottom there. The view that the signature's components describe is
-/// rebuilt, its rows are averaged to at most 16 bands, and each column is freed of its mean and
-/// divided by its contrast. So what hides a part of the view changes the columns there and no
-/// others, and light that differs from one direction to another cancels.
+/// A view for comparison column by column: for each of 128 directions around the robot, the profile
+/// of brightness from top to bottom. The view that the signature's components describe is rebuilt,
+/// its rows are averaged to at most 16 bands, and each column is freed of its mean and divided by
+/// its contrast. An occlusion therefore changes only the columns where it stands, and light that
+/// differs from one direction to another cancels.
 class ColumnProfiles {
  public:
   static constexpr int columns = 128;
@@ -42,18 +42,18 @@ class ColumnProfiles {
   std::vector<std::uint8_t> compared_values_;
 };
 
-/// How two views fit when the one is turned on to the other.
+/// How well two views agree when one is turned to match the other.
 struct ColumnMatch {
   /// Mean over the columns of the root of their mean absolute difference, in units of their
-  /// contrast: 0 for equal views, 0.2 to 0.5 for neighbouring places, above about 0.6 for places
-  /// that have nothing to do with each other. The root keeps a column that is hidden from counting
-  /// for more than it is.
+  /// contrast: 0 for equal views, 0.2 to 0.5 for neighbouring places, above about 0.6 for unrelated
+  /// places. The root limits the weight of an occluded column.
   double difference = 0.0;
   /// Heading of the query minus heading of the reference, in [-pi, pi), in steps of 2 pi / 128.
   double heading_rad = 0.0;
 };
 
-/// The same, and the best turn on the other side: a corridor looks much the same when turned round.
+/// The same with a second turn, because a corridor looks much the same when turned by half a
+/// circle.
 struct ColumnMatches {
   ColumnMatch best;
   ColumnMatch other;  ///< the best turn at least 60 degrees from `best`
@@ -70,7 +70,7 @@ struct ColumnMatches {
                                                 const ColumnProfiles& reference);
 
 /// The mean absolute difference of each compared column in units of contrast, when the robot is
-/// turned by `heading_rad` relative to the reference: the least of the nearest turn and the two
+/// turned by `heading_rad` relative to the reference: the minimum over the nearest turn and the two
 /// beside it, column by column. `ColumnMatch::difference` is the mean of the roots of such values,
 /// all at one turn. Throws ContractError on profiles with other bands. Cost: 1 microsecond.
 [[nodiscard]] std::array<double, ColumnProfiles::compared_columns> column_distances_near(

@@ -6,12 +6,11 @@
 
 namespace panonav {
 
-/// Relative heading read from two views [F11 section 3.2, M04 section 3.4, S06 section 2.4].
+/// The relative heading of two views [F11 section 3.2, M04 section 3.4, S06 section 2.4].
 struct CompassReading {
   /// heading of the query minus heading of the reference, in [-pi, pi).
   double heading_rad = 0.0;
-  /// Normalised correlation at this heading, -1 .. 1; 1 for the same view turned. k = 0 does not
-  /// count.
+  /// Normalised correlation at this heading without k = 0, -1 .. 1; 1 for the same view turned.
   double correlation = 0.0;
   /// 0 .. 1: how far the correlation stands above its next highest maximum, as a fraction of
   /// itself; 0 when another heading fits as well or better, 1 when no other fits at all.
@@ -22,14 +21,13 @@ struct CompassOptions {
   int components = 0;  ///< k = 1 .. components - 1 are used; 0 takes all that both signatures have
 };
 
-/// Heading of `query` relative to `reference`: the global maximum of
-/// C(sigma) = sum_{y,k} A^q A^r cos(psi^q - psi^r - k sigma) [S06 eq. 33], exact to rounding
-/// between columns. The rows are summed first, which leaves a trigonometric polynomial: it is
-/// evaluated at eight points per period of its highest frequency and each maximum that may be the
-/// highest is refined by Newton's rule. So no component needs to be good, the first one least of
-/// all. Empty when a view has no structure: no component k >= 1 above the rounding of its
-/// computation. Throws ContractError on different rows, or components outside 0, 2 .. those of both
-/// signatures. Cost: a few microseconds for 80 x 15.
+/// Heading of `query` relative to `reference`: the global maximum of C(sigma) = sum_{y,k} A^q A^r
+/// cos(psi^q - psi^r - k sigma) [S06 eq. 33], exact to rounding between columns. The sum over rows
+/// is a trigonometric polynomial. It is evaluated at eight points per period of its highest
+/// frequency, and each maximum that may be the highest is refined by Newton's rule. No single
+/// component needs to be reliable, not even the first. Empty when a view has no structure: no
+/// component k >= 1 above the rounding of its computation. Throws ContractError on different rows,
+/// or components outside 0, 2 .. those of both signatures. Cost: a few microseconds for 80 x 15.
 [[nodiscard]] std::optional<CompassReading> compass(const FourierSignature& query,
                                                     const FourierSignature& reference,
                                                     const CompassOptions& options = {});
@@ -40,9 +38,9 @@ struct CompassOptions {
                                                     const PackedSignature& reference,
                                                     const CompassOptions& options = {});
 
-/// The same, but the maximum is looked for only within `within_rad` of `heading_rad`: for a heading
-/// that something else has told coarsely. `distinctness` is 1, as no other heading is considered.
-/// Throws ContractError also unless 0 < within_rad <= pi.
+/// The same, but the maximum is searched only within `within_rad` of `heading_rad`, for a heading
+/// that is known coarsely from another source. `distinctness` is 1, as no other heading is
+/// considered. Throws ContractError also unless 0 < within_rad <= pi.
 [[nodiscard]] std::optional<CompassReading> compass_near(const PackedSignature& query,
                                                          const PackedSignature& reference,
                                                          double heading_rad, double within_rad,

@@ -14,8 +14,8 @@ namespace panonav {
 /// Square root of the sum of squares [F11 eq. 2].
 [[nodiscard]] double dissimilarity_l2(const FourierSignature& a, const FourierSignature& b,
                                       int components = 0);
-/// Sum of alpha_k |A^a - A^b| [M04 eq. 6]; one weight >= 0 per component, the first weights.size()
-/// components count.
+/// Sum of alpha_k |A^a - A^b| [M04 eq. 6]; one weight >= 0 per component; the first weights.size()
+/// components are used.
 [[nodiscard]] double dissimilarity_weighted(const FourierSignature& a, const FourierSignature& b,
                                             std::span<const double> weights);
 /// The exact integer L1 of packed magnitudes; the measure of a visual memory.
