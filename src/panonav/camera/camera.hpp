@@ -66,7 +66,7 @@ void validate(const Camera& camera);
 /// more.
 [[nodiscard]] std::optional<PixelPoint> project(const Camera& camera, const Direction3& direction);
 
-/// The unit direction in which a point of the image looks; empty outside the same domain.
+/// The unit direction that a point of the image shows; empty outside the same domain.
 [[nodiscard]] std::optional<Direction3> unproject(const Camera& camera, PixelPoint pixel);
 
 /// Lowest and highest elevation that is seen at every azimuth, in radians.

@@ -11,8 +11,8 @@
 
 namespace panonav {
 
-/// Drives legs along recorded routes, by horizon lines: where a planned way goes along a route, the
-/// robot repeats this as it was recorded. Deterministic.
+/// Drives legs along recorded routes by horizon scanlines: where a planned path goes along a route,
+/// the robot repeats the route as it was recorded. Deterministic.
 class RoutePilot {
  public:
   /// None to drive along.
@@ -24,16 +24,16 @@ class RoutePilot {
   /// Whether a leg is under way.
   [[nodiscard]] bool drives() const noexcept { return leg_.has_value(); }
 
-  /// Begins a leg of at least `shortest_m` along the route that leads farthest on the way, which
-  /// starts with the robot's place: where `line` says that the robot is on the route, no farther
-  /// from that place than `shortest_m`. Not along a route that was given up. Returns whether it
-  /// began. Throws ContractError on a line of another length than the route's. Cost: that of
-  /// `stretch_along` for each route, and of a search where one leads far enough.
+  /// Begins a leg of at least `shortest_m` along the route that leads farthest along the path,
+  /// which starts with the robot's place. `line` must show that the robot is on the route, no
+  /// farther from that place than `shortest_m`. Routes that were given up are not used. Returns
+  /// whether a leg began. Throws ContractError on a line of another length than the route's. Cost:
+  /// that of `stretch_along` for each route, and of a search where one leads far enough.
   bool begin(std::span<const ViewId> way, std::span<const float> line, double shortest_m);
 
-  /// The next look of a leg: `moved` is how the robot moved since the look before, in the frame it
-  /// had then. An empty line: none was taken; the motion tells. Throws ContractError as `begin`,
-  /// and without a leg.
+  /// The next observation of a leg: `moved` is the robot's motion since the observation before, in
+  /// the frame it had then. An empty line: none was taken, and the motion alone is used. Throws
+  /// ContractError as `begin`, and without a leg.
   void track(std::span<const float> line, const Pose2& moved);
 
   // Of the leg under way; undefined without one.
@@ -41,14 +41,14 @@ class RoutePilot {
   [[nodiscard]] const std::optional<Point2>& aim() const { return leg_->aim; }
   /// The reference to which it leads.
   [[nodiscard]] ViewId end() const { return leg_->end; }
-  /// The reference beside which the robot is, as far as line and motion tell.
+  /// The reference beside the robot according to line and motion.
   [[nodiscard]] ViewId place() const;
-  /// Looks one after the other that did not tell a place on the leg.
+  /// Number of consecutive observations that gave no place on the leg.
   [[nodiscard]] int unknown_looks() const { return leg_->unknown_looks; }
 
   /// Ends the leg, if there is one.
   void stop() noexcept { leg_.reset(); }
-  /// Ends the leg; its route is not driven along any more until `forgive`.
+  /// Ends the leg; its route is not used again until `forgive`.
   void give_up();
   void forgive() noexcept { given_up_.clear(); }
 

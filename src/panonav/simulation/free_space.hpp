@@ -34,9 +34,8 @@ void visit_options(FreeSpaceOptions& options, OptionVisitor& visitor);
 /// Where a robot can stand and drive in a scene: inside `floor_low .. floor_high` and the
 /// `drivable` areas if there are any; on something to stand on (a surface within the step height of
 /// the floor), unless the scene has no floor at all; and with no surface within the robot's radius
-/// between step height and robot height. Of the parts that are not connected with each other only
-/// one is kept, so that every free place can be reached from every other: the one of `seed`, or
-/// else the largest.
+/// between step height and robot height. Only one connected component is kept, so that every free
+/// place can be reached from every other: the one of `seed`, or else the largest.
 ///
 /// Computed on a map of square cells; whole cells are free or not. Distances to obstacles are never
 /// overestimated and underestimated by at most 1.5 cells. Building costs O(cells + triangle area).
@@ -50,7 +49,7 @@ class FreeSpace {
   [[nodiscard]] bool is_free(Point2 position) const noexcept;
   /// Lower bound of the distance from `position` to the nearest obstacle; 0 outside the map.
   [[nodiscard]] double clearance_m(Point2 position) const noexcept;
-  /// Whether every place on the straight way is free.
+  /// Whether every place on the straight line is free.
   [[nodiscard]] bool is_free_between(Point2 a, Point2 b) const noexcept;
 
   [[nodiscard]] double area_m2() const noexcept;
@@ -62,7 +61,7 @@ class FreeSpace {
                                                GridOrder order = GridOrder::raster) const;
   /// Uniform over the free area, any heading.
   [[nodiscard]] Pose2 random_pose(Random& random) const;
-  /// Way points of a short way through free places, first `a`, last `b`; empty when one of them is
+  /// Way points of a short path through free places, first `a`, last `b`; empty when one of them is
   /// not free. Shortest on the 8-connected map, then pulled tight. O(cells log cells).
   [[nodiscard]] std::optional<std::vector<Point2>> shortest_path(Point2 a, Point2 b) const;
 

@@ -12,7 +12,7 @@ enum class MirrorTarget {
   housing       ///< what lies beyond the mirror's rim
 };
 
-/// The way of light from a pixel through the lens to the mirror and out, in the robot frame (x
+/// The path of light from a pixel through the lens to the mirror and out, in the robot frame (x
 /// forward, y left, z up) with its origin in the mirror's inner focus, the viewpoint.
 struct MirrorRay {
   MirrorTarget target = MirrorTarget::housing;

@@ -26,7 +26,7 @@ enum class RecordingPath {
   random,  ///< independent random poses
 };
 
-/// Which way the robot faces at each place.
+/// The robot's heading at each place.
 enum class RecordingHeading {
   fixed,   ///< the same heading everywhere
   path,    ///< the way it goes
@@ -51,10 +51,10 @@ struct RecordedPose {
   friend bool operator==(const RecordedPose&, const RecordedPose&) = default;
 };
 
-/// The poses of a recording, all of them free. `way_points` replace the scene's tour. Straight ways
-/// that are not free are replaced by the shortest ones. The same seed gives the same poses.
-/// Throws OptionError; ContractError when no place is free at this spacing, a way point is not
-/// free, or a tour is asked for where there is none.
+/// The poses of a recording, all of them free. `way_points` replace the scene's tour. Straight
+/// lines that are not free are replaced by the shortest free paths. The same seed gives the same
+/// poses. Throws OptionError; ContractError when no place is free at this spacing, a way point is
+/// not free, or a tour is asked for where there is none.
 [[nodiscard]] std::vector<RecordedPose> plan_recording(const Scene& scene, const FreeSpace& space,
                                                        const RecordingOptions& options,
                                                        const OdometryNoise& odometry,
@@ -66,7 +66,7 @@ using RecordingCamera = std::variant<PanoramaRendering, Camera>;
 
 struct FrameOptions {
   double camera_height_m = 0.6;
-  /// The robot leans by this much, in another random direction at each place.
+  /// Tilt of the robot, in another random direction at each place.
   double tilt_rad = 0.0;
   int rays_per_axis = 2;  ///< for pictures through a camera
 };
@@ -80,7 +80,7 @@ void visit_options(FrameOptions& options, OptionVisitor& visitor);
                                  const SensorOptions& sensor, std::uint64_t seed,
                                  Executor& executor);
 
-/// The same as a panorama, without the way through a picture.
+/// The same as a panorama, without the detour through a picture.
 [[nodiscard]] Panorama take_panorama(const Renderer& renderer, const Pose2& pose,
                                      const PanoramaRendering& rendering,
                                      const FrameOptions& options, const SensorOptions& sensor,
