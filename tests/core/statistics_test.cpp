@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "panonav/core/error.hpp"
@@ -18,6 +19,25 @@ TEST(Quantile, InterpolatesBetweenOrderStatistics) {
   EXPECT_DOUBLE_EQ(quantile(values, 1.0 / 3.0), 2.0);
   EXPECT_THROW((void)quantile({}, 0.5), ContractError);
   EXPECT_THROW((void)quantile(values, 1.5), ContractError);
+}
+
+TEST(OrderStatistic, IsOneOfTheValuesAndBelowTheQuantile) {
+  EXPECT_DOUBLE_EQ(order_statistic({4.0, 1.0, 3.0, 2.0}, 0.5), 2.0);
+  EXPECT_DOUBLE_EQ(upper_median(std::vector{4.0, 1.0, 3.0, 2.0}), 3.0);
+  EXPECT_DOUBLE_EQ(order_statistic({4.0, 1.0, 3.0, 2.0}, 1.0), 4.0);
+  EXPECT_THROW((void)order_statistic({}, 0.5), ContractError);
+  Random random(3);
+  for (int trial = 0; trial < 50; ++trial) {
+    std::vector<double> values(1 + random.index(20));
+    for (double& value : values) value = random.normal();
+    const double fraction = random.uniform(0.0, 1.0);
+    const double found = order_statistic(values, fraction);
+    EXPECT_NE(std::ranges::find(values, found), values.end());
+    EXPECT_LE(found, quantile(values, fraction) + 1e-12);
+    if (values.size() % 2 == 1) {
+      EXPECT_EQ(order_statistic(values, 0.5), upper_median(values));
+    }
+  }
 }
 
 TEST(SuccessRate, WilsonIntervalOfPublishedExample) {

@@ -7,15 +7,11 @@
 
 #include "localisation/ray_cast_room.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/core/statistics.hpp"
 #include "support/sanitizers.hpp"
 
 namespace panonav::testing {
 namespace {
-
-double share_below(std::vector<double> values, double share) {
-  std::ranges::sort(values);
-  return values.at(static_cast<std::size_t>(share * static_cast<double>(values.size() - 1)));
-}
 
 std::vector<RankedMatch> ranked_matches(const VisualMemory& memory, const PackedSignature& query) {
   return ColumnRanking(memory).rank(
@@ -85,8 +81,8 @@ TEST(InterpolatedPosition, BeatsTheNearestReferenceAndItsRadiusHolds95PerCent) {
       inside += errors.back() <= *estimate->radius_m ? 1 : 0;
     }
   }
-  EXPECT_LT(share_below(errors, 0.5), 0.6 * share_below(nearest_errors, 0.5));
-  EXPECT_LT(share_below(errors, 0.95), share_below(nearest_errors, 0.95));
+  EXPECT_LT(order_statistic(errors, 0.5), 0.6 * order_statistic(nearest_errors, 0.5));
+  EXPECT_LT(order_statistic(errors, 0.95), order_statistic(nearest_errors, 0.95));
   // 95 % of 200, less three standard errors.
   EXPECT_GE(inside, 180);
 }

@@ -11,6 +11,7 @@
 
 #include "localisation/ray_cast_room.hpp"
 #include "localisation/recordings.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav/localisation/localiser.hpp"
 
 namespace panonav::testing {
@@ -18,12 +19,6 @@ namespace {
 
 #define REQUIRE_RECORDING(recording, name) \
   if (!(recording)) GTEST_SKIP() << "PANONAV_DATA does not point to a folder with " name
-
-double share_below(std::vector<double> values, double share) {
-  std::ranges::sort(values);
-  return values.at(static_cast<std::size_t>(std::ceil(share * static_cast<double>(values.size()))) -
-                   1);
-}
 
 struct Part {
   std::vector<FourierSignature> signatures;
@@ -104,17 +99,17 @@ TEST(SussexRoute, InterpolationBeatsTheNearestReference) {
                       part_of(*route, [&](std::size_t i) { return remainder(i, 2) == 1; }));
   ASSERT_EQ(errors.nearest_m.size(), 227U);
   ASSERT_GE(errors.interpolated_m.size(), 216U);
-  EXPECT_LE(share_below(errors.nearest_m, 0.5), 0.03);
-  EXPECT_LE(share_below(errors.nearest_m, 0.95), 0.09);
-  EXPECT_LT(share_below(errors.interpolated_m, 0.5), share_below(errors.nearest_m, 0.5));
-  EXPECT_LT(share_below(errors.interpolated_m, 0.95), share_below(errors.nearest_m, 0.95));
+  EXPECT_LE(quantile(errors.nearest_m, 0.5), 0.03);
+  EXPECT_LE(quantile(errors.nearest_m, 0.95), 0.09);
+  EXPECT_LT(quantile(errors.interpolated_m, 0.5), quantile(errors.nearest_m, 0.5));
+  EXPECT_LT(quantile(errors.interpolated_m, 0.95), quantile(errors.nearest_m, 0.95));
   EXPECT_GE(errors.inside, 0.93);
   // The same with five times sparser references, where there is more to gain.
   const PositionErrors sparse =
       position_errors(part_of(*route, [&](std::size_t i) { return remainder(i, 10) == 0; }),
                       part_of(*route, [&](std::size_t i) { return remainder(i, 10) == 5; }));
-  EXPECT_LT(share_below(sparse.interpolated_m, 0.5), 0.7 * share_below(sparse.nearest_m, 0.5));
-  EXPECT_LT(share_below(sparse.interpolated_m, 0.95), share_below(sparse.nearest_m, 0.95));
+  EXPECT_LT(quantile(sparse.interpolated_m, 0.5), 0.7 * quantile(sparse.nearest_m, 0.5));
+  EXPECT_LT(quantile(sparse.interpolated_m, 0.95), quantile(sparse.nearest_m, 0.95));
 }
 
 TEST(GantryPlants, InterpolationHalvesTheErrorBetweenReferences) {
@@ -127,8 +122,7 @@ TEST(GantryPlants, InterpolationHalvesTheErrorBetweenReferences) {
                       part_of(*gantry, [&](std::size_t i) { return !even_column(*gantry, i); }));
   ASSERT_EQ(errors.nearest_m.size(), 99U);
   ASSERT_GE(errors.interpolated_m.size(), 94U);
-  EXPECT_LE(share_below(errors.interpolated_m, 0.5),
-            0.5 * share_below(errors.nearest_m, 0.5) + 1e-9);
+  EXPECT_LE(quantile(errors.interpolated_m, 0.5), 0.5 * quantile(errors.nearest_m, 0.5) + 1e-9);
   EXPECT_GE(errors.inside, 0.93);
 }
 
@@ -145,8 +139,8 @@ TEST(GantryPlants, AbsoluteHeadingBetweenReferences) {
     if (found.heading_rad) errors.push_back(std::abs(angle_difference(*found.heading_rad, 0.0)));
   }
   ASSERT_GE(errors.size(), 94U);
-  EXPECT_LE(share_below(errors, 0.5), radians(1.7));
-  EXPECT_LE(share_below(errors, 0.95), radians(5.0));
+  EXPECT_LE(quantile(errors, 0.5), radians(1.7));
+  EXPECT_LE(quantile(errors, 0.95), radians(5.0));
 }
 
 TEST(IndoorWalk, EveryTurnedImageFindsItselfAndItsTurn) {

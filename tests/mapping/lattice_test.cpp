@@ -9,6 +9,7 @@
 
 #include "localisation/ray_cast_room.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/mapping/lattice_map.hpp"
@@ -79,11 +80,6 @@ std::vector<Point2> inner_grid(const testing::Room& room, double step_m) {
   return points;
 }
 
-double median_of(std::vector<double> values) {
-  std::ranges::sort(values);
-  return values.at(values.size() / 2);
-}
-
 TEST(Lattice, UnorderedViewsArrangeThemselvesLikeTheirRoom) {
   std::vector<double> differences;
   std::vector<double> heading_errors;
@@ -105,10 +101,10 @@ TEST(Lattice, UnorderedViewsArrangeThemselvesLikeTheirRoom) {
       errors.push_back(std::abs(angle_difference(node.pose.heading_rad + turned.rotation_rad,
                                                  *place.memory.info(node.view).pose->heading_rad)));
     }
-    heading_errors.push_back(median_of(errors));
+    heading_errors.push_back(upper_median(errors));
   }
-  EXPECT_LT(median_of(differences), 0.02);
-  EXPECT_LT(median_of(heading_errors), radians(5.0));
+  EXPECT_LT(upper_median(differences), 0.02);
+  EXPECT_LT(upper_median(heading_errors), radians(5.0));
 }
 
 TEST(Lattice, OrderOfViewsAndTheirPosesDoNotMatter) {
@@ -292,7 +288,7 @@ TEST(Lattice, ViewsThatCameLaterFindTheirPlace) {
   for (std::size_t i = first; i < order.size(); ++i) {
     errors.push_back(distance(fit.apply(lattice.nodes[i].pose.position()), truth[i]));
   }
-  EXPECT_LT(median_of(errors), 1.5 * fit.rms_m + 0.02);
+  EXPECT_LT(upper_median(errors), 1.5 * fit.rms_m + 0.02);
   // Nothing new: nothing happens.
   const auto settled = positions_of(lattice);
   extend(lattice, all);

@@ -11,7 +11,7 @@
 #include "navigation/walled_world.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/executor.hpp"
-#include "panonav/core/median.hpp"
+#include "panonav/core/statistics.hpp"
 #include "support/sanitizers.hpp"
 
 namespace panonav {

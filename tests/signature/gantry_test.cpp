@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "panonav/core/random.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/io/image_file.hpp"
@@ -150,9 +151,8 @@ TEST_F(Gantry, CompassBetweenNeighboursIsRightToAFractionOfAColumn) {
       }
     }
     ASSERT_GT(errors_deg.size(), 600U);
-    std::ranges::sort(errors_deg);
-    const double median_deg = errors_deg[errors_deg.size() / 2];
-    const double most_deg = errors_deg[errors_deg.size() * 95 / 100];
+    const double median_deg = median(errors_deg);
+    const double most_deg = quantile(errors_deg, 0.95);
     EXPECT_LE(median_deg, 1.7) << (packed ? "packed" : "float");
     EXPECT_LE(most_deg, 5.0) << (packed ? "packed" : "float");
     RecordProperty(packed ? "packed_median_deg" : "median_deg", std::to_string(median_deg));
@@ -176,9 +176,8 @@ TEST_F(Gantry, CompassReadsTheTurnOfTheRobot) {
     }
   }
   ASSERT_GT(errors_deg.size(), 600U);
-  std::ranges::sort(errors_deg);
-  EXPECT_LE(errors_deg[errors_deg.size() / 2], 1.7);
-  EXPECT_LE(errors_deg[errors_deg.size() * 95 / 100], 5.0);
+  EXPECT_LE(median(errors_deg), 1.7);
+  EXPECT_LE(quantile(errors_deg, 0.95), 5.0);
 }
 
 }  // namespace

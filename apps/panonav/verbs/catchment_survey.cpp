@@ -6,8 +6,8 @@
 #include <numbers>
 
 #include "panonav/core/error.hpp"
-#include "panonav/core/median.hpp"
 #include "panonav/core/random.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/positions.hpp"
 #include "panonav/geometry/voronoi.hpp"

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
-#include "panonav/core/median.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/mapping/lattice.hpp"
 

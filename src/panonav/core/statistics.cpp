@@ -71,6 +71,15 @@ double mean(std::span<const double> values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
+double order_statistic(std::vector<double> values, double fraction) {
+  require(!values.empty(), "number of values", 0.0, ">= 1");
+  require(fraction >= 0.0 && fraction <= 1.0, "fraction", fraction, "0 .. 1");
+  const auto place = values.begin() +
+                     static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), place, values.end());
+  return *place;
+}
+
 Proportion success_rate(std::size_t successes, std::size_t trials) {
   require(trials >= 1, "trials", static_cast<double>(trials), ">= 1");
   require(successes <= trials, "successes", static_cast<double>(successes), "0 .. trials");

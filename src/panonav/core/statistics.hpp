@@ -1,8 +1,11 @@
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <utility>
+#include <vector>
 
 namespace panonav {
 
@@ -11,6 +14,26 @@ namespace panonav {
 [[nodiscard]] double quantile(std::span<const double> values, double fraction);
 [[nodiscard]] double median(std::span<const double> values);
 [[nodiscard]] double mean(std::span<const double> values);
+
+/// The median; of an even number the larger of the two in the middle. Reorders `values`, of which
+/// there must be at least one. Cost: O(n).
+template <typename Value>
+[[nodiscard]] Value upper_median_in_place(std::span<Value> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// The same of a copy.
+template <typename Value>
+[[nodiscard]] Value upper_median(std::vector<Value> values) {
+  return upper_median_in_place(std::span(values));
+}
+
+/// The value of `values` that stands at `fraction` (0 .. 1) of the way through them in ascending
+/// order, rounded down: one of them, where `quantile` interpolates. Throws ContractError on no
+/// values. Cost: O(n).
+[[nodiscard]] double order_statistic(std::vector<double> values, double fraction);
 
 struct Proportion {
   double value = 0.0;

@@ -10,6 +10,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
+#include "panonav/core/statistics.hpp"
 
 namespace panonav {
 
@@ -175,9 +176,7 @@ VoronoiCells::VoronoiCells(std::span<const Point2> positions, std::optional<doub
       }
       second[site] = std::isfinite(nearest[1]) ? nearest[1] : nearest[0];
     }
-    const auto middle = second.begin() + static_cast<std::ptrdiff_t>((second.size() - 1) / 2);
-    std::nth_element(second.begin(), middle, second.end());
-    spacing_m_ = *middle;
+    spacing_m_ = order_statistic(std::move(second), 0.5);
   }
 }
 

@@ -13,6 +13,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav/geometry/voronoi.hpp"
 #include "panonav/localisation/place_model.hpp"
 #include "panonav/localisation/sample.hpp"

@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include "panonav/core/statistics.hpp"
 #include "panonav/localisation/sample.hpp"
 
 namespace panonav {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "panonav/core/statistics.hpp"
 #include "panonav/geometry/voronoi.hpp"
 #include "panonav/localisation/sample.hpp"
 
@@ -192,6 +193,7 @@ PositionModel learn_position_model(const ColumnRanking& ranking,
       }
     }
   }
+  if (best_errors.empty()) return model;  // no finite error
   model.variance_unit = quantile(best_variances, 0.5);
   std::vector<double> ratios;
   for (std::size_t i = 0; i < best_errors.size(); ++i) {

@@ -1,8 +1,6 @@
 #include "panonav/localisation/sample.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <utility>
 
 #include "panonav/core/random.hpp"
@@ -20,15 +18,6 @@ std::vector<ViewId> sample_views(std::span<const ViewId> views, int count, std::
   sample.resize(wanted);
   std::ranges::sort(sample);
   return sample;
-}
-
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  std::ranges::sort(values);
-  const double place = share * static_cast<double>(values.size() - 1);
-  const auto below = static_cast<std::size_t>(place);
-  const std::size_t above = std::min(below + 1, values.size() - 1);
-  return values[below] + (place - std::floor(place)) * (values[above] - values[below]);
 }
 
 PackedSignature with_rows(PackedSignature signature, std::span<const std::uint8_t> allowed_rows) {

@@ -13,10 +13,6 @@ namespace panonav {
 [[nodiscard]] std::vector<ViewId> sample_views(std::span<const ViewId> views, int count,
                                                std::uint64_t seed);
 
-/// The value below which the share `share` of the values lies, linear between the sorted values;
-/// NaN of no values. `share` is in 0 .. 1.
-[[nodiscard]] double quantile(std::vector<double> values, double share);
-
 /// The signature with the magnitudes of the rows that do not count set to 0. Empty `allowed_rows`:
 /// unchanged.
 [[nodiscard]] PackedSignature with_rows(PackedSignature signature,

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "panonav/core/error.hpp"
-#include "panonav/core/median.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav/mapping/internal/ground_displacement.hpp"
 #include "panonav/mapping/visual_odometry.hpp"
 

@@ -8,8 +8,8 @@
 #include <set>
 
 #include "panonav/core/error.hpp"
-#include "panonav/core/median.hpp"
 #include "panonav/core/random.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/positions.hpp"
 #include "panonav/mapping/internal/lattice_solver.hpp"

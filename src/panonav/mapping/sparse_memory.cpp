@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav/relative_pose/fourier_homing.hpp"
 #include "panonav/relative_pose/homing_view.hpp"
 
@@ -93,12 +94,6 @@ class Pairs {
   std::set<std::pair<std::uint32_t, std::uint32_t>> pairs_;
 };
 
-double middle_of(std::vector<double> values, double fraction) {
-  const auto at = static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + at, values.end());
-  return values[static_cast<std::size_t>(at)];
-}
-
 }  // namespace
 
 void visit_options(SparseMemoryOptions& options, OptionVisitor& visitor) {
@@ -133,7 +128,7 @@ SparseSelection select_references(const VisualMemory& memory, const SparseMemory
   const auto views = memory.views();
   for (auto at = views.rbegin(); at != views.rend(); ++at) {
     const ViewId view = *at;
-    HomingView seen = homing_view(memory.signature(view));
+    HomingView seen = homing_view(memory, view);
     const auto& pose = memory.info(view).pose;
     std::optional<RedundantView> best;
     const auto consider = [&](ViewId other, std::optional<double> distance_m) {
@@ -238,10 +233,11 @@ SparseLoss measure_loss(const VisualMemory& memory, const SparseSelection& selec
     after_m.push_back(*after);
   }
   loss.asked = asked;
-  loss.median_difference = middle_of(differences, 0.5);
+  loss.median_difference = order_statistic(differences, 0.5);
   if (before_m.size() >= 2) {
-    loss.positions = SparseLoss::Positions{middle_of(before_m, 0.5), middle_of(before_m, 0.95),
-                                           middle_of(after_m, 0.5), middle_of(after_m, 0.95)};
+    loss.positions =
+        SparseLoss::Positions{order_statistic(before_m, 0.5), order_statistic(before_m, 0.95),
+                              order_statistic(after_m, 0.5), order_statistic(after_m, 0.95)};
   }
   return loss;
 }

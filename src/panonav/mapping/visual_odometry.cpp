@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
-#include "panonav/core/median.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav/mapping/internal/azimuth_flow.hpp"
 #include "panonav/signature/compass.hpp"
 #include "panonav/signature/dissimilarity.hpp"

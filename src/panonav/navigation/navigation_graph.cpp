@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
-#include "panonav/core/median.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/relative_pose/fourier_homing.hpp"

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "panonav/core/error.hpp"
-#include "panonav/core/median.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav/relative_pose/fourier_homing.hpp"
 #include "panonav/relative_pose/view_pair.hpp"
 

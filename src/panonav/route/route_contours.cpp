@@ -9,7 +9,7 @@
 #include <string>
 
 #include "panonav/core/error.hpp"
-#include "panonav/core/median.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/route/internal/line_sampling.hpp"
 

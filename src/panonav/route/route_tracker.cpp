@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/route/route_place.hpp"
 
@@ -15,11 +16,6 @@ namespace panonav {
 namespace {
 
 constexpr double pi = std::numbers::pi;
-
-double quantile(std::vector<double> values, double share) {
-  std::ranges::sort(values);
-  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
-}
 
 }  // namespace
 
@@ -81,8 +77,8 @@ double RouteTracker::learnt_correlation(const RoutePanorama& route,
     if (const auto fix = best_anywhere(line)) wrong.push_back(fix->correlation);
   }
   if (right.size() < 3 || wrong.size() < 3) return usual;
-  const double low = std::max(0.0, quantile(std::move(wrong), 0.95));
-  const double high = quantile(std::move(right), 0.05);
+  const double low = std::max(0.0, order_statistic(std::move(wrong), 0.95));
+  const double high = order_statistic(std::move(right), 0.05);
   // A view from beside the path or of a changed scene fits worse than one from the path.
   return low + std::max(0.0, high - low) / 3.0;
 }

@@ -9,7 +9,7 @@
 #include <numeric>
 
 #include "panonav/core/error.hpp"
-#include "panonav/core/median.hpp"
+#include "panonav/core/statistics.hpp"
 
 namespace panonav {
 namespace {

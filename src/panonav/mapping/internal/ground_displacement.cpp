@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "panonav/core/error.hpp"
-#include "panonav/core/median.hpp"
+#include "panonav/core/statistics.hpp"
 
 namespace panonav {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "panonav/core/median.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/mapping/lattice_graph.hpp"
 #include "panonav/signature/dissimilarity.hpp"
@@ -42,7 +42,7 @@ SpringViews::SpringViews(const VisualMemory& memory, const LatticeOptions& optio
   for (const ViewId view : memory.views()) {
     packed_.push_back(memory.packed(view));
     if (!options.phases) continue;
-    const HomingView seen = homing_view(memory.signature(view));
+    const HomingView seen = homing_view(memory, view);
     homing_.push_back(components_ > 0 ? first_components(seen, components_) : seen);
   }
 }
