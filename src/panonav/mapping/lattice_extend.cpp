@@ -114,7 +114,7 @@ class Extender {
   }
 
   [[nodiscard]] HomingView homing(ViewId view) const {
-    const HomingView seen = homing_view(memory_.signature(view));
+    const HomingView seen = homing_view(memory_, view);
     return options_.components > 0 ? first_components(seen, options_.components) : seen;
   }
 

@@ -1,7 +1,9 @@
 #include "panonav/relative_pose/homing_view.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 
 #include "panonav/core/error.hpp"
 
@@ -23,6 +25,48 @@ HomingView::HomingView(int rows, int components, std::vector<float> cosines,
     for (const float value : *values) require(std::isfinite(value), "coefficient", value, "finite");
   }
   for (int y = 0; y < rows; ++y) require(b(y, 0) == 0.0F, "b_0", b(y, 0), "0");
+}
+
+namespace {
+
+// Of the phase that a byte stands for.
+struct Direction {
+  float cosine;
+  float sine;
+};
+
+const std::array<Direction, 256>& directions() {
+  static const std::array<Direction, 256> table = [] {
+    std::array<Direction, 256> filled{};
+    PackedSignature packed{{1, 1}, {255}, {0}};
+    for (std::size_t i = 0; i < filled.size(); ++i) {
+      packed.phases[0] = static_cast<std::uint8_t>(i);
+      const float phase = unpack(packed, 1.0F, std::nullopt).phases_rad()[0];
+      filled[i] = {std::cos(phase), std::sin(phase)};
+    }
+    return filled;
+  }();
+  return table;
+}
+
+}  // namespace
+
+HomingView homing_view(const VisualMemory& memory, ViewId view) {
+  const PackedSignature packed = memory.packed(view);
+  const auto& table = directions();
+  const float unit = memory.full_scale() / 255.0F;
+  const auto rows = static_cast<std::size_t>(packed.shape.rows);
+  std::vector<float> cosines(packed.shape.size());
+  std::vector<float> sines(packed.shape.size());
+  for (std::size_t i = 0; i < cosines.size(); ++i) {
+    const float magnitude = static_cast<float>(packed.magnitudes[i]) * unit;
+    // A magnitude of 0 has no phase, whatever its byte.
+    const Direction direction = table[packed.magnitudes[i] == 0 ? 0 : packed.phases[i]];
+    cosines[i] = magnitude * direction.cosine;
+    sines[i] = i < rows ? 0.0F : -magnitude * direction.sine;
+  }
+  return {packed.shape.rows, packed.shape.components, std::move(cosines), std::move(sines),
+          memory.elevations()};
 }
 
 HomingView homing_view(const FourierSignature& signature) {
