@@ -213,9 +213,8 @@ std::vector<MapPlot> particle_maps(const TrackingPlace& place, std::span<const M
         map.layers.push_back(
             {.label = "references", .colour = "#999999", .dots = place.reference_positions()});
         MapLayer particles{.label = "particles", .colour = "#e41a1c"};
-        for (const Particle& particle : filter.particles()) {
-          particles.dots.push_back(particle.pose.position());
-        }
+        const Particles& held = filter.particles();
+        for (std::size_t i = 0; i < held.size(); ++i) particles.dots.push_back(held.position(i));
         map.layers.push_back(std::move(particles));
         map.layers.push_back({.label = "true path",
                               .colour = "#0072b2",

@@ -97,11 +97,12 @@ TEST(MonteCarlo, WeightsSumToOneAndNumbersStayWithinTheirBounds) {
     if (k > 0) filter.move(run.step(k));
     const MonteCarloEstimate found = filter.observe(run.views[k]);
     double sum = 0.0;
-    for (const Particle& particle : filter.particles()) {
-      EXPECT_GE(particle.weight, 0.0);
-      EXPECT_GE(particle.pose.heading_rad, -std::numbers::pi);
-      EXPECT_LT(particle.pose.heading_rad, std::numbers::pi);
-      sum += particle.weight;
+    const Particles& particles = filter.particles();
+    for (std::size_t i = 0; i < particles.size(); ++i) {
+      EXPECT_GE(particles.weight[i], 0.0);
+      EXPECT_GE(particles.heading_rad[i], -std::numbers::pi);
+      EXPECT_LT(particles.heading_rad[i], std::numbers::pi);
+      sum += particles.weight[i];
     }
     EXPECT_NEAR(sum, 1.0, 1e-9);
     EXPECT_GE(filter.particles().size(), 50U);
@@ -130,11 +131,8 @@ TEST(MonteCarlo, SameSeedSameBits) {
       if (k > 0) filter.move(run.step(k));
       filter.observe(run.views[k]);
     }
-    std::vector<double> values;
-    for (const Particle& p : filter.particles()) {
-      values.insert(values.end(), {p.pose.x_m, p.pose.y_m, p.pose.heading_rad, p.weight});
-    }
-    return values;
+    const Particles& held = filter.particles();
+    return std::vector{held.x_m, held.y_m, held.heading_rad, held.weight};
   };
   EXPECT_EQ(bits(3), bits(3));
   EXPECT_NE(bits(3), bits(4));
@@ -217,9 +215,7 @@ TEST(MonteCarlo, KnowsItsHeadingAndPlaceWhenTheyAreTold) {
   MonteCarloLocaliser filter =
       quick_filter(place.memory, {.least_particles = 300, .most_particles = 300});
   filter.start_anywhere(0.7);
-  for (const Particle& particle : filter.particles()) {
-    EXPECT_EQ(particle.pose.heading_rad, 0.7);
-  }
+  for (const double heading_rad : filter.particles().heading_rad) EXPECT_EQ(heading_rad, 0.7);
   filter.start_at(run.poses[0], 0.05, 0.02);
   EXPECT_EQ(filter.particles().size(), 300U);
   const MonteCarloEstimate before = filter.estimate();

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <vector>
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
@@ -14,24 +13,21 @@
 namespace panonav {
 namespace {
 
-std::vector<Particle> cloud(const Pose2& centre, double deviation_m, double deviation_rad,
-                            std::size_t count, double weight, Random& random) {
-  std::vector<Particle> particles;
+void add_cloud(const Pose2& centre, double deviation_m, double deviation_rad, std::size_t count,
+               double weight, Random& random, Particles& particles) {
   for (std::size_t i = 0; i < count; ++i) {
-    particles.push_back(
-        {{random.normal(centre.x_m, deviation_m), random.normal(centre.y_m, deviation_m),
-          wrap_angle(random.normal(centre.heading_rad, deviation_rad))},
-         weight / static_cast<double>(count)});
+    particles.add({random.normal(centre.x_m, deviation_m), random.normal(centre.y_m, deviation_m),
+                   wrap_angle(random.normal(centre.heading_rad, deviation_rad))},
+                  weight / static_cast<double>(count));
   }
-  return particles;
 }
 
 TEST(FindModes, TellsCloudsApartWithTheirMoments) {
   Random random(1);
   // The heavier one lies across the cut of the circle.
-  auto particles = cloud({3.0, -2.0, std::numbers::pi}, 0.05, 0.04, 4000, 0.7, random);
-  const auto other = cloud({7.0, 1.0, 0.5}, 0.08, 0.1, 2000, 0.3, random);
-  particles.insert(particles.end(), other.begin(), other.end());
+  Particles particles;
+  add_cloud({3.0, -2.0, std::numbers::pi}, 0.05, 0.04, 4000, 0.7, random, particles);
+  add_cloud({7.0, 1.0, 0.5}, 0.08, 0.1, 2000, 0.3, random, particles);
   const ParticleModes found = find_modes(particles, {.cell_m = 0.25, .headings = 24});
   ASSERT_EQ(found.modes.size(), 2U);
   EXPECT_NEAR(found.modes[0].weight, 0.7, 0.01);
@@ -52,19 +48,19 @@ TEST(FindModes, TellsCloudsApartWithTheirMoments) {
 
 TEST(FindModes, OppositeHeadingsAtOnePlaceAreTwoModesUnlessHeadingsDoNotCount) {
   Random random(2);
-  auto particles = cloud({0.0, 0.0, 0.0}, 0.05, 0.05, 500, 0.5, random);
-  const auto other = cloud({0.0, 0.0, 3.0}, 0.05, 0.05, 500, 0.5, random);
-  particles.insert(particles.end(), other.begin(), other.end());
+  Particles particles;
+  add_cloud({0.0, 0.0, 0.0}, 0.05, 0.05, 500, 0.5, random, particles);
+  add_cloud({0.0, 0.0, 3.0}, 0.05, 0.05, 500, 0.5, random, particles);
   EXPECT_EQ(find_modes(particles, {.cell_m = 0.25, .headings = 24}).modes.size(), 2U);
   EXPECT_EQ(find_modes(particles, {.cell_m = 0.25, .headings = 1}).modes.size(), 1U);
 }
 
 TEST(FindModes, TheCovarianceOfAStretchedCloudShowsItsDirection) {
   Random random(3);
-  std::vector<Particle> particles;
+  Particles particles;
   for (int i = 0; i < 5000; ++i) {
     const double along = 0.2 * random.normal();
-    particles.push_back({{along, 0.5 * along, 0.0}, 1.0});
+    particles.add({along, 0.5 * along, 0.0}, 1.0);
   }
   const ParticleModes found = find_modes(particles, {.cell_m = 0.5, .headings = 24});
   ASSERT_GE(found.modes.size(), 1U);
@@ -75,8 +71,9 @@ TEST(FindModes, TheCovarianceOfAStretchedCloudShowsItsDirection) {
 
 TEST(FindModes, LightModesAreNotKeptAndOccupiedBinsCountWeight) {
   Random random(4);
-  auto particles = cloud({0.0, 0.0, 0.0}, 0.01, 0.01, 100, 0.995, random);
-  particles.push_back({{5.0, 5.0, 0.0}, 0.005});
+  Particles particles;
+  add_cloud({0.0, 0.0, 0.0}, 0.01, 0.01, 100, 0.995, random, particles);
+  particles.add({5.0, 5.0, 0.0}, 0.005);
   const ParticleModes found = find_modes(particles, {.cell_m = 1.0, .headings = 24}, 0.01);
   EXPECT_EQ(found.modes.size(), 1U);
   EXPECT_EQ(found.mode_of.back(), -1);
@@ -85,7 +82,8 @@ TEST(FindModes, LightModesAreNotKeptAndOccupiedBinsCountWeight) {
 
 TEST(FindModes, NothingAndNoWeightGiveNoMode) {
   EXPECT_TRUE(find_modes({}, {}).modes.empty());
-  const std::vector<Particle> weightless(3);
+  Particles weightless;
+  weightless.resize(3);
   EXPECT_TRUE(find_modes(weightless, {}).modes.empty());
   EXPECT_EQ(spread_of({}), 0.0);
   EXPECT_THROW((void)find_modes({}, {.cell_m = 0.0}), ContractError);
@@ -93,10 +91,10 @@ TEST(FindModes, NothingAndNoWeightGiveNoMode) {
 }
 
 TEST(SpreadOf, IsTheRootMeanSquareDistanceFromTheMean) {
-  const std::vector<Particle> four{{{0.0, 0.0, 0.0}, 0.25},
-                                   {{2.0, 0.0, 0.0}, 0.25},
-                                   {{0.0, 2.0, 0.0}, 0.25},
-                                   {{2.0, 2.0, 0.0}, 0.25}};
+  const Particles four{.x_m = {0.0, 2.0, 0.0, 2.0},
+                       .y_m = {0.0, 0.0, 2.0, 2.0},
+                       .heading_rad = {0.0, 0.0, 0.0, 0.0},
+                       .weight = {0.25, 0.25, 0.25, 0.25}};
   EXPECT_NEAR(spread_of(four), std::numbers::sqrt2, 1e-12);
 }
 

@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <numbers>
-#include <vector>
 
 #include "panonav/geometry/angles.hpp"
 
@@ -17,11 +16,11 @@ TEST(MoveParticles, MovesThemAsTheSamplerOneByOne) {
     const StepSampler sampler({0.4, -0.1, 2.0}, noise);
     Random random(1);
     for (const std::size_t count : {0U, 1U, 127U, 128U, 1000U}) {
-      std::vector<Particle> particles;
+      Particles particles;
       for (std::size_t i = 0; i < count; ++i) {
-        particles.push_back({{random.uniform(-9.0, 9.0), random.uniform(-9.0, 9.0),
-                              random.uniform(-std::numbers::pi, std::numbers::pi)},
-                             0.5});
+        particles.add({random.uniform(-9.0, 9.0), random.uniform(-9.0, 9.0),
+                       random.uniform(-std::numbers::pi, std::numbers::pi)},
+                      0.5);
       }
       auto moved = particles;
       // A holonomic drive takes its two numbers for one particle after the other, too.
@@ -29,13 +28,13 @@ TEST(MoveParticles, MovesThemAsTheSamplerOneByOne) {
       Random second(count);
       move_particles(moved, sampler, first);
       for (std::size_t i = 0; i < count; ++i) {
-        const Pose2 wanted = sampler.move(particles[i].pose, second);
-        ASSERT_NEAR(moved[i].pose.x_m, wanted.x_m, 1e-6);
-        ASSERT_NEAR(moved[i].pose.y_m, wanted.y_m, 1e-6);
-        ASSERT_NEAR(angle_difference(moved[i].pose.heading_rad, wanted.heading_rad), 0.0, 1e-6);
-        ASSERT_GE(moved[i].pose.heading_rad, -std::numbers::pi);
-        ASSERT_LT(moved[i].pose.heading_rad, std::numbers::pi);
-        ASSERT_EQ(moved[i].weight, 0.5);
+        const Pose2 wanted = sampler.move(particles.pose(i), second);
+        ASSERT_NEAR(moved.x_m[i], wanted.x_m, 1e-6);
+        ASSERT_NEAR(moved.y_m[i], wanted.y_m, 1e-6);
+        ASSERT_NEAR(angle_difference(moved.heading_rad[i], wanted.heading_rad), 0.0, 1e-6);
+        ASSERT_GE(moved.heading_rad[i], -std::numbers::pi);
+        ASSERT_LT(moved.heading_rad[i], std::numbers::pi);
+        ASSERT_EQ(moved.weight[i], 0.5);
       }
       EXPECT_EQ(first.next(), second.next());
     }
@@ -44,12 +43,13 @@ TEST(MoveParticles, MovesThemAsTheSamplerOneByOne) {
 
 TEST(MoveParticles, AStepOfNoUseLeavesNumbers) {
   const OdometryNoise noise;
-  std::vector<Particle> particles(20);
+  Particles particles;
+  particles.resize(20);
   Random random(1);
   move_particles(particles, StepSampler({0.0, 0.0, 1e300}, noise), random);
-  for (const Particle& particle : particles) {
-    EXPECT_TRUE(std::isfinite(particle.pose.heading_rad));
-    EXPECT_LE(std::abs(particle.pose.heading_rad), std::numbers::pi);
+  for (const double heading_rad : particles.heading_rad) {
+    EXPECT_TRUE(std::isfinite(heading_rad));
+    EXPECT_LE(std::abs(heading_rad), std::numbers::pi);
   }
 }
 

@@ -45,20 +45,20 @@ TrackSummary summarise_track(const std::vector<TrackedImage>& images) {
   return summary;
 }
 
-std::vector<Point2> even_sample(std::span<const Particle> particles, std::size_t count) {
+std::vector<Point2> even_sample(const Particles& particles, std::size_t count) {
   std::vector<Point2> sample;
   if (particles.size() <= count) {
-    for (const Particle& particle : particles) sample.push_back(particle.pose.position());
+    for (std::size_t i = 0; i < particles.size(); ++i) sample.push_back(particles.position(i));
     return sample;
   }
   double total = 0.0;
-  for (const Particle& particle : particles) total += particle.weight;
+  for (const double weight : particles.weight) total += weight;
   double passed = 0.0;
-  for (const Particle& particle : particles) {
-    passed += particle.weight;
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    passed += particles.weight[i];
     while (sample.size() < count && (static_cast<double>(sample.size()) + 0.5) * total <
                                         passed * static_cast<double>(count)) {
-      sample.push_back(particle.pose.position());
+      sample.push_back(particles.position(i));
     }
   }
   return sample;

@@ -54,7 +54,6 @@ void track(MonteCarloLocaliser& localiser, const ViewEncoder& pipeline, const Da
            const std::function<void(TrackedImage&&)>& report);
 
 /// `count` positions drawn evenly by weight; all of them where there are fewer. No randomness.
-[[nodiscard]] std::vector<Point2> even_sample(std::span<const Particle> particles,
-                                              std::size_t count);
+[[nodiscard]] std::vector<Point2> even_sample(const Particles& particles, std::size_t count);
 
 }  // namespace panonav::command

@@ -58,7 +58,7 @@ struct MonteCarloLocaliser::Implementation {
   ViewLikelihood likelihood;
   std::optional<ReferenceAreas> areas;
   Random random;
-  std::vector<Particle> particles;
+  Particles particles;
   std::vector<double> log_ratios;  // of the particles; scratch space of `weigh`, as the next two
   std::vector<float> log_ratios_below_most;
   std::vector<float> factors;
@@ -97,7 +97,7 @@ struct MonteCarloLocaliser::Implementation {
   }
 
   // The heading that a new particle has when no compass tells it: somebody else's.
-  double borrowed_heading() { return particles[random.index(particles.size())].pose.heading_rad; }
+  double borrowed_heading() { return particles.heading_rad[random.index(particles.size())]; }
 
   void compare_views(const PackedSignature& view, bool was_localised);
   // Whether a reference stands near enough to tell anything of the place.
@@ -215,20 +215,21 @@ int MonteCarloLocaliser::Implementation::redraw_fixed(const PackedSignature& vie
     count = static_cast<std::size_t>(std::lround(options.redraw_share * static_cast<double>(size)));
   }
   for (std::size_t n = 0; n < count; ++n) {
-    Particle& particle = particles[random.index(size)];
+    const std::size_t replaced = random.index(size);
+    Pose2 pose;
     if (options.redraw == Redraw::uniform) {
       const double heading = borrowed_heading();
-      particle.pose = anywhere(options.compass ? std::nullopt : std::optional(heading));
+      pose = anywhere(options.compass ? std::nullopt : std::optional(heading));
     } else {
       const auto site = *likelihood.site_of(candidates[random.index(candidates.size())].view);
       likelihood.compare(site);
-      particle.pose = drawn_around({site, false});
+      pose = drawn_around({site, false});
     }
-    particle.weight = 1.0 / static_cast<double>(size);
+    particles.set(replaced, pose, 1.0 / static_cast<double>(size));
   }
   double sum = 0.0;
-  for (const Particle& particle : particles) sum += particle.weight;
-  for (Particle& particle : particles) particle.weight /= sum;
+  for (const double weight : particles.weight) sum += weight;
+  for (double& weight : particles.weight) weight /= sum;
   return static_cast<int>(count);
 }
 
@@ -240,7 +241,7 @@ MonteCarloLocaliser::Implementation::Weighed MonteCarloLocaliser::Implementation
                         kernels::chosen_instructions());
   Weighed weighed;
   for (std::size_t i = 0; i < particles.size(); ++i) {
-    const double weight = particles[i].weight * static_cast<double>(factors[i]);
+    const double weight = particles.weight[i] * static_cast<double>(factors[i]);
     weighed.sum += weight;
     weighed.squares += weight * weight;
   }
@@ -292,13 +293,11 @@ double MonteCarloLocaliser::Implementation::weigh() {
     const double sum =
         (stage + 1 == most_stages ? take_share(share) : take_bearable_share(share)).sum;
     if (!(sum > nothing_left)) {  // what explains the view had lost all its weight
-      for (Particle& particle : particles) {
-        particle.weight = 1.0 / static_cast<double>(particles.size());
-      }
+      std::ranges::fill(particles.weight, 1.0 / static_cast<double>(particles.size()));
       return evidence_in_full;
     }
     for (std::size_t i = 0; i < particles.size(); ++i) {
-      particles[i].weight *= static_cast<double>(factors[i]) / sum;
+      particles.weight[i] *= static_cast<double>(factors[i]) / sum;
     }
     evidence += share * most + std::log(sum);
     left -= share;
@@ -312,10 +311,7 @@ double MonteCarloLocaliser::Implementation::weigh() {
 }
 
 void MonteCarloLocaliser::Implementation::resample(std::size_t count, bool spread) {
-  std::vector<double> weights;
-  weights.reserve(particles.size());
-  for (const Particle& p : particles) weights.push_back(p.weight);
-  const auto survivors = low_variance_resample(weights, count, random);
+  const auto survivors = low_variance_resample(particles.weight, count, random);
   ParticleModes found;
   std::vector<std::size_t> members;
   if (spread) {
@@ -325,10 +321,11 @@ void MonteCarloLocaliser::Implementation::resample(std::size_t count, bool sprea
       if (found.mode_of[s] >= 0) ++members[static_cast<std::size_t>(found.mode_of[s])];
     }
   }
-  std::vector<Particle> next;
-  next.reserve(count);
-  for (const std::size_t s : survivors) {
-    Pose2 pose = particles[s].pose;
+  Particles next;
+  next.resize(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t s = survivors[i];
+    Pose2 pose = particles.pose(s);
     if (spread && found.mode_of[s] >= 0) {
       // The kernel of least mean squared error for a normal distribution in three dimensions
       // (Silverman 1986, eq. 4.14 and table 4.1: exponent 1 / (d + 4), factor (4 / (d + 2))).
@@ -342,7 +339,7 @@ void MonteCarloLocaliser::Implementation::resample(std::size_t count, bool sprea
       pose.heading_rad =
           wrap_angle(pose.heading_rad + random.normal(0.0, width * std::sqrt(mode.covariance[8])));
     }
-    next.push_back({pose, 1.0 / static_cast<double>(count)});
+    next.set(i, pose, 1.0 / static_cast<double>(count));
   }
   particles = std::move(next);
 }
@@ -351,10 +348,10 @@ void MonteCarloLocaliser::Implementation::resample(std::size_t count, bool sprea
 // earns them.
 int MonteCarloLocaliser::Implementation::redraw_explained(double log_here) {
   std::vector<Candidate> places;
-  std::vector<Particle> told;
+  Particles told;
   const auto add = [&](Candidate candidate) {
     places.push_back(candidate);
-    told.push_back({pose_told_by(candidate), 0.0});
+    told.add(pose_told_by(candidate), 0.0);
   };
   for (const std::uint32_t site : likelihood.compared_sites()) {
     add({site, false});
@@ -386,31 +383,28 @@ int MonteCarloLocaliser::Implementation::redraw_explained(double log_here) {
   const auto count =
       static_cast<std::size_t>(std::max(1L, std::lround(std::max(0.05, 0.9 * mass) * size)));
   const std::vector<std::size_t> drawn = low_variance_resample(values, count, random);
-  std::vector<Particle> fresh;
-  for (const std::size_t d : drawn) fresh.push_back({drawn_around(places[d]), 0.0});
+  Particles fresh;
+  for (const std::size_t d : drawn) fresh.add(drawn_around(places[d]), 0.0);
   std::vector<double> fresh_values(fresh.size());
   likelihood.log_ratios(fresh, fresh_values);
   double fresh_sum = 0.0;
   for (std::size_t n = 0; n < fresh.size(); ++n) {
-    fresh[n].weight = std::exp(std::max(fresh_values[n] - most, -most_against)) / values[drawn[n]];
-    fresh_sum += fresh[n].weight;
+    fresh.weight[n] = std::exp(std::max(fresh_values[n] - most, -most_against)) / values[drawn[n]];
+    fresh_sum += fresh.weight[n];
   }
   // They take the places of the lightest particles.
   std::vector<std::size_t> order(particles.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
   const auto lightest = order.begin() + static_cast<std::ptrdiff_t>(fresh.size());
   std::nth_element(order.begin(), lightest, order.end(), [&](std::size_t a, std::size_t b) {
-    return particles[a].weight != particles[b].weight ? particles[a].weight < particles[b].weight
-                                                      : a < b;
+    return std::pair(particles.weight[a], a) < std::pair(particles.weight[b], b);
   });
-  for (std::size_t n = 0; n < fresh.size(); ++n) {
-    particles[order[n]] = {fresh[n].pose, 0.0};
-  }
+  for (std::size_t n = 0; n < fresh.size(); ++n) particles.set(order[n], fresh.pose(n), 0.0);
   double kept = 0.0;
-  for (const Particle& p : particles) kept += p.weight;
-  for (Particle& p : particles) p.weight *= kept > 0.0 ? (1.0 - mass) / kept : 0.0;
+  for (const double weight : particles.weight) kept += weight;
+  for (double& weight : particles.weight) weight *= kept > 0.0 ? (1.0 - mass) / kept : 0.0;
   for (std::size_t n = 0; n < fresh.size(); ++n) {
-    particles[order[n]].weight = (kept > 0.0 ? mass : 1.0) * fresh[n].weight / fresh_sum;
+    particles.weight[order[n]] = (kept > 0.0 ? mass : 1.0) * fresh.weight[n] / fresh_sum;
   }
   return static_cast<int>(fresh.size());
 }
@@ -443,11 +437,9 @@ MonteCarloEstimate MonteCarloLocaliser::Implementation::observe(const PackedSign
 
   const ParticleModes found = find_modes(particles, bins());
   latest.particles = static_cast<int>(particles.size());
-  std::vector<double> weights;
-  for (const Particle& p : particles) weights.push_back(p.weight);
-  latest.effective_particles = effective_sample_size(weights);
+  latest.effective_particles = effective_sample_size(particles.weight);
   describe(latest, found);
-  if (latest.effective_particles < options.resample_below * static_cast<double>(weights.size())) {
+  if (latest.effective_particles < options.resample_below * static_cast<double>(particles.size())) {
     latest.resampled = true;
     resample(std::clamp(kld_sample_size(found.occupied_bins, options.kld_error),
                         static_cast<std::size_t>(options.least_particles),
@@ -500,8 +492,8 @@ MonteCarloLocaliser& MonteCarloLocaliser::operator=(MonteCarloLocaliser&&) noexc
 
 void MonteCarloLocaliser::start_anywhere(std::optional<double> heading_rad) {
   auto& own = *implementation_;
-  own.particles.clear();
   const auto count = static_cast<std::size_t>(own.options.most_particles);
+  own.particles.resize(count);
   // Spread evenly over the references: as many particles as references leave none without one.
   const std::size_t sites = own.likelihood.sites().size();
   const double first = own.random.uniform(0.0, 1.0);
@@ -509,8 +501,7 @@ void MonteCarloLocaliser::start_anywhere(std::optional<double> heading_rad) {
     const double share = (static_cast<double>(i) + first) / static_cast<double>(count);
     const auto site =
         std::min(sites - 1, static_cast<std::size_t>(share * static_cast<double>(sites)));
-    own.particles.push_back(
-        {own.anywhere_around(site, heading_rad), 1.0 / static_cast<double>(count)});
+    own.particles.set(i, own.anywhere_around(site, heading_rad), 1.0 / static_cast<double>(count));
   }
   own.inside = 0.5;
   own.knows_nothing = true;
@@ -520,13 +511,13 @@ void MonteCarloLocaliser::start_anywhere(std::optional<double> heading_rad) {
 void MonteCarloLocaliser::start_at(const Pose2& pose, double deviation_m,
                                    double heading_deviation_rad) {
   auto& own = *implementation_;
-  own.particles.clear();
   const auto count = static_cast<std::size_t>(own.options.most_particles);
+  own.particles.resize(count);
   for (std::size_t i = 0; i < count; ++i) {
     const double x = own.random.normal(pose.x_m, deviation_m);
     const double y = own.random.normal(pose.y_m, deviation_m);
     const double heading = own.random.normal(pose.heading_rad, heading_deviation_rad);
-    own.particles.push_back({{x, y, wrap_angle(heading)}, 1.0 / static_cast<double>(count)});
+    own.particles.set(i, {x, y, wrap_angle(heading)}, 1.0 / static_cast<double>(count));
   }
   own.inside = 1.0 - leaving;
   own.knows_nothing = false;
@@ -551,7 +542,7 @@ MonteCarloEstimate MonteCarloLocaliser::estimate() const {
   return estimate;
 }
 
-std::span<const Particle> MonteCarloLocaliser::particles() const noexcept {
+const Particles& MonteCarloLocaliser::particles() const noexcept {
   return implementation_->particles;
 }
 

@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <span>
 #include <string_view>
 #include <vector>
 
@@ -108,7 +107,7 @@ class MonteCarloLocaliser {
   /// What is known now, without a picture.
   [[nodiscard]] MonteCarloEstimate estimate() const;
 
-  [[nodiscard]] std::span<const Particle> particles() const noexcept;
+  [[nodiscard]] const Particles& particles() const noexcept;
   [[nodiscard]] const ObservationModel& model() const noexcept;
 
  private:

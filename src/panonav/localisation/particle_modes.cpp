@@ -29,15 +29,14 @@ struct Moments {
   std::array<double, 3> first{};
   std::array<double, 6> second{};  // xx xy xh yy yh hh
 
-  void add(const Particle& particle) {
+  void add(const Pose2& pose, double w) {
     if (!anchored) {
-      anchor = particle.pose;
+      anchor = pose;
       anchored = true;
     }
-    const double w = particle.weight;
-    const double x = particle.pose.x_m - anchor.x_m;
-    const double y = particle.pose.y_m - anchor.y_m;
-    const double h = wrap_angle(particle.pose.heading_rad - anchor.heading_rad);
+    const double x = pose.x_m - anchor.x_m;
+    const double y = pose.y_m - anchor.y_m;
+    const double h = wrap_angle(pose.heading_rad - anchor.heading_rad);
     weight += w;
     first[0] += w * x;
     first[1] += w * y;
@@ -148,8 +147,7 @@ std::int32_t bin_at(double cells) {
 
 }  // namespace
 
-ParticleModes find_modes(std::span<const Particle> particles, const PoseBins& bins,
-                         double least_weight) {
+ParticleModes find_modes(const Particles& particles, const PoseBins& bins, double least_weight) {
   require(bins.cell_m > 0.0, "side of a bin", bins.cell_m, "> 0 m");
   require(bins.headings >= 1, "sectors of the circle", bins.headings, ">= 1");
   ParticleModes result;
@@ -161,14 +159,13 @@ ParticleModes find_modes(std::span<const Particle> particles, const PoseBins& bi
   const double sectors_per_radian = bins.headings / (2.0 * std::numbers::pi);
   double sum = 0.0;
   for (std::size_t i = 0; i < particles.size(); ++i) {
-    const Pose2& pose = particles[i].pose;
-    const auto x = bin_at(pose.x_m * cells_per_metre);
-    const auto y = bin_at(pose.y_m * cells_per_metre);
-    const auto sector = bin_at((pose.heading_rad + std::numbers::pi) * sectors_per_radian);
+    const auto x = bin_at(particles.x_m[i] * cells_per_metre);
+    const auto y = bin_at(particles.y_m[i] * cells_per_metre);
+    const auto sector = bin_at((particles.heading_rad[i] + std::numbers::pi) * sectors_per_radian);
     const std::int32_t heading = std::clamp(sector, 0, bins.headings - 1);
     bin_of[i] = table.find_or_add(x, y, heading);
-    table.bins()[bin_of[i]].weight += particles[i].weight;
-    sum += particles[i].weight;
+    table.bins()[bin_of[i]].weight += particles.weight[i];
+    sum += particles.weight[i];
   }
   if (!(sum > 0.0)) return result;
 
@@ -223,7 +220,8 @@ ParticleModes find_modes(std::span<const Particle> particles, const PoseBins& bi
   for (std::size_t i = 0; i < particles.size(); ++i) {
     const int mode = cells[bin_of[i]].mode;
     result.mode_of[i] = mode;
-    if (mode >= 0) moments[static_cast<std::size_t>(mode)].add(particles[i]);
+    if (mode < 0) continue;
+    moments[static_cast<std::size_t>(mode)].add(particles.pose(i), particles.weight[i]);
   }
   for (const Moments& m : moments) {
     result.modes.push_back(m.mode());
@@ -232,21 +230,22 @@ ParticleModes find_modes(std::span<const Particle> particles, const PoseBins& bi
   return result;
 }
 
-double spread_of(std::span<const Particle> particles) {
+double spread_of(const Particles& particles) {
   if (particles.empty()) return 0.0;
   // Relative to the first, so that nothing is lost far from the origin.
-  const Point2 anchor = particles.front().pose.position();
+  const Point2 anchor = particles.position(0);
   double weight = 0.0;
   double first_x = 0.0;
   double first_y = 0.0;
   double second = 0.0;
-  for (const Particle& particle : particles) {
-    const double x = particle.pose.x_m - anchor.x_m;
-    const double y = particle.pose.y_m - anchor.y_m;
-    weight += particle.weight;
-    first_x += particle.weight * x;
-    first_y += particle.weight * y;
-    second += particle.weight * (x * x + y * y);
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    const double x = particles.x_m[i] - anchor.x_m;
+    const double y = particles.y_m[i] - anchor.y_m;
+    const double w = particles.weight[i];
+    weight += w;
+    first_x += w * x;
+    first_y += w * y;
+    second += w * (x * x + y * y);
   }
   if (!(weight > 0.0)) return 0.0;
   const double x = first_x / weight;

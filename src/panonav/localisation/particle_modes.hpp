@@ -2,17 +2,35 @@
 
 #include <array>
 #include <cstddef>
-#include <span>
 #include <vector>
 
 #include "panonav/geometry/pose2.hpp"
 
 namespace panonav {
 
-/// One hypothesis of where the robot is. Weights of all particles sum to 1.
-struct Particle {
-  Pose2 pose;
-  double weight = 0.0;
+/// Hypotheses of where the robot is, column by column as kernels take them. Invariant: columns of
+/// one size. In a filter the weights sum to 1.
+struct Particles {
+  std::vector<double> x_m, y_m, heading_rad;
+  std::vector<double> weight;
+
+  [[nodiscard]] std::size_t size() const noexcept { return weight.size(); }
+  [[nodiscard]] bool empty() const noexcept { return weight.empty(); }
+  [[nodiscard]] Point2 position(std::size_t i) const { return {x_m[i], y_m[i]}; }
+  [[nodiscard]] Pose2 pose(std::size_t i) const { return {x_m[i], y_m[i], heading_rad[i]}; }
+  void set(std::size_t i, const Pose2& pose, double its_weight) {
+    x_m[i] = pose.x_m;
+    y_m[i] = pose.y_m;
+    heading_rad[i] = pose.heading_rad;
+    weight[i] = its_weight;
+  }
+  void add(const Pose2& pose, double its_weight) {
+    resize(size() + 1);
+    set(size() - 1, pose, its_weight);
+  }
+  void resize(std::size_t count) {
+    for (auto* column : {&x_m, &y_m, &heading_rad, &weight}) column->resize(count);
+  }
 };
 
 /// Particles that lie together.
@@ -41,10 +59,10 @@ struct ParticleModes {
 /// on: a mode is a bin and the bins up to two beside it, less what was gathered before. Modes below
 /// `least_weight` of the whole are not kept. Deterministic; cost linear in particles, and in bins
 /// times modes.
-[[nodiscard]] ParticleModes find_modes(std::span<const Particle> particles, const PoseBins& bins,
+[[nodiscard]] ParticleModes find_modes(const Particles& particles, const PoseBins& bins,
                                        double least_weight = 0.01);
 
 /// Root mean square distance of the particles from their mean; 0 for none.
-[[nodiscard]] double spread_of(std::span<const Particle> particles);
+[[nodiscard]] double spread_of(const Particles& particles);
 
 }  // namespace panonav

@@ -41,7 +41,8 @@ const std::array<Direction, 256>& directions() {
     PackedSignature packed{{1, 1}, {255}, {0}};
     for (std::size_t i = 0; i < filled.size(); ++i) {
       packed.phases[0] = static_cast<std::uint8_t>(i);
-      const float phase = unpack(packed, 1.0F, std::nullopt).phases_rad()[0];
+      const FourierSignature unpacked = unpack(packed, 1.0F, std::nullopt);
+      const float phase = unpacked.phases_rad()[0];
       filled[i] = {std::cos(phase), std::sin(phase)};
     }
     return filled;

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
 
 #include "panonav/geometry/angles.hpp"
 #include "panonav/kernels/motion.hpp"
@@ -13,8 +16,8 @@ namespace {
 constexpr std::size_t most = 128;  // at a time, so that all stays in the first-level cache
 using Numbers = std::array<double, most>;
 
-void move_block(std::span<Particle> particles, const StepSampler& sampler, Random& random) {
-  const std::size_t count = particles.size();
+void move_block(const kernels::PoseColumns& poses, const StepSampler& sampler, Random& random) {
+  const std::size_t count = poses.x_m.size();
   const kernels::Instructions instructions = kernels::chosen_instructions();
   std::array<std::uint64_t, most> bits, further_bits;
   for (std::size_t i = 0; i < count; ++i) {
@@ -29,7 +32,7 @@ void move_block(std::span<Particle> particles, const StepSampler& sampler, Rando
   draw(bits, first, second);
   if (sampler.holonomic()) draw(further_bits, third, unused);
 
-  Numbers x_m, y_m, heading_rad, forward_m, left_m, turn_error_rad;
+  Numbers forward_m, left_m, turn_error_rad;
   for (std::size_t i = 0; i < count; ++i) {
     const Pose2 error =
         sampler.error_of(static_cast<double>(first[i]), static_cast<double>(second[i]),
@@ -37,27 +40,24 @@ void move_block(std::span<Particle> particles, const StepSampler& sampler, Rando
     forward_m[i] = sampler.step().x_m + error.x_m;
     left_m[i] = sampler.step().y_m + error.y_m;
     turn_error_rad[i] = error.heading_rad;
-    x_m[i] = particles[i].pose.x_m;
-    y_m[i] = particles[i].pose.y_m;
-    heading_rad[i] = particles[i].pose.heading_rad;
   }
   const auto part = [count](Numbers& numbers) { return std::span(numbers).first(count); };
-  kernels::move_poses({part(x_m), part(y_m), part(heading_rad)},
+  kernels::move_poses(poses,
                       {part(forward_m), part(left_m), part(turn_error_rad),
                        sampler.step().heading_rad, sampler.share_before()},
                       instructions);
-  for (std::size_t i = 0; i < count; ++i) {
-    particles[i].pose = {x_m[i], y_m[i], wrap_angle(heading_rad[i])};
-  }
+  for (double& heading_rad : poses.heading_rad) heading_rad = wrap_angle(heading_rad);
 }
 
 }  // namespace
 
-void move_particles(std::span<Particle> particles, const StepSampler& sampler, Random& random) {
-  while (!particles.empty()) {
-    const std::size_t count = std::min(most, particles.size());
-    move_block(particles.first(count), sampler, random);
-    particles = particles.subspan(count);
+void move_particles(Particles& particles, const StepSampler& sampler, Random& random) {
+  for (std::size_t begin = 0; begin < particles.size(); begin += most) {
+    const auto part = [begin](std::vector<double>& column) {
+      return std::span(column).subspan(begin, std::min(most, column.size() - begin));
+    };
+    move_block({part(particles.x_m), part(particles.y_m), part(particles.heading_rad)}, sampler,
+               random);
   }
 }
 

@@ -208,25 +208,24 @@ const kernels::LikenessLanes& ViewLikelihood::lanes_of(Cell& cell) {
   return lanes;
 }
 
-void ViewLikelihood::log_ratios(std::span<const Particle> particles, std::span<double> ratios) {
+void ViewLikelihood::log_ratios(const Particles& particles, std::span<double> ratios) {
   if (particles.empty()) return;
   // Particles of one cell that follow each other are handed on together.
   constexpr std::size_t most = 128;
   std::array<float, most> x_m, y_m, heading_rad, explained;
   std::size_t begin = 0;
-  auto next = cell_of(particles.front().pose.position());
+  auto next = cell_of(particles.position(0));
   while (begin < particles.size()) {
     const auto place = next;
     const Point2 centre = centre_of(place);
     std::size_t count = 0;
     do {
-      const Pose2& pose = particles[begin + count].pose;
-      x_m[count] = static_cast<float>(pose.x_m - centre.x_m);
-      y_m[count] = static_cast<float>(pose.y_m - centre.y_m);
-      heading_rad[count] = static_cast<float>(pose.heading_rad);
+      x_m[count] = static_cast<float>(particles.x_m[begin + count] - centre.x_m);
+      y_m[count] = static_cast<float>(particles.y_m[begin + count] - centre.y_m);
+      heading_rad[count] = static_cast<float>(particles.heading_rad[begin + count]);
       ++count;
       if (begin + count == particles.size()) break;
-      next = cell_of(particles[begin + count].pose.position());
+      next = cell_of(particles.position(begin + count));
     } while (count < most && next == place);
     if (const auto cell = cell_at(place.first, place.second)) {
       kernels::explain_likeness(lanes_of(table_[*cell]), fall_, std::span(x_m).first(count),
@@ -242,13 +241,6 @@ void ViewLikelihood::log_ratios(std::span<const Particle> particles, std::span<d
   }
 }
 
-double ViewLikelihood::log_ratio(const Pose2& pose) {
-  const Particle particle{pose, 1.0};
-  double ratio = 0.0;
-  log_ratios({&particle, 1}, {&ratio, 1});
-  return ratio;
-}
-
 std::span<const std::uint32_t> ViewLikelihood::sites_near(Point2 position) const noexcept {
   const auto [x, y] = cell_of(position);
   const auto cell = cell_at(x, y);
@@ -256,13 +248,13 @@ std::span<const std::uint32_t> ViewLikelihood::sites_near(Point2 position) const
   return std::span(near_).subspan(table_[*cell].begin, table_[*cell].end - table_[*cell].begin);
 }
 
-void ViewLikelihood::group(std::span<const Particle> particles) {
+void ViewLikelihood::group(const Particles& particles) {
   groups_.clear();
   group_of_.resize(particles.size());
   std::pair<std::int32_t, std::int32_t> last;
   std::uint32_t at = 0;
   for (std::size_t i = 0; i < particles.size(); ++i) {
-    const auto place = cell_of(particles[i].pose.position());
+    const auto place = cell_of(particles.position(i));
     if (i == 0 || place != last) {
       last = place;
       const auto none = static_cast<std::uint32_t>(table_.size());
@@ -275,11 +267,11 @@ void ViewLikelihood::group(std::span<const Particle> particles) {
     }
     group_of_[i] = at;
     ++groups_[at].count;
-    groups_[at].weight += particles[i].weight;
+    groups_[at].weight += particles.weight[i];
   }
 }
 
-void ViewLikelihood::arrange(std::vector<Particle>& particles) {
+void ViewLikelihood::arrange(Particles& particles) {
   group(particles);
   std::uint32_t begin = 0;
   for (Group& group : groups_) {
@@ -289,12 +281,12 @@ void ViewLikelihood::arrange(std::vector<Particle>& particles) {
   }
   arranged_.resize(particles.size());
   for (std::size_t i = 0; i < particles.size(); ++i) {
-    arranged_[groups_[group_of_[i]].count++] = particles[i];
+    arranged_.set(groups_[group_of_[i]].count++, particles.pose(i), particles.weight[i]);
   }
-  particles.swap(arranged_);
+  std::swap(particles, arranged_);
 }
 
-std::vector<std::uint32_t> ViewLikelihood::sites_near_most(std::span<const Particle> particles,
+std::vector<std::uint32_t> ViewLikelihood::sites_near_most(const Particles& particles,
                                                            std::size_t most, double least) {
   group(particles);
   std::vector<double> mass(sites_.size());

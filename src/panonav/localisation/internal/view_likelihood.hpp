@@ -53,17 +53,16 @@ class ViewLikelihood {
 
   /// Log-likelihood of the view at each pose, over that of a view which no reference there
   /// explains; >= 0. Cost: 15 ns a pose where those of one cell follow each other (`arrange`).
-  void log_ratios(std::span<const Particle> particles, std::span<double> ratios);
-  [[nodiscard]] double log_ratio(const Pose2& pose);
+  void log_ratios(const Particles& particles, std::span<double> ratios);
   /// Changes the order of particles so that those of one cell follow each other. Cost: 10 ns each.
-  void arrange(std::vector<Particle>& particles);
+  void arrange(Particles& particles);
 
   [[nodiscard]] std::span<const Site> sites() const noexcept { return sites_; }
   /// Nearest sites of a place, 12 at most; empty far from all references.
   [[nodiscard]] std::span<const std::uint32_t> sites_near(Point2 position) const noexcept;
   /// The sites near most of the particles' weight, heaviest first: those with at least `least` of
   /// it around them, `most` at most.
-  [[nodiscard]] std::vector<std::uint32_t> sites_near_most(std::span<const Particle> particles,
+  [[nodiscard]] std::vector<std::uint32_t> sites_near_most(const Particles& particles,
                                                            std::size_t most, double least);
   [[nodiscard]] std::optional<std::uint32_t> site_of(ViewId view) const noexcept;
   /// Compared with the view so far, in the order of comparison.
@@ -86,7 +85,7 @@ class ViewLikelihood {
   };
   void index_sites();
   /// Fills `groups_`, in the order of their first particles, and `group_of_`.
-  void group(std::span<const Particle> particles);
+  void group(const Particles& particles);
   /// Index in `table_`; empty where no reference is near.
   [[nodiscard]] std::optional<std::uint32_t> cell_at(std::int32_t x, std::int32_t y) const noexcept;
   [[nodiscard]] std::pair<std::int32_t, std::int32_t> cell_of(Point2 position) const noexcept;
@@ -106,7 +105,7 @@ class ViewLikelihood {
   std::vector<Group> groups_;
   std::vector<std::uint32_t> group_of_;       ///< each particle
   std::vector<std::uint32_t> group_of_cell_;  ///< right only where the group is of the cell
-  std::vector<Particle> arranged_;
+  Particles arranged_;
   std::uint32_t revision_ = 1;
   std::vector<std::uint32_t> compared_sites_;
   std::optional<ColumnProfiles> asked_;
