@@ -7,6 +7,7 @@
 #include <queue>
 #include <utility>
 
+#include "panonav/core/disjoint_sets.hpp"
 #include "panonav/core/error.hpp"
 
 namespace panonav {
@@ -30,26 +31,15 @@ LatticeGraph::LatticeGraph(std::size_t nodes, std::span<const GraphEdge> edges)
 }
 
 std::vector<std::size_t> LatticeGraph::parts() const {
-  constexpr auto kNone = std::numeric_limits<std::size_t>::max();
-  std::vector<std::size_t> found(size(), kNone);
+  DisjointSets sets(size());
+  for (std::size_t node = 0; node < size(); ++node) {
+    for (const Neighbour& neighbour : neighbours(node)) sets.join(node, neighbour.node);
+  }
+  std::vector<std::size_t> found = sets.numbered();
   std::vector<std::size_t> sizes;
-  std::vector<std::size_t> open;
-  for (std::size_t first = 0; first < size(); ++first) {
-    if (found[first] != kNone) continue;
-    const std::size_t part = sizes.size();
-    sizes.push_back(0);
-    open.assign(1, first);
-    found[first] = part;
-    while (!open.empty()) {
-      const std::size_t node = open.back();
-      open.pop_back();
-      ++sizes[part];
-      for (const Neighbour& neighbour : neighbours(node)) {
-        if (found[neighbour.node] != kNone) continue;
-        found[neighbour.node] = part;
-        open.push_back(neighbour.node);
-      }
-    }
+  for (const std::size_t part : found) {
+    sizes.resize(std::max(sizes.size(), part + 1));
+    ++sizes[part];
   }
   std::vector<std::size_t> order(sizes.size());
   std::iota(order.begin(), order.end(), 0U);

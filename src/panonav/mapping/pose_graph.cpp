@@ -9,6 +9,7 @@
 #include <limits>
 #include <string>
 
+#include "panonav/core/disjoint_sets.hpp"
 #include "panonav/core/error.hpp"
 
 namespace panonav {
@@ -258,24 +259,9 @@ PoseGraphReport optimise_pose_graph(std::span<Pose2> nodes, std::span<const Pose
 }
 
 std::vector<std::size_t> connected_parts(std::size_t nodes, std::span<const PoseEdge> edges) {
-  std::vector<std::size_t> root(nodes);
-  for (std::size_t i = 0; i < nodes; ++i) root[i] = i;
-  const auto find = [&](std::size_t i) {
-    while (root[i] != i) i = root[i] = root[root[i]];
-    return i;
-  };
-  for (const PoseEdge& edge : edges) {
-    const std::size_t a = find(edge.a);
-    const std::size_t b = find(edge.b);
-    root[std::max(a, b)] = std::min(a, b);
-  }
-  std::vector<std::size_t> part(nodes);
-  std::size_t next = 0;
-  for (std::size_t i = 0; i < nodes; ++i) {
-    const std::size_t first = find(i);
-    part[i] = first == i ? next++ : part[first];
-  }
-  return part;
+  DisjointSets sets(nodes);
+  for (const PoseEdge& edge : edges) sets.join(edge.a, edge.b);
+  return sets.numbered();
 }
 
 double edge_tension(const PoseEdge& edge, std::span<const Pose2> nodes) {

@@ -10,6 +10,7 @@
 #include <tuple>
 #include <utility>
 
+#include "panonav/core/disjoint_sets.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
@@ -517,18 +518,11 @@ std::vector<Passage> passages_of(const std::vector<ViewId>& views, std::vector<S
   std::ranges::stable_sort(candidates, {}, [](const Candidate& candidate) {
     return std::pair(candidate.joins_only, candidate.far);
   });
-  std::vector<std::size_t> group(views.size());
-  std::iota(group.begin(), group.end(), std::size_t{0});
-  const auto group_of = [&](std::size_t node) {
-    while (group[node] != node) node = group[node] = group[group[node]];
-    return node;
-  };
+  DisjointSets groups(views.size());
   std::vector<Passage> kept;
   for (const Candidate& candidate : candidates) {
-    const std::size_t a = group_of(candidate.ends.a);
-    const std::size_t b = group_of(candidate.ends.b);
-    group[std::max(a, b)] = std::min(a, b);
-    if (!candidate.joins_only || a != b) kept.push_back(candidate.passage);
+    const bool joins = groups.join(candidate.ends.a, candidate.ends.b);
+    if (joins || !candidate.joins_only) kept.push_back(candidate.passage);
   }
   complete_lengths(kept);
   return kept;
