@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <numbers>
 #include <optional>
+#include <span>
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/localisation/internal/cell_table.hpp"
 
 namespace panonav {
 
@@ -16,7 +18,8 @@ namespace {
 constexpr int reach = 2;  // bins beside the heaviest one
 
 struct Bin {
-  std::int32_t x, y, heading;
+  GridCell place;
+  std::int32_t heading;
   double weight;
   int mode;
 };
@@ -70,68 +73,37 @@ struct Moments {
   }
 };
 
-/// Bins by their place; open addressing by their cell, because it is asked for each particle.
+/// Bins by their place: a cell and a sector of headings.
 class BinTable {
  public:
-  explicit BinTable(int headings)
-      : headings_(static_cast<std::size_t>(headings)), slots_(64, none) {}
+  explicit BinTable(int headings) : headings_(static_cast<std::size_t>(headings)) {}
 
   [[nodiscard]] std::span<Bin> bins() { return bins_; }
-  [[nodiscard]] std::optional<std::uint32_t> find(std::int32_t x, std::int32_t y,
-                                                  std::int32_t heading) const {
-    const std::uint32_t cell = slots_[slot_of(x, y)];
-    if (cell == none) return std::nullopt;
-    const std::uint32_t bin = bin_of_[cell * headings_ + static_cast<std::size_t>(heading)];
+  [[nodiscard]] std::optional<std::uint32_t> find(GridCell place, std::int32_t heading) const {
+    const auto cell = cells_.find(place);
+    if (!cell) return std::nullopt;
+    const std::uint32_t bin = bin_of_[*cell * headings_ + static_cast<std::size_t>(heading)];
     return bin == none ? std::nullopt : std::optional(bin);
   }
-  std::uint32_t find_or_add(std::int32_t x, std::int32_t y, std::int32_t heading) {
+  std::uint32_t find_or_add(GridCell place, std::int32_t heading) {
     // Mostly it is the cell of the particle before.
-    if (cells_.empty() || cells_[last_].x != x || cells_[last_].y != y) {
-      last_ = cell_with(x, y);
+    if (cells_.size() == 0 || cells_[last_] != place) {
+      last_ = cells_.number_of(place);
+      bin_of_.resize(cells_.size() * headings_, none);
     }
     std::uint32_t& bin = bin_of_[last_ * headings_ + static_cast<std::size_t>(heading)];
     if (bin == none) {
       bin = static_cast<std::uint32_t>(bins_.size());
-      bins_.push_back({x, y, heading, 0.0, -1});
+      bins_.push_back({place, heading, 0.0, -1});
     }
     return bin;
   }
 
  private:
   static constexpr std::uint32_t none = 0xFFFFFFFF;
-  struct Cell {
-    std::int32_t x, y;
-  };
-  [[nodiscard]] std::size_t slot_of(std::int32_t x, std::int32_t y) const {
-    std::uint64_t hash = static_cast<std::uint32_t>(x) * 0x9E3779B97F4A7C15ULL;
-    hash = (hash ^ static_cast<std::uint32_t>(y)) * 0xBF58476D1CE4E5B9ULL;
-    std::size_t slot = (hash >> 32U) & (slots_.size() - 1);
-    while (slots_[slot] != none) {
-      const Cell& cell = cells_[slots_[slot]];
-      if (cell.x == x && cell.y == y) break;
-      slot = (slot + 1) & (slots_.size() - 1);
-    }
-    return slot;
-  }
-  std::uint32_t cell_with(std::int32_t x, std::int32_t y) {
-    const std::size_t slot = slot_of(x, y);
-    if (slots_[slot] != none) return slots_[slot];
-    const auto added = static_cast<std::uint32_t>(cells_.size());
-    slots_[slot] = added;
-    cells_.push_back({x, y});
-    bin_of_.resize(bin_of_.size() + headings_, none);
-    if (2 * cells_.size() > slots_.size()) {
-      slots_.assign(2 * slots_.size(), none);
-      for (std::uint32_t c = 0; c < cells_.size(); ++c) {
-        slots_[slot_of(cells_[c].x, cells_[c].y)] = c;
-      }
-    }
-    return added;
-  }
 
   std::size_t headings_;
-  std::vector<std::uint32_t> slots_;  ///< cells; a power of two, half of them empty
-  std::vector<Cell> cells_;
+  CellTable cells_;
   std::vector<std::uint32_t> bin_of_;  ///< each heading of each cell
   std::vector<Bin> bins_;
   std::uint32_t last_ = 0;
@@ -139,10 +111,7 @@ class BinTable {
 
 // Particles beyond any map, or at no number, share the outermost bin.
 std::int32_t bin_at(double cells) {
-  constexpr double most = 1e9;
-  const double far = cells < most ? (cells > -most ? cells : -most) : most;
-  const auto towards_zero = static_cast<std::int32_t>(far);  // faster than floor
-  return towards_zero - (static_cast<double>(towards_zero) > far ? 1 : 0);
+  return cell_index(cells, 1e9);
 }
 
 }  // namespace
@@ -159,11 +128,11 @@ ParticleModes find_modes(const Particles& particles, const PoseBins& bins, doubl
   const double sectors_per_radian = bins.headings / (2.0 * std::numbers::pi);
   double sum = 0.0;
   for (std::size_t i = 0; i < particles.size(); ++i) {
-    const auto x = bin_at(particles.x_m[i] * cells_per_metre);
-    const auto y = bin_at(particles.y_m[i] * cells_per_metre);
+    const GridCell place{bin_at(particles.x_m[i] * cells_per_metre),
+                         bin_at(particles.y_m[i] * cells_per_metre)};
     const auto sector = bin_at((particles.heading_rad[i] + std::numbers::pi) * sectors_per_radian);
     const std::int32_t heading = std::clamp(sector, 0, bins.headings - 1);
-    bin_of[i] = table.find_or_add(x, y, heading);
+    bin_of[i] = table.find_or_add(place, heading);
     table.bins()[bin_of[i]].weight += particles.weight[i];
     sum += particles.weight[i];
   }
@@ -192,7 +161,8 @@ ParticleModes find_modes(const Particles& particles, const PoseBins& bins, doubl
       for (std::int32_t dy = -reach; dy <= reach; ++dy) {
         for (std::int32_t dh = -turn_reach; dh <= turn_reach; ++dh) {
           const std::int32_t heading = (cells[seed].heading + dh + bins.headings) % bins.headings;
-          const auto found = table.find(cells[seed].x + dx, cells[seed].y + dy, heading);
+          const GridCell beside{cells[seed].place.x + dx, cells[seed].place.y + dy};
+          const auto found = table.find(beside, heading);
           if (!found || cells[*found].mode >= 0) continue;
           cells[*found].mode = modes;
           weight += cells[*found].weight;

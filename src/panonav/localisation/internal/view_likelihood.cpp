@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -18,13 +17,6 @@ constexpr double near_spacings = 2.0;  // beyond the border of the references to
 
 // Mean distance of a place in a square of a grid from the nearest corner.
 constexpr double nearest_spacings = 0.3826;
-
-std::uint32_t hash_of(std::int32_t x, std::int32_t y) {
-  auto h = static_cast<std::uint64_t>(static_cast<std::uint32_t>(x)) << 32U |
-           static_cast<std::uint32_t>(y);
-  h *= 0x9E3779B97F4A7C15ULL;
-  return static_cast<std::uint32_t>(h >> 32U);
-}
 
 constexpr std::size_t most_near = 12;  // a grid's square and the ring around it
 constexpr auto lanes_of_all = static_cast<std::size_t>(kernels::likeness_lanes);
@@ -75,51 +67,30 @@ void ViewLikelihood::index_sites() {
     }
   }
   std::ranges::sort(entries);
-  std::vector<Cell> cells;
   for (std::size_t i = 0; i < entries.size();) {
-    const auto [x, y, d, s] = entries[i];
-    Cell cell{x, y, static_cast<std::uint32_t>(near_.size()), 0, 0, 0};
+    const GridCell place{std::get<0>(entries[i]), std::get<1>(entries[i])};
+    Cell cell{place, static_cast<std::uint32_t>(near_.size()), 0, 0, 0};
     std::size_t taken = 0;
-    for (; i < entries.size() && std::get<0>(entries[i]) == x && std::get<1>(entries[i]) == y;
+    for (; i < entries.size() && std::get<0>(entries[i]) == place.x &&
+           std::get<1>(entries[i]) == place.y;
          ++i) {
       if (taken++ < most_near) near_.push_back(std::get<3>(entries[i]));
     }
     cell.end = static_cast<std::uint32_t>(near_.size());
-    cells.push_back(cell);
+    table_.number_of(place);
+    cells_.push_back(cell);
   }
-  table_.assign(std::bit_ceil(2 * cells.size() + 1), Cell{0, 0, 0, 0, 0, 0});
-  const auto last = static_cast<std::uint32_t>(table_.size() - 1);
-  for (const Cell& cell : cells) {
-    std::uint32_t at = hash_of(cell.x, cell.y) & last;
-    while (table_[at].end != 0) at = (at + 1) & last;
-    table_[at] = cell;
-  }
-  group_of_cell_.assign(table_.size() + 1, 0);
+  group_of_cell_.assign(cells_.size() + 1, 0);
 }
 
-std::optional<std::uint32_t> ViewLikelihood::cell_at(std::int32_t x,
-                                                     std::int32_t y) const noexcept {
-  const auto last = static_cast<std::uint32_t>(table_.size() - 1);
-  for (std::uint32_t at = hash_of(x, y) & last; table_[at].end != 0; at = (at + 1) & last) {
-    if (table_[at].x == x && table_[at].y == y) return at;
-  }
-  return std::nullopt;
+GridCell ViewLikelihood::cell_of(Point2 position) const noexcept {
+  constexpr double limit = 2e9;  // farther than any memory reaches all places are alike
+  return {cell_index(position.x_m * cells_per_metre_, limit),
+          cell_index(position.y_m * cells_per_metre_, limit)};
 }
 
-std::pair<std::int32_t, std::int32_t> ViewLikelihood::cell_of(Point2 position) const noexcept {
-  // Farther than any memory reaches all places are alike.
-  constexpr double limit = 2e9;
-  const auto index = [&](double value) {
-    const double far = value * cells_per_metre_;
-    const double cells = far < limit ? (far > -limit ? far : -limit) : limit;
-    const auto towards_zero = static_cast<std::int32_t>(cells);  // faster than floor
-    return towards_zero - (static_cast<double>(towards_zero) > cells ? 1 : 0);
-  };
-  return {index(position.x_m), index(position.y_m)};
-}
-
-Point2 ViewLikelihood::centre_of(std::pair<std::int32_t, std::int32_t> cell) const noexcept {
-  return {(cell.first + 0.5) * cell_m_, (cell.second + 0.5) * cell_m_};
+Point2 ViewLikelihood::centre_of(GridCell cell) const noexcept {
+  return {(cell.x + 0.5) * cell_m_, (cell.y + 0.5) * cell_m_};
 }
 
 void ViewLikelihood::begin(const PackedSignature& view) {
@@ -190,7 +161,7 @@ const kernels::LikenessLanes& ViewLikelihood::lanes_of(Cell& cell) {
     lanes.log_likeness[i] = lanes.other_log_likeness[i] = -std::numeric_limits<float>::infinity();
   }
   // Small numbers, wherever on Earth the origin is.
-  const Point2 centre = centre_of({cell.x, cell.y});
+  const Point2 centre = centre_of(cell.place);
   const auto per_square_turn =
       static_cast<float>(-0.5 / (model_.heading_width_rad * model_.heading_width_rad));
   for (std::size_t i = 0; i < cell.end - cell.begin; ++i) {
@@ -227,8 +198,8 @@ void ViewLikelihood::log_ratios(const Particles& particles, std::span<double> ra
       if (begin + count == particles.size()) break;
       next = cell_of(particles.position(begin + count));
     } while (count < most && next == place);
-    if (const auto cell = cell_at(place.first, place.second)) {
-      kernels::explain_likeness(lanes_of(table_[*cell]), fall_, std::span(x_m).first(count),
+    if (const auto cell = table_.find(place)) {
+      kernels::explain_likeness(lanes_of(cells_[*cell]), fall_, std::span(x_m).first(count),
                                 std::span(y_m).first(count), std::span(heading_rad).first(count),
                                 std::span(explained).first(count), kernels::chosen_instructions());
     } else {
@@ -242,23 +213,22 @@ void ViewLikelihood::log_ratios(const Particles& particles, std::span<double> ra
 }
 
 std::span<const std::uint32_t> ViewLikelihood::sites_near(Point2 position) const noexcept {
-  const auto [x, y] = cell_of(position);
-  const auto cell = cell_at(x, y);
+  const auto cell = table_.find(cell_of(position));
   if (!cell) return {};
-  return std::span(near_).subspan(table_[*cell].begin, table_[*cell].end - table_[*cell].begin);
+  return std::span(near_).subspan(cells_[*cell].begin, cells_[*cell].end - cells_[*cell].begin);
 }
 
 void ViewLikelihood::group(const Particles& particles) {
   groups_.clear();
   group_of_.resize(particles.size());
-  std::pair<std::int32_t, std::int32_t> last;
+  GridCell last;
   std::uint32_t at = 0;
   for (std::size_t i = 0; i < particles.size(); ++i) {
-    const auto place = cell_of(particles.position(i));
+    const GridCell place = cell_of(particles.position(i));
     if (i == 0 || place != last) {
       last = place;
-      const auto none = static_cast<std::uint32_t>(table_.size());
-      const std::uint32_t cell = cell_at(place.first, place.second).value_or(none);
+      const auto none = static_cast<std::uint32_t>(cells_.size());
+      const std::uint32_t cell = table_.find(place).value_or(none);
       at = group_of_cell_[cell];
       if (at >= groups_.size() || groups_[at].cell != cell) {
         at = group_of_cell_[cell] = static_cast<std::uint32_t>(groups_.size());
@@ -292,8 +262,8 @@ std::vector<std::uint32_t> ViewLikelihood::sites_near_most(const Particles& part
   std::vector<double> mass(sites_.size());
   std::vector<std::uint32_t> found;
   for (const Group& group : groups_) {
-    if (group.cell == table_.size()) continue;
-    const Cell& cell = table_[group.cell];
+    if (group.cell == cells_.size()) continue;
+    const Cell& cell = cells_[group.cell];
     for (std::uint32_t i = cell.begin; i < cell.end; ++i) {
       if (mass[near_[i]] == 0.0) found.push_back(near_[i]);
       mass[near_[i]] += group.weight;

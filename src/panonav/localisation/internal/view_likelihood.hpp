@@ -3,11 +3,11 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "panonav/kernels/likeness.hpp"
 #include "panonav/localisation/column_ranking.hpp"
+#include "panonav/localisation/internal/cell_table.hpp"
 #include "panonav/localisation/observation_model.hpp"
 #include "panonav/localisation/particle_modes.hpp"
 #include "panonav/memory/visual_memory.hpp"
@@ -71,25 +71,24 @@ class ViewLikelihood {
   }
 
  private:
+  /// What is near a cell.
   struct Cell {
-    std::int32_t x, y;
+    GridCell place;
     std::uint32_t begin, end;      ///< in `near_`
     std::uint32_t lanes_revision;  ///< of the comparisons that `lanes` tells
     std::uint32_t lanes;
   };
   /// Particles of one cell; all that are in no cell are a group too.
   struct Group {
-    std::uint32_t cell;  ///< in `table_`; its size for no cell
+    std::uint32_t cell;  ///< in `cells_`; their number for no cell
     std::uint32_t count;
     double weight;
   };
   void index_sites();
   /// Fills `groups_`, in the order of their first particles, and `group_of_`.
   void group(const Particles& particles);
-  /// Index in `table_`; empty where no reference is near.
-  [[nodiscard]] std::optional<std::uint32_t> cell_at(std::int32_t x, std::int32_t y) const noexcept;
-  [[nodiscard]] std::pair<std::int32_t, std::int32_t> cell_of(Point2 position) const noexcept;
-  [[nodiscard]] Point2 centre_of(std::pair<std::int32_t, std::int32_t> cell) const noexcept;
+  [[nodiscard]] GridCell cell_of(Point2 position) const noexcept;
+  [[nodiscard]] Point2 centre_of(GridCell cell) const noexcept;
   [[nodiscard]] const kernels::LikenessLanes& lanes_of(Cell& cell);
 
   const ColumnRanking* ranking_;
@@ -99,7 +98,8 @@ class ViewLikelihood {
   std::vector<double> differences_;
   std::vector<ColumnProfiles> profiles_;
   std::vector<ViewId> views_;  ///< of the sites, ascending
-  std::vector<Cell> table_;    ///< open addressing, a power of two
+  CellTable table_;            ///< of the cells with references near
+  std::vector<Cell> cells_;    ///< as `table_` numbers them
   std::vector<std::uint32_t> near_;
   std::vector<kernels::LikenessLanes> lanes_;  ///< of cells asked for since the last comparison
   std::vector<Group> groups_;
