@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <numbers>
 
+#include "panonav/signature/turn_rules.hpp"
+
 namespace panonav {
 
 namespace {
@@ -12,36 +14,17 @@ namespace {
 constexpr float pi = std::numbers::pi_v<float>;
 constexpr int most_points = 512;  // 8 for each of 62 frequencies, rounded up to a power of two
 
-struct Point {
-  float value, slope, curvature;
-};
-
-Point evaluate(const TurnCorrelation& correlation, float turn_rad) noexcept {
-  const float step_real = std::cos(turn_rad);
-  const float step_imaginary = -std::sin(turn_rad);
-  float real = 1.0F;
-  float imaginary = 0.0F;
-  Point point{0.0F, 0.0F, 0.0F};
-  for (int k = 1; k <= correlation.highest; ++k) {
-    const float next = real * step_real - imaginary * step_imaginary;
-    imaginary = real * step_imaginary + imaginary * step_real;
-    real = next;
-    const auto i = static_cast<std::size_t>(k);
-    const float cosine = correlation.real[i] * real - correlation.imaginary[i] * imaginary;
-    const float sine = correlation.real[i] * imaginary + correlation.imaginary[i] * real;
-    const auto frequency = static_cast<float>(k);
-    point.value += cosine;
-    point.slope += frequency * sine;
-    point.curvature -= frequency * frequency * cosine;
-  }
-  return point;
+CorrelationPoint<float> evaluate(const TurnCorrelation& correlation, float turn_rad) noexcept {
+  const std::size_t size = static_cast<std::size_t>(correlation.highest) + 1;
+  return correlation_at<float>(std::span(correlation.real).first(size),
+                               std::span(correlation.imaginary).first(size), turn_rad);
 }
 
 // From a point of the grid to the maximum beside it.
 float refine(const TurnCorrelation& correlation, float turn_rad, float half_step_rad) noexcept {
   float turn = turn_rad;
   for (int i = 0; i < 3; ++i) {
-    const Point point = evaluate(correlation, turn);
+    const auto point = evaluate(correlation, turn);
     if (!(point.curvature < 0.0F)) break;
     const float next = std::clamp(turn - point.slope / point.curvature,
                                   turn_rad - 2.0F * half_step_rad, turn_rad + 2.0F * half_step_rad);
@@ -78,7 +61,6 @@ float TurnCorrelation::at(float turn_rad) const noexcept {
 float sequential_turn(const TurnCorrelation& correlation) noexcept {
   std::array<float, TurnCorrelation::most_frequencies + 1> differences{};
   std::array<float, TurnCorrelation::most_frequencies + 1> weights{};
-  float all = 0.0F;
   for (int k = 1; k <= correlation.highest; ++k) {
     const auto i = static_cast<std::size_t>(k);
     differences[i] = std::atan2(correlation.imaginary[i], correlation.real[i]);
@@ -86,26 +68,10 @@ float sequential_turn(const TurnCorrelation& correlation) noexcept {
     weights[i] = frequency * frequency *
                  std::sqrt(correlation.real[i] * correlation.real[i] +
                            correlation.imaginary[i] * correlation.imaginary[i]);
-    all += weights[i];
   }
-  const auto refined_from = [&](float first_rad) {
-    float turn = first_rad;
-    float sum = weights[1];
-    for (int k = 2; k <= correlation.highest; ++k) {
-      const auto i = static_cast<std::size_t>(k);
-      if (!(weights[i] > 0.0F)) continue;
-      const auto frequency = static_cast<float>(k);
-      const float turns = std::nearbyint((frequency * turn - differences[i]) / (2.0F * pi));
-      const float told = (differences[i] + 2.0F * pi * turns) / frequency;
-      turn = (sum * turn + weights[i] * told) / (sum + weights[i]);
-      sum += weights[i];
-    }
-    return turn;
-  };
-  const float first = refined_from(differences[1]);
-  if (weights[1] >= 0.1F * all / static_cast<float>(correlation.highest)) return first;
-  const float opposite = refined_from(differences[1] + pi);
-  return correlation.at(opposite) > correlation.at(first) ? opposite : first;
+  const std::size_t size = static_cast<std::size_t>(correlation.highest) + 1;
+  return sequential_turn<float>(std::span(differences).first(size), std::span(weights).first(size),
+                                [&](float turn_rad) { return correlation.at(turn_rad); });
 }
 
 int highest_turns(const TurnCorrelation& correlation, std::span<float> turns,

@@ -27,9 +27,7 @@ struct TurnWindow {
   }
 };
 
-/// The heading of S06's sequential rule [S06 eq. 40-43, sign of eq. 41 corrected; with the second
-/// start at the opposite heading where the first weight is below a tenth of the mean]. In radians,
-/// not wrapped.
+/// The heading of S06's sequential rule (turn_rules.hpp). In radians, not wrapped.
 [[nodiscard]] float sequential_turn(const TurnCorrelation& correlation) noexcept;
 
 /// Fills `turns` with the headings of the highest local maxima within the window, highest first,

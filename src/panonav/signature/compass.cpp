@@ -12,6 +12,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/signature/turn_rules.hpp"
 
 namespace panonav {
 
@@ -19,12 +20,15 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 
-/// C(sigma) = Re sum_k terms[k] exp(-j k sigma), k = 1 .. terms.size() - 1; terms[0] is 0.
+/// The terms of C(sigma) (`CorrelationPoint`); entry 0 is 0.
 struct CrossSpectrum {
-  std::vector<std::complex<double>> terms;
+  std::vector<double> real, imaginary;
   double norm = 0.0;  ///< the correlation of a view with itself, geometric mean of both views
 
-  [[nodiscard]] int highest() const { return static_cast<int>(terms.size()) - 1; }
+  explicit CrossSpectrum(int components)
+      : real(static_cast<std::size_t>(components)), imaginary(real.size()) {}
+  [[nodiscard]] int highest() const { return static_cast<int>(real.size()) - 1; }
+  [[nodiscard]] std::complex<double> term(int k) const { return {real[k], imaginary[k]}; }
 };
 
 int components_used(SignatureShape query, SignatureShape reference, int components) {
@@ -59,8 +63,7 @@ std::optional<CrossSpectrum> cross_spectrum(const FourierSignature& query,
                                             const CompassOptions& options) {
   const int components = components_used(query.shape(), reference.shape(), options.components);
   const auto rows = static_cast<std::size_t>(query.rows());
-  CrossSpectrum spectrum;
-  spectrum.terms.resize(static_cast<std::size_t>(components));
+  CrossSpectrum spectrum(components);
   std::vector<float> cosines(rows);
   std::vector<float> sines(rows);
   double query_energy = 0.0;
@@ -84,7 +87,8 @@ std::optional<CrossSpectrum> cross_spectrum(const FourierSignature& query,
       query_energy += static_cast<double>(query_magnitudes[y]) * query_magnitudes[y];
       reference_energy += static_cast<double>(reference_magnitudes[y]) * reference_magnitudes[y];
     }
-    spectrum.terms[k] = {real, imaginary};
+    spectrum.real[k] = real;
+    spectrum.imaginary[k] = imaginary;
   }
   // Views are of the order of 1, so a transform in single precision leaves less than this of
   // nothing.
@@ -118,8 +122,7 @@ std::optional<CrossSpectrum> cross_spectrum(const PackedSignature& query,
     return table;
   }();
   const auto rows = static_cast<std::size_t>(query.shape.rows);
-  CrossSpectrum spectrum;
-  spectrum.terms.resize(static_cast<std::size_t>(components));
+  CrossSpectrum spectrum(components);
   std::uint64_t query_energy = 0;
   std::uint64_t reference_energy = 0;
   for (int k = 1; k < components; ++k) {
@@ -134,8 +137,8 @@ std::optional<CrossSpectrum> cross_spectrum(const PackedSignature& query,
       query_energy += static_cast<std::uint64_t>(a * a);
       reference_energy += static_cast<std::uint64_t>(b * b);
     }
-    spectrum.terms[k] = {static_cast<double>(real) / 16384.0,
-                         static_cast<double>(imaginary) / 16384.0};
+    spectrum.real[k] = static_cast<double>(real) / 16384.0;
+    spectrum.imaginary[k] = static_cast<double>(imaginary) / 16384.0;
   }
   if (query_energy == 0 || reference_energy == 0) return {};
   spectrum.norm = std::sqrt(static_cast<double>(query_energy)) *
@@ -143,28 +146,10 @@ std::optional<CrossSpectrum> cross_spectrum(const PackedSignature& query,
   return spectrum;
 }
 
-/// C and its first two derivatives at one heading.
-struct Point {
-  double value = 0.0;
-  double slope = 0.0;
-  double curvature = 0.0;
-};
+using Point = CorrelationPoint<double>;
 
 Point evaluate(const CrossSpectrum& spectrum, double heading_rad) {
-  const std::complex<double> step = std::polar(1.0, -heading_rad);
-  std::complex<double> turn = 1.0;
-  Point point;
-  for (int k = 1; k <= spectrum.highest(); ++k) {
-    turn = {turn.real() * step.real() - turn.imag() * step.imag(),
-            turn.real() * step.imag() + turn.imag() * step.real()};
-    const auto& term = spectrum.terms[k];
-    const double cosine = term.real() * turn.real() - term.imag() * turn.imag();
-    const double sine = term.real() * turn.imag() + term.imag() * turn.real();
-    point.value += cosine;
-    point.slope += k * sine;
-    point.curvature -= static_cast<double>(k) * k * cosine;
-  }
-  return point;
+  return correlation_at<double>(spectrum.real, spectrum.imaginary, heading_rad);
 }
 
 struct Peak {
@@ -213,8 +198,8 @@ std::vector<Peak> highest_peaks(const CrossSpectrum& spectrum) {
   }
   const double scale = 1.0 / spectrum.norm;
   for (int k = highest; k >= 1; --k) {
-    const auto term_real = static_cast<float>(spectrum.terms[k].real() * scale);
-    const auto term_imaginary = static_cast<float>(spectrum.terms[k].imag() * scale);
+    const auto term_real = static_cast<float>(spectrum.real[k] * scale);
+    const auto term_imaginary = static_cast<float>(spectrum.imaginary[k] * scale);
     for (std::size_t i = 0; i < size; ++i) {
       // (sum + term) * exp(-j sigma)
       const float a = real[i] + term_real;
@@ -300,7 +285,7 @@ std::optional<CompassReading> compass_near(const PackedSignature& query,
   // By Bernstein's inequality C rises by at most (highest * half a step)^2 / 2 <= 0.08 of its bound
   // between two points.
   double bound = 0.0;
-  for (const auto& term : spectrum->terms) bound += std::abs(term);
+  for (int k = 1; k <= spectrum->highest(); ++k) bound += std::abs(spectrum->term(k));
   const double least = best.value - 0.08 * bound;
   for (int i = 0; i < steps; ++i) {
     const Point& low = points[static_cast<std::size_t>(i)];
@@ -321,38 +306,20 @@ std::optional<CompassReading> sequential_compass(const FourierSignature& query,
   const auto spectrum = cross_spectrum(query, reference, options);
   if (!spectrum) return {};
   const int highest = spectrum->highest();
-
+  std::vector<double> differences(spectrum->real.size());
+  std::vector<double> weights(spectrum->real.size());
   double weight_sum = 0.0;
-  for (int k = 1; k <= highest; ++k) weight_sum += std::abs(spectrum->terms[k]) * k * k;
-  if (!(weight_sum > 0.0)) return {};
-
-  // [S06 eq. 40-43] from a given first estimate.
-  const auto refine_from = [&](double first_rad) {
-    double heading = first_rad;
-    double weights = std::abs(spectrum->terms[1]);
-    for (int k = 2; k <= highest; ++k) {
-      const double difference = std::arg(spectrum->terms[k]);
-      const double turns = std::nearbyint((k * heading - difference) / (2.0 * pi));
-      const double of_component = (difference + 2.0 * pi * turns) / k;
-      const double weight = std::abs(spectrum->terms[k]) * k * k;
-      if (weight > 0.0) {
-        heading = (weights * heading + weight * of_component) / (weights + weight);
-        weights += weight;
-      }
-    }
-    return wrap_angle(heading);
-  };
-  const double first = std::arg(spectrum->terms[1]);
-  double heading = refine_from(first);
-  double value = evaluate(*spectrum, heading).value;
-  if (std::abs(spectrum->terms[1]) < 0.1 * weight_sum / highest) {
-    const double opposite = refine_from(first + pi);
-    const double opposite_value = evaluate(*spectrum, opposite).value;
-    if (opposite_value > value) {
-      heading = opposite;
-      value = opposite_value;
-    }
+  for (int k = 1; k <= highest; ++k) {
+    differences[k] = std::arg(spectrum->term(k));
+    weights[k] = std::abs(spectrum->term(k)) * k * k;
+    weight_sum += weights[k];
   }
+  if (!(weight_sum > 0.0)) return {};
+  const double heading =
+      wrap_angle(sequential_turn<double>(differences, weights, [&](double turn_rad) {
+        return evaluate(*spectrum, wrap_angle(turn_rad)).value;
+      }));
+  const double value = evaluate(*spectrum, heading).value;
   double other = 0.0;
   for (const Peak& peak : highest_peaks(*spectrum)) {
     const bool same = std::abs(angle_difference(peak.heading_rad, heading)) < pi / highest;
