@@ -15,8 +15,8 @@
 
 namespace panonav {
 
-/// Which particles are thrown away at each image, so that a robot that was carried away is found
-/// again, and from where new ones are drawn.
+/// Particle injection: how many particles are replaced at each image, so that a kidnapped robot is
+/// found again, and where the new ones are drawn.
 enum class Redraw {
   none,         ///< none
   uniform,      ///< a fixed number, anywhere in the memorised area: the standard way
@@ -59,12 +59,12 @@ struct MonteCarloEstimate {
   double effective_particles = 0.0;  ///< before resampling
   bool resampled = false;
   int redrawn = 0;
-  /// How well the view is explained by the references near the particles, and by those anywhere:
-  /// the least difference (`ColumnMatch`) there; empty when none was compared.
+  /// The minimum difference (`ColumnMatch`) of the view to the references near the particles, and
+  /// to those anywhere; empty when none was compared.
   std::optional<double> difference_here;
   std::optional<double> difference_anywhere;
-  /// Log-likelihood of the view, over that of a view that nothing explains: where the particles
-  /// were, and anywhere in the memory (only with `Redraw::explained`).
+  /// Log-likelihood of the view relative to that of a view that nothing explains: where the
+  /// particles were, and anywhere in the memory (only with `Redraw::explained`).
   double log_here = 0.0;
   double log_there = 0.0;
   /// Belief that the robot is in the memorised area, 0 .. 1; lost below one half.
@@ -74,9 +74,9 @@ struct MonteCarloEstimate {
 
 /// Monte-Carlo localisation over the posed views of a memory [M03 section 4].
 ///
-/// A robot that knows nothing of its position finds it within a few images, keeps it where images
-/// are missing or tell nothing, and is found again after it was carried away. In places that look
-/// alike it keeps several modes.
+/// A robot with an unknown start is localised within a few images, keeps its position where images
+/// are missing or uninformative, and recovers after it was kidnapped. In places that look alike the
+/// filter keeps several modes.
 ///
 /// Runs in the calling thread. Same memory, options and calls: same bits.
 class MonteCarloLocaliser {
@@ -97,8 +97,8 @@ class MonteCarloLocaliser {
   /// Around a known pose; deviations of each coordinate, >= 0.
   void start_at(const Pose2& pose, double deviation_m, double heading_deviation_rad);
 
-  /// The robot moved by `robot_old_from_robot_new`, as its odometry says; any number of steps may
-  /// pass between two images.
+  /// The robot moved by `robot_old_from_robot_new` according to its odometry; any number of steps
+  /// may come between two images.
   void move(const Pose2& step);
 
   /// The robot took a picture. Throws ContractError on a signature of another shape than the

@@ -55,8 +55,8 @@ struct ParticleModes {
   std::size_t occupied_bins = 0;  ///< that hold more than a particle's share of the weight
 };
 
-/// Gathers particles around the heaviest bin, then around the heaviest bin of what is left, and so
-/// on: a mode is a bin and the bins up to two beside it, less what was gathered before. Modes below
+/// Clusters particles around the heaviest bin, then around the heaviest bin of the rest, and so on:
+/// a mode is a bin and the bins up to two beside it, without those of earlier modes. Modes below
 /// `least_weight` of the whole are not kept. Deterministic; cost linear in particles, and in bins
 /// times modes.
 [[nodiscard]] ParticleModes find_modes(const Particles& particles, const PoseBins& bins,

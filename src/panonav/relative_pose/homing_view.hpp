@@ -54,15 +54,15 @@ class HomingView {
 /// All rows of a signature. Throws ContractError when it has fewer than two components.
 [[nodiscard]] HomingView homing_view(const FourierSignature& signature);
 
-/// The same of a view of a memory, to the bit, but from its bytes through tables instead of by a sine
-/// and a cosine a coefficient. Throws ContractError when there is no such view. Cost: 1 microsecond
-/// for 40 rows and 15 components.
+/// The same of a view of a memory, to the bit, but from its bytes through tables instead of by a
+/// sine and a cosine a coefficient. Throws ContractError when there is no such view. Cost: 1
+/// microsecond for 40 rows and 15 components.
 [[nodiscard]] HomingView homing_view(const VisualMemory& memory, ViewId view);
 
 /// S06's one-dimensional view: the mean of the rows whose middle lies within `half_band_rad` of the
-/// horizon, or of all rows where elevations are unknown. At least the row nearest to the horizon
-/// counts. Throws ContractError when the signature has fewer than two components or half_band_rad
-/// is not above 0.
+/// horizon, or of all rows where elevations are unknown. The row nearest to the horizon is always
+/// used. Throws ContractError when the signature has fewer than two components or half_band_rad is
+/// not above 0.
 [[nodiscard]] HomingView horizon_view(const FourierSignature& signature,
                                       double half_band_rad = 5.0 * std::numbers::pi / 180.0);
 
@@ -73,8 +73,8 @@ class HomingView {
 /// The view after the robot turned by `turn_rad` counter-clockwise.
 [[nodiscard]] HomingView turn(const HomingView& view, double turn_rad);
 
-/// Two floats for each row and frequency but the mean, which does not count: K = 3 and one row are
-/// 24 bytes [S06 section 4.4].
+/// Two floats for each row and frequency, without the mean: K = 3 and one row are 24 bytes [S06
+/// section 4.4].
 [[nodiscard]] std::size_t snapshot_bytes(const HomingView& view) noexcept;
 
 }  // namespace panonav

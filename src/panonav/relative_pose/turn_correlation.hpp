@@ -7,7 +7,7 @@
 namespace panonav {
 
 /// C(sigma) = sum_{k=1..K} Re(real[k] + j imaginary[k]) exp(-j k sigma): the correlation of two
-/// views against the turn between them, all rows summed [S06 eq. 33]. Entry 0 does not count.
+/// views against the turn between them, all rows summed [S06 eq. 33]. Entry 0 is not used.
 struct TurnCorrelation {
   static constexpr int most_frequencies = 62;
   int highest = 0;  ///< K, 1 .. most_frequencies
@@ -17,7 +17,7 @@ struct TurnCorrelation {
   [[nodiscard]] float at(float turn_rad) const noexcept;
 };
 
-/// The headings that count: within `half_width_rad` of `middle_rad`; all by default.
+/// The headings that are considered: within `half_width_rad` of `middle_rad`; all by default.
 struct TurnWindow {
   float middle_rad = 0.0F;
   float half_width_rad = 4.0F;
