@@ -1,8 +1,5 @@
 #include "panonav/mapping/pose_graph.hpp"
 
-#include <Eigen/Core>
-#include <Eigen/Sparse>
-#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,12 +8,12 @@
 
 #include "panonav/core/disjoint_sets.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/mapping/internal/normal_equations.hpp"
 
 namespace panonav {
 
 namespace {
 
-using Triplet = Eigen::Triplet<double>;
 constexpr std::size_t unknowns = 3;  // x, y, heading of each node
 
 void check(std::span<const Pose2> nodes, std::span<const PoseEdge> edges) {
@@ -95,13 +92,9 @@ class Problem {
   /// Returns the largest change of a position or, in radians, of a heading.
   double step() {
     assemble();
-    if (!analysed_) {
-      solver_.analyzePattern(hessian_);
-      analysed_ = true;
-    }
-    solver_.factorize(hessian_);
-    if (solver_.info() != Eigen::Success) return 0.0;
-    const Eigen::VectorXd change = solver_.solve(-gradient_);
+    const auto solution = equations_.solve();
+    if (!solution) return 0.0;
+    const Eigen::VectorXd& change = *solution;
     double largest = 0.0;
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
       if (fixed_[i] != 0) continue;
@@ -129,30 +122,28 @@ class Problem {
 
   void add(std::size_t row, std::size_t column, double value) {
     // Fixed poses keep their equation x = 0; the pattern stays the same.
-    if (row < column) std::swap(row, column);
     if (fixed_[row / unknowns] != 0 || fixed_[column / unknowns] != 0) value = 0.0;
-    triplets_.emplace_back(static_cast<int>(row), static_cast<int>(column), value);
+    equations_.add(static_cast<int>(row), static_cast<int>(column), value);
   }
 
   void assemble() {
-    const std::size_t size = nodes_.size() * unknowns;
-    triplets_.clear();
-    gradient_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(size));
+    equations_.begin(static_cast<int>(nodes_.size() * unknowns));
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
       for (std::size_t u = 0; u < unknowns; ++u) {
         // A part may hang on nothing but edges whose weight has fallen to almost nothing.
         const double held = fixed_[i] != 0 ? 1.0 : 1e-9;
-        triplets_.emplace_back(static_cast<int>(i * unknowns + u),
-                               static_cast<int>(i * unknowns + u), held);
+        const auto at = static_cast<int>(i * unknowns + u);
+        equations_.add(at, at, held);
       }
     }
     for (std::size_t i = 0; i < edges_.size(); ++i) add_edge(i);
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
       if (fixed_[i] == 0) continue;
-      gradient_.segment<3>(static_cast<Eigen::Index>(i * unknowns)).setZero();
+      for (std::size_t u = 0; u < unknowns; ++u) {
+        equations_.gradient(static_cast<int>(i * unknowns + u)) = 0.0;
+      }
     }
-    hessian_.resize(static_cast<Eigen::Index>(size), static_cast<Eigen::Index>(size));
-    hessian_.setFromTriplets(triplets_.begin(), triplets_.end());
+    equations_.assemble();
   }
 
   void add_edge(std::size_t i) {
@@ -181,7 +172,7 @@ class Problem {
     for (std::size_t m = 0; m < columns; ++m) {
       double slope = 0.0;
       for (std::size_t r = 0; r < 3; ++r) slope += jacobian[r][m] * residual[r];
-      gradient_[static_cast<Eigen::Index>(index(m))] += weight * slope;
+      equations_.gradient(static_cast<int>(index(m))) += weight * slope;
       for (std::size_t n = 0; n <= m; ++n) {
         double sum = 0.0;
         for (std::size_t r = 0; r < 3; ++r) sum += jacobian[r][m] * jacobian[r][n];
@@ -194,11 +185,7 @@ class Problem {
   std::span<const PoseEdge> edges_;
   std::vector<double> weights_;
   std::vector<std::uint8_t> fixed_;
-  bool analysed_ = false;
-  std::vector<Triplet> triplets_;
-  Eigen::SparseMatrix<double> hessian_;
-  Eigen::VectorXd gradient_;
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower> solver_;
+  NormalEquations equations_;
 };
 
 }  // namespace

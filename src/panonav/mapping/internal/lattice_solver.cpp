@@ -1,6 +1,5 @@
 #include "panonav/mapping/internal/lattice_solver.hpp"
 
-#include <Eigen/Sparse>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +9,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/mapping/internal/normal_equations.hpp"
 
 namespace panonav {
 
@@ -261,10 +261,9 @@ class Solver {
   }
 
   void assemble() {
-    entries_.clear();
-    gradient_ = Eigen::VectorXd::Zero(unknowns_);
+    equations_.begin(unknowns_);
     // Every diagonal entry is there, whatever the springs touch.
-    for (int i = 0; i < unknowns_; ++i) entries_.emplace_back(i, i, 0.0);
+    for (int i = 0; i < unknowns_; ++i) equations_.add(i, i, 0.0);
     for (std::size_t s = 0; s < springs_.size(); ++s) {
       const SpringTerm& spring = springs_[s];
       const int first = unknown_[spring.a];
@@ -282,30 +281,23 @@ class Solver {
           const double si = entry.slope[static_cast<std::size_t>(i)];
           const int ci = column(i);
           if (ci < 0 || si == 0.0) continue;
-          gradient_(ci) += w * si * entry.value;
+          equations_.gradient(ci) += w * si * entry.value;
           for (int j = 0; j < 6; ++j) {
             const double sj = entry.slope[static_cast<std::size_t>(j)];
             const int cj = column(j);
-            if (cj >= 0 && cj <= ci && sj != 0.0) entries_.emplace_back(ci, cj, w * si * sj);
+            if (cj >= 0 && cj <= ci && sj != 0.0) equations_.add(ci, cj, w * si * sj);
           }
         }
       }
     }
-    matrix_.resize(unknowns_, unknowns_);
-    matrix_.setFromTriplets(entries_.begin(), entries_.end());
-    diagonal_ = matrix_.diagonal();
+    equations_.assemble();
   }
 
   /// False when the system cannot be solved with so little damping.
   bool step(double damping) {
-    const double floor = 1e-9 * std::max(diagonal_.maxCoeff(), 1e-9);
-    for (int i = 0; i < unknowns_; ++i) {
-      matrix_.coeffRef(i, i) = diagonal_(i) * (1.0 + damping) + floor;
-    }
-    Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower> factors(matrix_);
-    if (factors.info() != Eigen::Success) return false;
-    const Eigen::VectorXd change = factors.solve(-gradient_);
-    if (!change.allFinite()) return false;
+    const auto solution = equations_.solve(damping);
+    if (!solution) return false;
+    const Eigen::VectorXd& change = *solution;
     for (std::size_t i = 0; i < poses_.size(); ++i) {
       const int base = unknown_[i];
       if (base < 0) continue;
@@ -320,10 +312,7 @@ class Solver {
   std::span<Pose2> poses_;
   std::vector<int> unknown_;  // first unknown of each pose, -1: it stays
   int unknowns_ = 0;
-  std::vector<Eigen::Triplet<double>> entries_;  // lower triangle
-  Eigen::SparseMatrix<double> matrix_;
-  Eigen::VectorXd diagonal_;
-  Eigen::VectorXd gradient_;
+  NormalEquations equations_;
   std::vector<std::optional<double>> trust_;  // in the lengths of each spring with phases
   std::array<double, groups> widths_{kWidth, kWidth, kWidth};
   LatticeSolution solution_;
