@@ -10,11 +10,20 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/localisation/sample.hpp"
 
 namespace panonav {
 
 namespace {
+
+// The signature with the magnitudes of the rows that do not count set to 0; no `allowed_rows`:
+// unchanged.
+PackedSignature with_rows(PackedSignature signature, std::span<const std::uint8_t> allowed_rows) {
+  if (allowed_rows.empty()) return signature;
+  for (std::size_t i = 0; i < signature.magnitudes.size(); ++i) {
+    if (allowed_rows[i % allowed_rows.size()] == 0) signature.magnitudes[i] = 0;
+  }
+  return signature;
+}
 
 constexpr std::size_t references = 4;  // the corners of a grid's square
 

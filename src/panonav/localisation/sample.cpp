@@ -20,12 +20,4 @@ std::vector<ViewId> sample_views(std::span<const ViewId> views, int count, std::
   return sample;
 }
 
-PackedSignature with_rows(PackedSignature signature, std::span<const std::uint8_t> allowed_rows) {
-  if (allowed_rows.empty()) return signature;
-  for (std::size_t i = 0; i < signature.magnitudes.size(); ++i) {
-    if (allowed_rows[i % allowed_rows.size()] == 0) signature.magnitudes[i] = 0;
-  }
-  return signature;
-}
-
 }  // namespace panonav

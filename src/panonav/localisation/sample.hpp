@@ -13,9 +13,4 @@ namespace panonav {
 [[nodiscard]] std::vector<ViewId> sample_views(std::span<const ViewId> views, int count,
                                                std::uint64_t seed);
 
-/// The signature with the magnitudes of the rows that do not count set to 0. Empty `allowed_rows`:
-/// unchanged.
-[[nodiscard]] PackedSignature with_rows(PackedSignature signature,
-                                        std::span<const std::uint8_t> allowed_rows);
-
 }  // namespace panonav

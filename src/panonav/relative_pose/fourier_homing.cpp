@@ -21,22 +21,28 @@ namespace panonav {
 
 namespace {
 
-// What one row becomes when the robot turns.
-void turn_row(std::span<float> a, std::span<float> b, double turn_rad) {
+// Calls visit(k, cos(k turn), sin(k turn)) for k = 0 .. frequencies - 1.
+template <class Visit>
+void for_frequencies(int frequencies, double turn_rad, const Visit& visit) {
   const double step_cosine = std::cos(turn_rad);
   const double step_sine = std::sin(turn_rad);
   double cosine = 1.0;
   double sine = 0.0;
-  for (std::size_t k = 0; k < a.size(); ++k) {
-    const auto c = static_cast<float>(cosine);
-    const auto s = static_cast<float>(sine);
-    const float turned = a[k] * c + b[k] * s;
-    b[k] = b[k] * c - a[k] * s;
-    a[k] = turned;
+  for (int k = 0; k < frequencies; ++k) {
+    visit(k, static_cast<float>(cosine), static_cast<float>(sine));
     const double next = cosine * step_cosine - sine * step_sine;
     sine = sine * step_cosine + cosine * step_sine;
     cosine = next;
   }
+}
+
+// What one row becomes when the robot turns.
+void turn_row(std::span<float> a, std::span<float> b, double turn_rad) {
+  for_frequencies(static_cast<int>(a.size()), turn_rad, [&](int k, float cosine, float sine) {
+    const float turned = a[k] * cosine + b[k] * sine;
+    b[k] = b[k] * cosine - a[k] * sine;
+    a[k] = turned;
+  });
 }
 
 class PairOfViews {
@@ -136,13 +142,7 @@ void PairOfViews::correlate() {
 }
 
 void PairOfViews::turn_home(double turn_rad) {
-  const double step_cosine = std::cos(turn_rad);
-  const double step_sine = std::sin(turn_rad);
-  double cosine = 1.0;
-  double sine = 0.0;
-  for (int k = 0; k <= known_; ++k) {
-    const auto c = static_cast<float>(cosine);
-    const auto s = static_cast<float>(sine);
+  for_frequencies(known_ + 1, turn_rad, [&](int k, float c, float s) {
     const float* const a = home_.cosines(k).data();
     const float* const b = home_.sines(k).data();
     float* const turned_a = c_.home_a(k);
@@ -151,10 +151,7 @@ void PairOfViews::turn_home(double turn_rad) {
       turned_a[y] = a[y] * c - b[y] * s;
       turned_b[y] = a[y] * s + b[y] * c;
     }
-    const double next = cosine * step_cosine - sine * step_sine;
-    sine = sine * step_cosine + cosine * step_sine;
-    cosine = next;
-  }
+  });
 }
 
 // By coherence at the present turn: components by a bell as wide as there are coherent ones, over
