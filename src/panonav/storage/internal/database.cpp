@@ -89,10 +89,6 @@ bool Database::in_transaction() const noexcept {
   return sqlite3_get_autocommit(handle_.get()) == 0;
 }
 
-std::int64_t Database::last_insert_id() const noexcept {
-  return sqlite3_last_insert_rowid(handle_.get());
-}
-
 void Database::leave_log_on_close() noexcept {
   sqlite3_db_config(handle_.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
 }

@@ -28,7 +28,6 @@ class Database {
   void execute(const char* sql);
   [[nodiscard]] std::int64_t integer(const char* sql);
   [[nodiscard]] bool in_transaction() const noexcept;
-  [[nodiscard]] std::int64_t last_insert_id() const noexcept;
   /// Closing will leave the write-ahead log as it is instead of bringing it into the file.
   void leave_log_on_close() noexcept;
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
