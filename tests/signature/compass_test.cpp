@@ -172,13 +172,11 @@ TEST(Compass, HasNoAnswerWithoutStructure) {
   EXPECT_FALSE(compass(flat, view));
   EXPECT_FALSE(compass(view, flat));
   EXPECT_FALSE(compass(flat, flat));
-  EXPECT_FALSE(sequential_compass(flat, view));
   EXPECT_FALSE(compass(pack(flat, 2.0F), pack(view, 2.0F)));
   EXPECT_TRUE(compass(view, view));
   // Only the mean: nothing to take a heading from.
   const FourierSignature mean_only = random_signature(random, {3, 1});
   EXPECT_FALSE(compass(mean_only, mean_only));
-  EXPECT_FALSE(sequential_compass(mean_only, mean_only));
 }
 
 TEST(Compass, PackedAgreesWithFloat) {
@@ -351,47 +349,6 @@ TEST(Compass, UsesTheComponentsAskedFor) {
   EXPECT_THROW(static_cast<void>(compass(query, reference, {.components = 1})), ContractError);
   EXPECT_THROW(static_cast<void>(compass(query, reference, {.components = -1})), ContractError);
   EXPECT_THROW(static_cast<void>(compass(query, random_signature(random, {5, 15}))), ContractError);
-}
-
-TEST(SequentialCompass, ReadsTurnsOfTheSameView) {
-  // [S06 eq. 40-43]; one row, as in the paper, and several.
-  Random random(11);
-  for (const int rows : {1, 7}) {
-    for (int trial = 0; trial < 100; ++trial) {
-      const FourierSignature reference = random_signature(random, {rows, 11});
-      const double turned = random.uniform(-3.1, 3.1);
-      const auto reading = sequential_compass(turn(reference, turned), reference);
-      ASSERT_TRUE(reading);
-      EXPECT_LT(heading_error(*reading, turned), 1e-4);
-      EXPECT_NEAR(reading->correlation, 1.0, 1e-5);
-    }
-  }
-}
-
-TEST(SequentialCompass, TriesTheOppositeStartWhenTheFirstComponentIsWeak) {
-  // The first component is weak and says the opposite. The rule as printed without the second start
-  // fails.
-  const int components = 6;
-  std::vector<float> magnitudes(components, 0.2F);
-  std::vector<float> phases(components, 0.0F);
-  magnitudes[1] = 0.002F;
-  const FourierSignature reference({1, components}, magnitudes, phases, std::nullopt);
-  phases[1] = -std::numbers::pi_v<float>;
-  const FourierSignature query({1, components}, magnitudes, phases, std::nullopt);
-  const auto reading = sequential_compass(turn(query, 0.4), reference);
-  ASSERT_TRUE(reading);
-  EXPECT_LT(heading_error(*reading, 0.4), 1e-3);
-
-  // A strong first component that is wrong is believed: that is the rule, and why compass() is
-  // global.
-  magnitudes[1] = 0.5F;
-  const FourierSignature strong_reference({1, components}, magnitudes,
-                                          std::vector<float>(components, 0.0F), std::nullopt);
-  const FourierSignature strong_query({1, components}, magnitudes, phases, std::nullopt);
-  const auto misled = sequential_compass(turn(strong_query, 0.4), strong_reference);
-  const auto global = compass(turn(strong_query, 0.4), strong_reference);
-  ASSERT_TRUE(misled && global);
-  EXPECT_LE(misled->correlation, global->correlation + 1e-9);
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <numbers>
 
-#include "panonav/signature/turn_rules.hpp"
+#include "panonav/signature/correlation_point.hpp"
 
 namespace panonav {
 
@@ -61,6 +61,7 @@ float TurnCorrelation::at(float turn_rad) const noexcept {
 float sequential_turn(const TurnCorrelation& correlation) noexcept {
   std::array<float, TurnCorrelation::most_frequencies + 1> differences{};
   std::array<float, TurnCorrelation::most_frequencies + 1> weights{};
+  float all = 0.0F;
   for (int k = 1; k <= correlation.highest; ++k) {
     const auto i = static_cast<std::size_t>(k);
     differences[i] = std::atan2(correlation.imaginary[i], correlation.real[i]);
@@ -68,10 +69,26 @@ float sequential_turn(const TurnCorrelation& correlation) noexcept {
     weights[i] = frequency * frequency *
                  std::sqrt(correlation.real[i] * correlation.real[i] +
                            correlation.imaginary[i] * correlation.imaginary[i]);
+    all += weights[i];
   }
-  const std::size_t size = static_cast<std::size_t>(correlation.highest) + 1;
-  return sequential_turn<float>(std::span(differences).first(size), std::span(weights).first(size),
-                                [&](float turn_rad) { return correlation.at(turn_rad); });
+  const auto refined_from = [&](float first_rad) {
+    float turn = first_rad;
+    float sum = weights[1];
+    for (int k = 2; k <= correlation.highest; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      if (!(weights[i] > 0.0F)) continue;
+      const auto frequency = static_cast<float>(k);
+      const float turns = std::nearbyint((frequency * turn - differences[i]) / (2.0F * pi));
+      const float told = (differences[i] + 2.0F * pi * turns) / frequency;
+      turn = (sum * turn + weights[i] * told) / (sum + weights[i]);
+      sum += weights[i];
+    }
+    return turn;
+  };
+  const float first = refined_from(differences[1]);
+  if (weights[1] >= 0.1F * all / static_cast<float>(correlation.highest)) return first;
+  const float opposite = refined_from(differences[1] + pi);
+  return correlation.at(opposite) > correlation.at(first) ? opposite : first;
 }
 
 int highest_turns(const TurnCorrelation& correlation, std::span<float> turns,

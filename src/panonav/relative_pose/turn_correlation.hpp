@@ -27,7 +27,9 @@ struct TurnWindow {
   }
 };
 
-/// The heading of S06's sequential rule (turn_rules.hpp). In radians, not wrapped.
+/// The heading of S06's sequential rule, as published [S06 eq. 40-43, sign of eq. 41 corrected]:
+/// each component refines the estimate of those before. Where the first weight is below a tenth of
+/// the mean, a second estimate starts at the opposite heading. In radians, not wrapped.
 [[nodiscard]] float sequential_turn(const TurnCorrelation& correlation) noexcept;
 
 /// Fills `turns` with the headings of the highest local maxima within the window, highest first,

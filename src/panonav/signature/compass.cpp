@@ -12,7 +12,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/signature/turn_rules.hpp"
+#include "panonav/signature/correlation_point.hpp"
 
 namespace panonav {
 
@@ -298,35 +298,6 @@ std::optional<CompassReading> compass_near(const PackedSignature& query,
   }
   return CompassReading{wrap_angle(best.heading_rad),
                         std::clamp(best.value / spectrum->norm, -1.0, 1.0), 1.0};
-}
-
-std::optional<CompassReading> sequential_compass(const FourierSignature& query,
-                                                 const FourierSignature& reference,
-                                                 const CompassOptions& options) {
-  const auto spectrum = cross_spectrum(query, reference, options);
-  if (!spectrum) return {};
-  const int highest = spectrum->highest();
-  std::vector<double> differences(spectrum->real.size());
-  std::vector<double> weights(spectrum->real.size());
-  double weight_sum = 0.0;
-  for (int k = 1; k <= highest; ++k) {
-    differences[k] = std::arg(spectrum->term(k));
-    weights[k] = std::abs(spectrum->term(k)) * k * k;
-    weight_sum += weights[k];
-  }
-  if (!(weight_sum > 0.0)) return {};
-  const double heading =
-      wrap_angle(sequential_turn<double>(differences, weights, [&](double turn_rad) {
-        return evaluate(*spectrum, wrap_angle(turn_rad)).value;
-      }));
-  const double value = evaluate(*spectrum, heading).value;
-  double other = 0.0;
-  for (const Peak& peak : highest_peaks(*spectrum)) {
-    const bool same = std::abs(angle_difference(peak.heading_rad, heading)) < pi / highest;
-    if (!same) other = std::max(other, peak.value);
-  }
-  return CompassReading{heading, std::clamp(value / spectrum->norm, -1.0, 1.0),
-                        distinctness(value, other)};
 }
 
 }  // namespace panonav

@@ -46,13 +46,4 @@ struct CompassOptions {
                                                          double heading_rad, double within_rad,
                                                          const CompassOptions& options = {});
 
-/// S06's sequential rule [S06 eq. 40-43, sign of eq. 41 corrected], as published, kept for
-/// comparison: each component refines the estimate of those before. When the first is weak (its
-/// weight below a tenth of the mean) a second estimate starts at the opposite heading and the one
-/// of higher correlation is taken. The paper has one row; with more, the phase difference and
-/// weight of a component are those of its sum over the rows.
-[[nodiscard]] std::optional<CompassReading> sequential_compass(const FourierSignature& query,
-                                                               const FourierSignature& reference,
-                                                               const CompassOptions& options = {});
-
 }  // namespace panonav

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <span>
+
+namespace panonav {
+
+/// The correlation of two views against the turn between them, all rows summed [S06 eq. 33],
+///   C(sigma) = Re sum_k (real[k] + j imaginary[k]) exp(-j k sigma), k = 1 .. K = size - 1,
+/// and its first two derivatives at one turn. Entry 0 does not count. The compass takes double
+/// precision, homing single.
+template <class Real>
+struct CorrelationPoint {
+  Real value = 0;
+  Real slope = 0;
+  Real curvature = 0;
+};
+
+/// Cost: a sine, a cosine and a few multiplications a frequency.
+template <class Real>
+[[nodiscard]] CorrelationPoint<Real> correlation_at(std::span<const Real> term_real,
+                                                    std::span<const Real> term_imaginary,
+                                                    Real turn_rad) noexcept {
+  const Real step_real = std::cos(turn_rad);
+  const Real step_imaginary = -std::sin(turn_rad);
+  Real real = 1;
+  Real imaginary = 0;
+  CorrelationPoint<Real> point;
+  for (std::size_t k = 1; k < term_real.size(); ++k) {
+    const Real next = real * step_real - imaginary * step_imaginary;
+    imaginary = real * step_imaginary + imaginary * step_real;
+    real = next;
+    const Real cosine = term_real[k] * real - term_imaginary[k] * imaginary;
+    const Real sine = term_real[k] * imaginary + term_imaginary[k] * real;
+    const auto frequency = static_cast<Real>(k);
+    point.value += cosine;
+    point.slope += frequency * sine;
+    point.curvature -= frequency * frequency * cosine;
+  }
+  return point;
+}
+
+}  // namespace panonav
