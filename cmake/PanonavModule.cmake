@@ -93,8 +93,33 @@ function(panonav_module_tests name)
   panonav_warnings(test_${name})
   panonav_compile_quickly(test_${name})
   panonav_precompile(test_${name} <gtest/gtest.h>)
-  gtest_discover_tests(test_${name} TEST_PREFIX ${name}. DISCOVERY_MODE PRE_TEST
-                       PROPERTIES LABELS unit)
+  panonav_add_suites(test_${name} PREFIX ${name} LABEL unit SOURCES ${sources})
+endfunction()
+
+# panonav_add_suites(PROGRAM PREFIX name LABEL label [COST cost] SOURCES files): one test PREFIX.SUITE for each test suite
+# of a test program, so that what a suite shares (a rendered scene, a memory) is made once. Those of a higher cost begin
+# first.
+function(panonav_add_suites program)
+  cmake_parse_arguments(ARG "" "PREFIX;LABEL;COST" "SOURCES" ${ARGN})
+  if(NOT ARG_COST)
+    set(ARG_COST 0)
+  endif()
+  set(suites "")
+  foreach(source IN LISTS ARG_SOURCES)
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${source})
+    file(STRINGS ${source} tests REGEX "^TEST(_F|_P)?\\(")
+    list(TRANSFORM tests REPLACE "^TEST[_FP]*\\(([A-Za-z0-9_]+),.*" "\\1")
+    list(APPEND suites ${tests})
+  endforeach()
+  list(REMOVE_DUPLICATES suites)
+  foreach(suite IN LISTS suites)
+    add_test(NAME ${ARG_PREFIX}.${suite} COMMAND ${program} "--gtest_filter=${suite}.*:*/${suite}.*")
+    # A suite of which nothing ran, since what it needs is not there, counts as skipped; one that is not in the program
+    # is a fault.
+    set_tests_properties(${ARG_PREFIX}.${suite} PROPERTIES LABELS ${ARG_LABEL} COST ${ARG_COST}
+      FAIL_REGULAR_EXPRESSION "from 0 test suites ran"
+      SKIP_REGULAR_EXPRESSION "PASSED  . 0 tests\\.[\r\n]+(.  SKIPPED[^\r\n]*[\r\n]+)+$")
+  endforeach()
 endfunction()
 
 # The target panonav::panonav links every module that was built.

@@ -1,4 +1,5 @@
 #include "panonav/camera/camera.hpp"
+#include "support/text.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,7 +14,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -79,12 +80,12 @@ double angle_between(const Direction3& a, const Direction3& b) {
   return std::atan2(std::hypot(cross.x, cross.y, cross.z), a.x * b.x + a.y * b.y + a.z * b.z);
 }
 
-class EveryCamera : public testing::TestWithParam<NamedCamera> {
+class EveryCamera : public ::testing::TestWithParam<NamedCamera> {
  protected:
   const Camera& camera() const { return GetParam().camera; }
 };
 
-INSTANTIATE_TEST_SUITE_P(Models, EveryCamera, testing::ValuesIn(all_cameras()),
+INSTANTIATE_TEST_SUITE_P(Models, EveryCamera, ::testing::ValuesIn(all_cameras()),
                          [](const auto& test) { return test.param.name; });
 
 TEST_P(EveryCamera, IsValid) {
@@ -324,12 +325,7 @@ TEST(CameraValidation, NamesTheField) {
   for (const Fault& fault : faults) {
     Camera camera = good;
     fault.make(camera);
-    try {
-      validate(camera);
-      FAIL() << fault.field << " was accepted";
-    } catch (const ContractError& error) {
-      EXPECT_NE(std::string(error.what()).find(fault.field), std::string::npos) << error.what();
-    }
+    EXPECT_TRUE(contains(message_of<ContractError>([&] { validate(camera); }), fault.field));
   }
 }
 
@@ -346,4 +342,4 @@ TEST(PolynomialModel, MonotonicOnlyInPartOfTheRangeIsRefused) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -8,21 +8,15 @@
 #include <string>
 #include <vector>
 
-#include "camera/synthetic_mirror.hpp"
 #include "panonav/camera/mirror_camera.hpp"
 #include "panonav/camera/mirror_overlay.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/io/image_file.hpp"
-#include "support/sanitizers.hpp"
+#include "support/mirror_pictures.hpp"
+#include "support/skips.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
-
-using testing_support::MirrorPicture;
-using testing_support::paint;
-using testing_support::paint_without_mirror;
-using testing_support::Plain;
-using testing_support::Surroundings;
 
 std::optional<MirrorCircle> find_in(const Image& image, const MirrorSearchOptions& options = {}) {
   const ImageView view = image.view();
@@ -110,8 +104,8 @@ std::vector<NamedPicture> pictures() {
   return result;
 }
 
-class EveryMirrorPicture : public testing::TestWithParam<NamedPicture> {};
-INSTANTIATE_TEST_SUITE_P(Synthetic, EveryMirrorPicture, testing::ValuesIn(pictures()),
+class EveryMirrorPicture : public ::testing::TestWithParam<NamedPicture> {};
+INSTANTIATE_TEST_SUITE_P(Synthetic, EveryMirrorPicture, ::testing::ValuesIn(pictures()),
                          [](const auto& test) { return test.param.name; });
 
 TEST_P(EveryMirrorPicture, RimAndCentreAreFoundToAFractionOfAPixel) {
@@ -264,15 +258,15 @@ TEST(FindMirror, OptionsBoundTheRadius) {
 std::vector<Image> kaidan_images(const std::filesystem::path& data) {
   std::vector<Image> images;
   for (int i = 1; i <= 17; ++i) {
-    images.push_back(read_image(data / "mirror_raw" / ("KaidanOmni" + std::to_string(i) + ".jpg")));
+    images.push_back(read_image(data / ("KaidanOmni" + std::to_string(i) + ".jpg")));
   }
   return images;
 }
 
 TEST(FindMirrorRealData, SeventeenImagesOfOneCameraAgree) {
-  const char* data = std::getenv("PANONAV_DATA");
-  if (data == nullptr) GTEST_SKIP() << "PANONAV_DATA is not set: real data not tested";
-  const std::vector<Image> images = kaidan_images(data);
+  const auto data = real_data("mirror_raw");
+  PANONAV_REQUIRE_DATA(data, "mirror_raw");
+  const std::vector<Image> images = kaidan_images(*data);
   std::vector<ImageView> views;
   for (const Image& image : images) views.push_back(image.view());
   const auto mirror = find_mirror(views);
@@ -292,10 +286,9 @@ TEST(FindMirrorRealData, SeventeenImagesOfOneCameraAgree) {
 }
 
 TEST(FindMirrorRealData, MirrorOnACarRoof) {
-  const char* data = std::getenv("PANONAV_DATA");
-  if (data == nullptr) GTEST_SKIP() << "PANONAV_DATA is not set: real data not tested";
-  const auto mirror =
-      find_in(read_image(std::filesystem::path(data) / "mirror_raw" / "hyperbolic_car.jpg"));
+  const auto data = real_data("mirror_raw");
+  PANONAV_REQUIRE_DATA(data, "mirror_raw");
+  const auto mirror = find_in(read_image(*data / "hyperbolic_car.jpg"));
   ASSERT_TRUE(mirror);
   // Read off the picture by eye: leftmost 12, rightmost 970, top 13, bottom 972; disc 385 to 602.
   EXPECT_NEAR(mirror->centre.u_px, 491, 4);
@@ -306,11 +299,10 @@ TEST(FindMirrorRealData, MirrorOnACarRoof) {
 }
 
 TEST(FindMirrorRealData, ThreeHundredAndSixtyDegreePicturesAreNoMirror) {
-  const char* data = std::getenv("PANONAV_DATA");
-  if (data == nullptr) GTEST_SKIP() << "PANONAV_DATA is not set: real data not tested";
+  const auto data = real_data("indoor_walk_360");
+  PANONAV_REQUIRE_DATA(data, "indoor_walk_360");
   int pictures = 0;
-  for (const auto& entry :
-       std::filesystem::directory_iterator(std::filesystem::path(data) / "indoor_walk_360")) {
+  for (const auto& entry : std::filesystem::directory_iterator(*data)) {
     if (entry.path().extension() != ".jpg") continue;
     // Every tenth, by name: the folder's order is not defined.
     const std::string stem = entry.path().stem().string();
@@ -371,4 +363,4 @@ TEST(MirrorCamera, HasTheCirclesAndTheModel) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -10,7 +10,7 @@
 
 #include "experiments/reproduction.hpp"
 #include "panonav/core/error.hpp"
-#include "support/sanitizers.hpp"
+#include "support/skips.hpp"
 
 namespace panonav {
 namespace {

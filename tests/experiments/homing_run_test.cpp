@@ -8,7 +8,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/simulation/scenes.hpp"
-#include "support/sanitizers.hpp"
+#include "support/skips.hpp"
 
 namespace panonav {
 namespace {

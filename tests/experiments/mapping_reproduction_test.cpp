@@ -9,7 +9,7 @@
 #include "experiments/runs/mapping_run.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/simulation/scenes.hpp"
-#include "support/sanitizers.hpp"
+#include "support/skips.hpp"
 
 namespace panonav {
 namespace {

@@ -9,7 +9,7 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/simulation/load_gazebo.hpp"
-#include "support/sanitizers.hpp"
+#include "support/skips.hpp"
 
 namespace panonav {
 namespace {
@@ -30,7 +30,7 @@ void print(const std::string& place, const std::vector<PlaceResult>& results) {
 
 // The grid and the conditions of the promise: a 0.5 m grid memorised, random poses asked; 400 of
 // them, twice as many as the promise, to be surer of the rate.
-class GazeboWorld : public testing::TestWithParam<const char*> {};
+class GazeboWorld : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(GazeboWorld, IsRecognisedAlsoInOtherLightAndWithPeopleInView) {
   if (std::getenv("PANONAV_DATA") == nullptr) {
@@ -57,7 +57,7 @@ TEST_P(GazeboWorld, IsRecognisedAlsoInOtherLightAndWithPeopleInView) {
   EXPECT_GE(results[2].nearest_or_next.value, 0.90);
 }
 
-INSTANTIATE_TEST_SUITE_P(Worlds, GazeboWorld, testing::Values("small_warehouse", "small_house"),
+INSTANTIATE_TEST_SUITE_P(Worlds, GazeboWorld, ::testing::Values("small_warehouse", "small_house"),
                          [](const auto& world) { return std::string(world.param); });
 
 TEST(PlaceExperiment, OfOnePlaceTellsItFromOthersAndIsTheSameOnAnyNumberOfThreads) {

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "panonav/core/error.hpp"
-#include "support/sanitizers.hpp"
+#include "support/skips.hpp"
 
 namespace panonav {
 namespace {

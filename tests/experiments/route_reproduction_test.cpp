@@ -15,7 +15,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/simulation/recording.hpp"
 #include "panonav/simulation/scenes.hpp"
-#include "support/sanitizers.hpp"
+#include "support/skips.hpp"
 
 namespace panonav {
 namespace {

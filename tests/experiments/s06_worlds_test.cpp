@@ -12,7 +12,7 @@
 #include "experiments/s06/chains.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/simulation/scenes.hpp"
-#include "support/sanitizers.hpp"
+#include "support/skips.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace panonav {
@@ -41,7 +41,7 @@ TEST(S06Worlds, AWorldGivesItsRowsAndAPictureOfEachFailure) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   const char* const data = std::getenv("PANONAV_DATA");
   if (data == nullptr) GTEST_SKIP() << "PANONAV_DATA is not set";
-  const test::TemporaryFolder out;
+  const testing::TemporaryFolder out;
   Executor executor(2);
   Reproduction result;
   reproduce_homing_in_world(data, "small_warehouse", out.path(), 5, 30, executor, result);
@@ -57,7 +57,7 @@ TEST(S06Worlds, AWorldGivesItsRowsAndAPictureOfEachFailure) {
 }
 
 TEST(S06Worlds, AWorldThatIsNotThereIsAnError) {
-  const test::TemporaryFolder out;
+  const testing::TemporaryFolder out;
   Executor executor(1);
   Reproduction result;
   EXPECT_THROW(reproduce_homing_in_world(out.path(), "nowhere", out.path(), 1, 1, executor, result),

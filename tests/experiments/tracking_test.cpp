@@ -12,7 +12,7 @@
 #include "experiments/runs/tracking_filter.hpp"
 #include "experiments/runs/tracking_run.hpp"
 #include "panonav/core/error.hpp"
-#include "support/sanitizers.hpp"
+#include "support/skips.hpp"
 
 namespace panonav {
 namespace {

@@ -6,14 +6,17 @@
 #include <numbers>
 #include <vector>
 
-#include "homing/cylinder_world.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
+#include "support/remembered_worlds.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
-using test::CylinderWorld;
+HomingView seen_from(const ToyWorld& world, const Pose2& pose, int components = 14) {
+  return homing_view(striped_signature(world, pose, components));
+}
+
 constexpr double pi = std::numbers::pi;
 
 struct Ended {
@@ -23,9 +26,9 @@ struct Ended {
 };
 
 // A robot that does exactly what it is told.
-Ended run(const CylinderWorld& world, HomingPursuit pursuit, Pose2 pose) {
+Ended run(const ToyWorld& world, HomingPursuit pursuit, Pose2 pose) {
   for (;;) {
-    const PursuitDecision decision = pursuit.decide(world.seen_from(pose));
+    const PursuitDecision decision = pursuit.decide(seen_from(world, pose));
     if (decision.state != PursuitState::moving) {
       EXPECT_EQ(decision.advance_m, 0.0);
       return {decision.state, pose, pursuit.steps()};
@@ -42,7 +45,7 @@ TEST(HomingPursuit, ReachesHomeFromAllAroundWhateverTheHeading) {
     int arrived = 0;
     constexpr int starts = 60;
     for (int i = 0; i < starts; ++i) {
-      const CylinderWorld world(3.0, 100 + static_cast<std::uint64_t>(i % 10));
+      const ToyWorld world = striped_round_room(3.0, 100 + static_cast<std::uint64_t>(i % 10));
       const Pose2 home{random.uniform(-0.8, 0.8), random.uniform(-0.8, 0.8),
                        random.uniform(-pi, pi)};
       const double direction = random.uniform(-pi, pi);
@@ -50,7 +53,7 @@ TEST(HomingPursuit, ReachesHomeFromAllAroundWhateverTheHeading) {
       const Pose2 start{home.x_m + way_m * std::cos(direction),
                         home.y_m + way_m * std::sin(direction), random.uniform(-pi, pi)};
       const HomingPursuitOptions options{.strategy = strategy, .typical_distance_m = 3.0};
-      const Ended end = run(world, HomingPursuit(world.seen_from(home), options), start);
+      const Ended end = run(world, HomingPursuit(seen_from(world, home), options), start);
       arrived += end.state == PursuitState::arrived &&
                  distance(end.pose.position(), home.position()) < 0.05;
     }
@@ -59,10 +62,10 @@ TEST(HomingPursuit, ReachesHomeFromAllAroundWhateverTheHeading) {
 }
 
 TEST(HomingPursuit, StepIsThatOfThePaper) {
-  const CylinderWorld world(3.0, 7);
-  const HomingView home = world.seen_from({0.0, 0.0, 0.3});
+  const ToyWorld world = striped_round_room(3.0, 7);
+  const HomingView home = seen_from(world, {0.0, 0.0, 0.3});
   for (const double way_m : {0.1, 0.8}) {
-    const HomingView current = world.seen_from({way_m, 0.0, -1.0});
+    const HomingView current = seen_from(world, {way_m, 0.0, -1.0});
     const HomeVector vector = home_vector(home, current);
     const PursuitDecision decision = HomingPursuit(home).decide(current);
     ASSERT_EQ(decision.state, PursuitState::moving);
@@ -74,10 +77,10 @@ TEST(HomingPursuit, StepIsThatOfThePaper) {
 
 TEST(HomingPursuit, EndsThoughTheThingsAroundAreMuchNearerThanAssumed) {
   // Every step goes far beyond the goal: without a shorter step it would run to and fro for ever.
-  const CylinderWorld world(3.0, 8);
+  const ToyWorld world = striped_round_room(3.0, 8);
   const Pose2 home{0.2, 0.1, 1.0};
   const HomingPursuitOptions far{.typical_distance_m = 9.0, .longest_step_m = 2.0};
-  const Ended end = run(world, HomingPursuit(world.seen_from(home), far), {0.5, -0.1, 2.0});
+  const Ended end = run(world, HomingPursuit(seen_from(world, home), far), {0.5, -0.1, 2.0});
   EXPECT_EQ(end.state, PursuitState::arrived);
   EXPECT_LT(distance(end.pose.position(), home.position()), 0.1);
   EXPECT_LT(end.steps, 30);
@@ -88,9 +91,9 @@ TEST(HomingPursuit, NoticesAWrongPlace) {
   const HomingPursuitOptions strict{.arrived_difference = 0.05};
   int stopped = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    const CylinderWorld world(3.0, seed);
-    const CylinderWorld other(3.0, seed + 1000);
-    const HomingView home = other.seen_from({0.1, 0.2, 0.0});
+    const ToyWorld world = striped_round_room(3.0, seed);
+    const ToyWorld other = striped_round_room(3.0, seed + 1000);
+    const HomingView home = seen_from(other, {0.1, 0.2, 0.0});
     EXPECT_EQ(run(other, HomingPursuit(home, strict), {0.4, 0.0, 0.0}).state, PursuitState::arrived)
         << "seed " << seed;
     const Ended end = run(world, HomingPursuit(home, strict), {0.4, 0.0, 0.0});
@@ -101,12 +104,12 @@ TEST(HomingPursuit, NoticesAWrongPlace) {
 }
 
 TEST(HomingPursuit, StopsAtOnceAtHomeAndStaysStopped) {
-  const CylinderWorld world(3.0, 9);
-  const HomingView home = world.seen_from({});
+  const ToyWorld world = striped_round_room(3.0, 9);
+  const HomingView home = seen_from(world, {});
   HomingPursuit pursuit(home);
   for (int i = 0; i < 3; ++i) {
     const PursuitDecision decision =
-        pursuit.decide(i < 2 ? home : world.seen_from({0.8, 0.2, 1.0}));
+        pursuit.decide(i < 2 ? home : seen_from(world, {0.8, 0.2, 1.0}));
     EXPECT_EQ(decision.state, PursuitState::arrived);
     EXPECT_EQ(decision.advance_m, 0.0);
     if (i < 2) {
@@ -117,39 +120,39 @@ TEST(HomingPursuit, StopsAtOnceAtHomeAndStaysStopped) {
 }
 
 TEST(HomingPursuit, GivesUpAfterTheMostSteps) {
-  const CylinderWorld world(3.0, 10);
-  HomingPursuit pursuit(world.seen_from({}), {.most_steps = 3});
-  const HomingView stuck = world.seen_from({0.9, 0.0, 0.0});
+  const ToyWorld world = striped_round_room(3.0, 10);
+  HomingPursuit pursuit(seen_from(world, {}), {.most_steps = 3});
+  const HomingView stuck = seen_from(world, {0.9, 0.0, 0.0});
   for (int i = 0; i < 3; ++i) EXPECT_EQ(pursuit.decide(stuck).state, PursuitState::moving);
   EXPECT_EQ(pursuit.decide(stuck).state, PursuitState::exhausted);
 }
 
 TEST(HomingPursuit, StopsWhereViewsBecomeNoMoreAlike) {
-  const CylinderWorld world(3.0, 10);
-  HomingPursuit pursuit(world.seen_from({}), {.strategy = PursuitStrategy::steady, .patience = 3});
-  const HomingView stuck = world.seen_from({0.9, 0.0, 0.0});
+  const ToyWorld world = striped_round_room(3.0, 10);
+  HomingPursuit pursuit(seen_from(world, {}), {.strategy = PursuitStrategy::steady, .patience = 3});
+  const HomingView stuck = seen_from(world, {0.9, 0.0, 0.0});
   for (int i = 0; i < 3; ++i) EXPECT_EQ(pursuit.decide(stuck).state, PursuitState::moving);
   EXPECT_EQ(pursuit.decide(stuck).state, PursuitState::wrong_place);
 }
 
 TEST(HomingPursuit, CoarseToFineGoesThroughItsStages) {
-  const CylinderWorld world(3.0, 11);
-  const HomingView home = world.seen_from({});
+  const ToyWorld world = striped_round_room(3.0, 11);
+  const HomingView home = seen_from(world, {});
   HomingPursuit pursuit(home, {.strategy = PursuitStrategy::coarse_to_fine});
-  EXPECT_EQ(pursuit.decide(world.seen_from({0.8, 0.1, 0.0})).stage, 0);
+  EXPECT_EQ(pursuit.decide(seen_from(world, {0.8, 0.1, 0.0})).stage, 0);
   const PursuitDecision last = pursuit.decide(home);
   EXPECT_EQ(last.stage, 2);
   EXPECT_EQ(last.state, PursuitState::arrived);
 }
 
 TEST(HomingPursuit, ChecksItsInputs) {
-  const CylinderWorld world(3.0, 12);
-  EXPECT_THROW(HomingPursuit(world.seen_from({}), {.typical_distance_m = 0.0}), OptionError);
-  EXPECT_THROW(HomingPursuit(world.seen_from({}), {.most_steps = 0}), OptionError);
-  HomingPursuit pursuit(world.seen_from({}));
+  const ToyWorld world = striped_round_room(3.0, 12);
+  EXPECT_THROW(HomingPursuit(seen_from(world, {}), {.typical_distance_m = 0.0}), OptionError);
+  EXPECT_THROW(HomingPursuit(seen_from(world, {}), {.most_steps = 0}), OptionError);
+  HomingPursuit pursuit(seen_from(world, {}));
   const std::vector<float> zeros(2 * 14);
   EXPECT_THROW((void)pursuit.decide(HomingView(2, 14, zeros, zeros)), ContractError) << "rows";
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -4,16 +4,16 @@
 #include <cmath>
 #include <numbers>
 
-#include "localisation/recordings.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/panorama/preprocessing.hpp"
 #include "panonav/relative_pose/fourier_homing.hpp"
+#include "support/recordings.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
-std::vector<HomingView> views_of(const testing::Recording& recording, int components) {
+std::vector<HomingView> views_of(const Recording& recording, int components) {
   std::vector<HomingView> views;
   for (const Panorama& panorama : recording.views) {
     views.push_back(homing_view(compute_signature(preprocess(panorama, {}), components)));
@@ -23,8 +23,8 @@ std::vector<HomingView> views_of(const testing::Recording& recording, int compon
 
 // The camera looks along the direction of travel, so the view 20 pictures later lies ahead.
 TEST(HomingOnRecordings, SussexRouteLeadsAlongTheWay) {
-  const auto recording = testing::sussex_route();
-  if (!recording) GTEST_SKIP() << "PANONAV_DATA does not name a folder that holds sussex_route";
+  const auto recording = sussex_route();
+  PANONAV_REQUIRE_DATA(recording, "sussex_route");
   const auto views = views_of(*recording, 15);
   ASSERT_EQ(views.size(), 455U);
   std::vector<double> directions;
@@ -39,8 +39,8 @@ TEST(HomingOnRecordings, SussexRouteLeadsAlongTheWay) {
 
 // All pairs of the 10 cm grid up to 30 cm, whose headings differ by any number of columns.
 TEST(HomingOnRecordings, GantryViewsPointHome) {
-  const auto recording = testing::gantry_plants();
-  if (!recording) GTEST_SKIP() << "PANONAV_DATA does not name a folder that holds gantry_plants";
+  const auto recording = gantry_plants();
+  PANONAV_REQUIRE_DATA(recording, "gantry_plants");
   constexpr int columns = 90;
   const auto views = views_of(*recording, 15);
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
@@ -66,4 +66,4 @@ TEST(HomingOnRecordings, GantryViewsPointHome) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

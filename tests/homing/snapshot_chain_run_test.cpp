@@ -7,16 +7,18 @@
 #include <numbers>
 #include <vector>
 
-#include "homing/cylinder_world.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/homing/chain_follower.hpp"
 #include "panonav/homing/chain_recorder.hpp"
 #include "panonav/motion/odometry.hpp"
+#include "support/remembered_worlds.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
-using test::CylinderWorld;
+HomingView seen_from(const ToyWorld& world, const Pose2& pose, int components = 14) {
+  return homing_view(striped_signature(world, pose, components));
+}
 
 // A bend of 4.2 m within a room of 6 m radius.
 std::vector<Pose2> bend() {
@@ -29,13 +31,13 @@ std::vector<Pose2> bend() {
   return poses;
 }
 
-SnapshotChain record(const CylinderWorld& world, const std::vector<Pose2>& route,
+SnapshotChain record(const ToyWorld& world, const std::vector<Pose2>& route,
                      const ChainRecorderOptions& options) {
   ChainRecorder recorder(options);
   std::size_t snapshots = 0;
   for (std::size_t i = 0; i < route.size(); ++i) {
     const Pose2 moved = i == 0 ? Pose2{} : inverse(route[i - 1]) * route[i];
-    const std::size_t now = recorder.add(world.seen_from(route[i]), moved);
+    const std::size_t now = recorder.add(seen_from(world, route[i]), moved);
     EXPECT_GE(now, snapshots);
     EXPECT_LE(now, snapshots + 1);
     snapshots = now;
@@ -44,13 +46,13 @@ SnapshotChain record(const CylinderWorld& world, const std::vector<Pose2>& route
 }
 
 TEST(ChainRecorder, SnapshotsLieOnTheRouteAndItsEndIsTheLast) {
-  const CylinderWorld world(6.0, 3);
+  const ToyWorld world = striped_round_room(6.0, 3);
   const auto route = bend();
   const SnapshotChain chain = record(world, route, {.longest_spacing_m = 1.0});
   ASSERT_NO_THROW(validate(chain));
   ASSERT_GE(chain.snapshots.size(), 5U);
-  EXPECT_EQ(chain.snapshots.front().view, world.seen_from(route.front()));
-  EXPECT_EQ(chain.snapshots.back().view, world.seen_from(route.back()));
+  EXPECT_EQ(chain.snapshots.front().view, seen_from(world, route.front()));
+  EXPECT_EQ(chain.snapshots.back().view, seen_from(world, route.back()));
   EXPECT_NEAR(chain_length_m(chain), 4.2, 0.01);
   Pose2 pose = route.front();
   for (std::size_t i = 1; i < chain.snapshots.size(); ++i) {
@@ -60,7 +62,7 @@ TEST(ChainRecorder, SnapshotsLieOnTheRouteAndItsEndIsTheLast) {
     const auto number = static_cast<std::size_t>(std::lround(chain.snapshots[i].travelled_m / 0.1));
     ASSERT_LT(number, route.size());
     EXPECT_LT(distance(pose.position(), route[number].position()), 1e-6) << "snapshot " << i;
-    EXPECT_EQ(chain.snapshots[i].view, world.seen_from(route[number]));
+    EXPECT_EQ(chain.snapshots[i].view, seen_from(world, route[number]));
   }
 }
 
@@ -71,8 +73,8 @@ TEST(ChainRecorder, TakesMoreSnapshotsWhereViewsChangeFaster) {
   std::size_t small = 0;
   std::size_t large = 0;
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-    small += record(CylinderWorld(1.8, seed), straight, {}).snapshots.size();
-    large += record(CylinderWorld(18.0, seed), straight, {}).snapshots.size();
+    small += record(striped_round_room(1.8, seed), straight, {}).snapshots.size();
+    large += record(striped_round_room(18.0, seed), straight, {}).snapshots.size();
   }
   EXPECT_GT(small, large);
 }
@@ -80,14 +82,14 @@ TEST(ChainRecorder, TakesMoreSnapshotsWhereViewsChangeFaster) {
 TEST(ChainRecorder, ChecksItsInputs) {
   EXPECT_THROW(ChainRecorder({.margin = 0.0}), OptionError);
   EXPECT_THROW(ChainRecorder({.longest_spacing_m = -1.0}), OptionError);
-  const CylinderWorld world(3.0, 1);
+  const ToyWorld world = striped_round_room(3.0, 1);
   ChainRecorder recorder;
   EXPECT_TRUE(recorder.finish().snapshots.empty());
-  recorder.add(world.seen_from({}), {});
+  recorder.add(seen_from(world, {}), {});
   EXPECT_EQ(recorder.finish().snapshots.size(), 1U);
-  EXPECT_THROW(recorder.add(world.seen_from({}, 9), {}), ContractError) << "components";
+  EXPECT_THROW(recorder.add(seen_from(world, {}, 9), {}), ContractError) << "components";
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THROW(recorder.add(world.seen_from({}), {nan, 0.0, 0.0}), ContractError);
+  EXPECT_THROW(recorder.add(seen_from(world, {}), {nan, 0.0, 0.0}), ContractError);
 }
 
 TEST(ChainFollower, DrivesTheRouteAgainInBothDirectionsWhateverTheHeading) {
@@ -96,7 +98,7 @@ TEST(ChainFollower, DrivesTheRouteAgainInBothDirectionsWhateverTheHeading) {
   int runs = 0;
   double worst_m = 0.0;
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    const CylinderWorld world(6.0, seed);
+    const ToyWorld world = striped_round_room(6.0, seed);
     const SnapshotChain chain = record(world, route, {.longest_spacing_m = 1.0});
     for (const ChainDirection direction : {ChainDirection::forward, ChainDirection::back}) {
       const bool forward = direction == ChainDirection::forward;
@@ -107,7 +109,7 @@ TEST(ChainFollower, DrivesTheRouteAgainInBothDirectionsWhateverTheHeading) {
       Pose2 moved;
       ++runs;
       for (int step = 0; step < 120; ++step) {
-        const ChainDecision decision = follower.decide(world.seen_from(pose), moved);
+        const ChainDecision decision = follower.decide(seen_from(world, pose), moved);
         if (decision.state == ChainState::finished) {
           EXPECT_EQ(decision.target, forward ? chain.snapshots.size() - 1 : 0U);
           EXPECT_LT(distance(pose.position(), end.position()), 0.1);
@@ -129,15 +131,15 @@ TEST(ChainFollower, DrivesTheRouteAgainInBothDirectionsWhateverTheHeading) {
 }
 
 TEST(ChainFollower, SaysThatItIsLostInAnotherPlace) {
-  const CylinderWorld world(6.0, 1);
-  const CylinderWorld other(6.0, 50);
+  const ToyWorld world = striped_round_room(6.0, 1);
+  const ToyWorld other = striped_round_room(6.0, 50);
   const SnapshotChain chain = record(world, bend(), {.longest_spacing_m = 1.0});
   ChainFollower follower(chain, ChainDirection::forward, {}, {.arrived_difference = 0.02});
   Pose2 pose{0.0, 0.0, 0.0};
   Pose2 moved;
   ChainState state = ChainState::following;
   for (int step = 0; step < 300 && state == ChainState::following; ++step) {
-    const ChainDecision decision = follower.decide(other.seen_from(pose), moved);
+    const ChainDecision decision = follower.decide(seen_from(other, pose), moved);
     state = decision.state;
     moved = Pose2{0.0, 0.0, decision.turn_rad} * Pose2{decision.advance_m, 0.0, 0.0};
     const Pose2 next = pose * moved;
@@ -149,12 +151,12 @@ TEST(ChainFollower, SaysThatItIsLostInAnotherPlace) {
 
 TEST(ChainFollower, ChecksItsInputs) {
   EXPECT_THROW(ChainFollower({}, ChainDirection::forward), ContractError) << "an empty chain";
-  const CylinderWorld world(3.0, 1);
-  const SnapshotChain one{{{world.seen_from({}), 0.0, {}}}};
+  const ToyWorld world = striped_round_room(3.0, 1);
+  const SnapshotChain one{{{seen_from(world, {}), 0.0, {}}}};
   EXPECT_THROW(ChainFollower(one, ChainDirection::forward, {.switch_length = -1.0}), OptionError);
   ChainFollower follower(one, ChainDirection::back);
-  EXPECT_EQ(follower.decide(world.seen_from({}), {}).state, ChainState::finished);
+  EXPECT_EQ(follower.decide(seen_from(world, {}), {}).state, ChainState::finished);
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

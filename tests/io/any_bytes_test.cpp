@@ -5,7 +5,6 @@
 #include <functional>
 #include <string>
 
-#include "io/picture_samples.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/io/camera_file.hpp"
@@ -13,12 +12,11 @@
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/option_file.hpp"
 #include "panonav/io/trajectory_file.hpp"
+#include "support/picture_samples.hpp"
 #include "support/temporary_folder.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
-
-using test::TemporaryFolder;
 
 constexpr std::string_view dataset_text =
     "[images]\nkind = \"equirectangular\"\ncolumns = \"clockwise\"\nforward_column = 0.5\n"
@@ -36,7 +34,7 @@ constexpr std::string_view csv_text = "stamp_s,x_m,y_m,heading_deg\n0,1,2,3\n1,2
 class AnyBytes : public ::testing::Test {
  protected:
   void SetUp() override {
-    const Image picture = test::smooth_image(16, 8, 1);
+    const Image picture = smooth_image(16, 8, 1);
     write_png(folder / "a.png", picture.view());
     write_png(folder / "b.png", picture.view());
     folder.write("dataset.toml", dataset_text);
@@ -136,4 +134,4 @@ TEST_F(AnyBytes, DeeplyNestedToml) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -9,7 +9,7 @@
 #include "panonav/io/trajectory_file.hpp"
 #include "support/temporary_folder.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
 namespace fs = std::filesystem;
@@ -26,16 +26,12 @@ Camera mirror_camera(CameraModel model) {
 }
 
 std::string error_of(const fs::path& path) {
-  try {
-    (void)read_camera(path);
-    return "";
-  } catch (const FileError& error) {
-    return error.what();
-  }
+  return message_of<FileError>([&] { (void)read_camera(path); });
 }
 
-TEST(CameraFile, EveryModelReadsBackTheSame) {
-  const test::TemporaryFolder folder;
+using CameraFiles = InTemporaryFolder;
+
+TEST_F(CameraFiles, EveryModelReadsBackTheSame) {
   const fs::path path = folder / "camera.toml";
   int models = 0;
   for (const CameraModel& model :
@@ -53,8 +49,7 @@ TEST(CameraFile, EveryModelReadsBackTheSame) {
   EXPECT_EQ(models, 4);
 }
 
-TEST(CameraFile, FaultsNameFieldValueAndRange) {
-  const test::TemporaryFolder folder;
+TEST_F(CameraFiles, FaultsNameFieldValueAndRange) {
   const fs::path path = folder / "camera.toml";
   write_camera(path, {mirror_camera(HyperboloidalModel{}), std::nullopt});
   std::ifstream in(path);
@@ -67,21 +62,21 @@ TEST(CameraFile, FaultsNameFieldValueAndRange) {
     std::ofstream(path) << text;
     return error_of(path);
   };
-  EXPECT_NE(with("model", "model = \"pinhole\"").find("pinhole"), std::string::npos);
-  EXPECT_NE(with("rim_radius_px", "rim_radius_px = nan").find("rim_radius_px"), std::string::npos);
-  EXPECT_NE(with("width_px", "width_px = 0.5").find("width_px is 0.5"), std::string::npos);
-  EXPECT_NE(with("centre_u_px", "").find("centre_u_px is missing"), std::string::npos);
-  EXPECT_NE(with("columns", "colums = \"clockwise\"").find("colums is not a known field"),
-            std::string::npos);
-  EXPECT_NE(error_of(folder / "no_such_camera.toml"), "");
+  EXPECT_TRUE(contains(with("model", "model = \"pinhole\""), "pinhole"));
+  EXPECT_TRUE(contains(with("rim_radius_px", "rim_radius_px = nan"), "rim_radius_px"));
+  EXPECT_TRUE(contains(with("width_px", "width_px = 0.5"), "width_px is 0.5"));
+  EXPECT_TRUE(contains(with("centre_u_px", ""), "centre_u_px is missing"));
+  EXPECT_TRUE(contains(with("columns", "colums = \"clockwise\""), "colums is not a known field"));
+  EXPECT_NE(error_of(folder / "no_such_camera.toml"), "no error");
 }
 
-TEST(TrajectoryFile, TumAndCsvReadBackTheSame) {
+using TrajectoryFile = InTemporaryFolder;
+
+TEST_F(TrajectoryFile, TumAndCsvReadBackTheSame) {
   std::vector<StampedPose> trajectory;
   for (int i = 0; i < 20; ++i) {
     trajectory.push_back({0.1 * i, {0.3 * i, -0.01 * i * i, wrap_angle(0.5 * i)}});
   }
-  const test::TemporaryFolder folder;
   for (const char* name : {"trajectory.tum", "trajectory.csv"}) {
     const fs::path path = folder / name;
     write_trajectory(path, trajectory);
@@ -96,24 +91,18 @@ TEST(TrajectoryFile, TumAndCsvReadBackTheSame) {
   }
 }
 
-TEST(TrajectoryFile, FaultsNameTheLine) {
-  const test::TemporaryFolder folder;
+TEST_F(TrajectoryFile, FaultsNameTheLine) {
   const fs::path path = folder / "trajectory.tum";
   const auto message = [&](const std::string& text) -> std::string {
     std::ofstream(path) << text;
-    try {
-      (void)read_trajectory(path);
-      return "";
-    } catch (const FileError& error) {
-      return error.what();
-    }
+    return message_of<FileError>([&] { (void)read_trajectory(path); });
   };
-  EXPECT_NE(message("0 1 2 0 0 0 0 1\n1 2 3\n").find("line 2"), std::string::npos);
-  EXPECT_NE(message("0 1 nan 0 0 0 0 1\n").find("line 1"), std::string::npos);
-  EXPECT_NE(message("0 1 2 0 0 0 0 0.5\n").find("quaternion"), std::string::npos);
-  EXPECT_NE(message("1 1 2 0 0 0 0 1\n1 1 2 0 0 0 0 1\n").find("stamp"), std::string::npos);
-  EXPECT_NE(message("# nothing\n").find("no pose"), std::string::npos);
+  EXPECT_TRUE(contains(message("0 1 2 0 0 0 0 1\n1 2 3\n"), "line 2"));
+  EXPECT_TRUE(contains(message("0 1 nan 0 0 0 0 1\n"), "line 1"));
+  EXPECT_TRUE(contains(message("0 1 2 0 0 0 0 0.5\n"), "quaternion"));
+  EXPECT_TRUE(contains(message("1 1 2 0 0 0 0 1\n1 1 2 0 0 0 0 1\n"), "stamp"));
+  EXPECT_TRUE(contains(message("# nothing\n"), "no pose"));
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -1,10 +1,10 @@
 #include "panonav/io/dataset.hpp"
+#include "support/skips.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -15,7 +15,7 @@
 #include "panonav/io/panorama_reader.hpp"
 #include "support/temporary_folder.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
 namespace fs = std::filesystem;
@@ -35,25 +35,20 @@ class DatasetFolder : public ::testing::Test {
   void write(const std::string& name, const std::string& text) const {
     std::ofstream(folder / name) << text;
   }
-  // The message of the error that reading throws; empty when it throws none.
+  // The message of the error that reading throws.
   [[nodiscard]] std::string error() const {
-    try {
-      (void)read_dataset(folder);
-      return "";
-    } catch (const FileError& e) {
-      return e.what();
-    }
+    return message_of<FileError>([&] { (void)read_dataset(folder); });
   }
   void expect_error(const std::string& part) const {
     const std::string message = error();
-    EXPECT_NE(message.find(part), std::string::npos) << "message: " << message;
+    EXPECT_TRUE(contains(message, part)) << "message: " << message;
     EXPECT_EQ(message.find('\n'), std::string::npos) << "more than one line: " << message;
   }
 
   static constexpr const char* kToml =
       "[images]\nkind = \"panorama\"\ncolumns = \"clockwise\"\nforward_column = 0.5\n"
       "[poses]\nfile = \"poses.csv\"\n";
-  const test::TemporaryFolder temporary;
+  const TemporaryFolder temporary;
   const fs::path& folder = temporary.path();
 };
 
@@ -205,9 +200,6 @@ TEST_F(DatasetFolder, APlainFolderIsReadInNaturalOrder) {
 }
 
 TEST(RealDatasets, AllAreReadAndConverted) {
-  const char* data = std::getenv("PANONAV_DATA");
-  if (data == nullptr || *data == '\0')
-    GTEST_SKIP() << "PANONAV_DATA is not set: no real recordings";
   const struct {
     const char* name;
     std::size_t pictures;
@@ -215,9 +207,9 @@ TEST(RealDatasets, AllAreReadAndConverted) {
   } expected[] = {
       {"gantry_plants", 196, true}, {"sussex_route", 455, false}, {"indoor_walk_360", 117, false}};
   for (const auto& each : expected) {
-    const fs::path folder = fs::path(data) / each.name;
-    if (!fs::exists(folder)) GTEST_SKIP() << folder << " is not there";
-    const Dataset dataset = read_dataset(folder);
+    const auto folder = real_data(each.name);
+    PANONAV_REQUIRE_DATA(folder, each.name);
+    const Dataset dataset = read_dataset(*folder);
     EXPECT_EQ(dataset.entries.size(), each.pictures) << each.name;
     EXPECT_EQ(dataset.entries[0].pose && dataset.entries[0].pose->heading_rad, each.headings)
         << each.name;
@@ -228,4 +220,4 @@ TEST(RealDatasets, AllAreReadAndConverted) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -8,11 +8,12 @@
 #include "panonav/io/atomic_file.hpp"
 #include "support/temporary_folder.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
-TEST(GraphFile, NodesAndEdgesAreThere) {
-  const test::TemporaryFolder folder;
+using GraphFile = InTemporaryFolder;
+
+TEST_F(GraphFile, NodesAndEdgesAreThere) {
   TopologicalMap map;
   map.nodes = {{ViewId{3}, {1.5, -2.0, 0.25}, 0}, {ViewId{7}, {0.0, 0.0, 0.0}, 0}};
   map.edges = {{ViewId{3}, ViewId{7}, {0.5, 0.0, 0.125}, LinkKind::closure, 0.75}};
@@ -25,12 +26,11 @@ TEST(GraphFile, NodesAndEdgesAreThere) {
         "<data key=\"x_m\">1.5</data><data key=\"y_m\">-2</data>",
         "<edge source=\"3\" target=\"7\"><data key=\"kind\">closure</data>",
         "<data key=\"weight\">0.75</data>", "</graphml>"}) {
-    EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
+    EXPECT_TRUE(contains(text, part)) << part << "\n" << text;
   }
 }
 
-TEST(GraphFile, BrokenMapsAreRefused) {
-  const test::TemporaryFolder folder;
+TEST_F(GraphFile, BrokenMapsAreRefused) {
   TopologicalMap map;
   map.nodes = {{ViewId{3}, {std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0}, 0}};
   EXPECT_THROW(write_graph(folder / "m.graphml", map, [](ViewId) { return std::string(); }),
@@ -41,4 +41,4 @@ TEST(GraphFile, BrokenMapsAreRefused) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -1,31 +1,26 @@
 #include "panonav/io/image_file.hpp"
+#include "support/skips.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "io/picture_samples.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/io/atomic_file.hpp"
+#include "support/picture_samples.hpp"
 #include "support/temporary_folder.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
-
-using test::make_jpeg;
-using test::make_png;
-using test::message_of;
-using test::random_image;
-using test::smooth_image;
-using test::TemporaryFolder;
 
 using Bytes = std::vector<std::uint8_t>;
 
-TEST(ImageFile, PngComesBackAsItWasWritten) {
+using ImageFile = InTemporaryFolder;
+
+TEST_F(ImageFile, PngComesBackAsItWasWritten) {
   Random random(1);
-  const TemporaryFolder folder;
   for (const int channels : {1, 3}) {
     for (const ImageSize size : {ImageSize{1, 1}, ImageSize{7, 3}, ImageSize{640, 48}}) {
       const Image image = random_image(random, size.width, size.height, channels);
@@ -37,7 +32,7 @@ TEST(ImageFile, PngComesBackAsItWasWritten) {
   }
 }
 
-TEST(ImageFile, StrideOfAViewIsRespected) {
+TEST_F(ImageFile, StrideOfAViewIsRespected) {
   Random random(2);
   const Image image = random_image(random, 20, 10, 3);
   const ImageView part{image.view().data + 3 * 3, 5, 10, 3, image.view().stride};
@@ -50,7 +45,7 @@ TEST(ImageFile, StrideOfAViewIsRespected) {
   }
 }
 
-TEST(ImageFile, PngOfAnyDepthAndColourType) {
+TEST_F(ImageFile, PngOfAnyDepthAndColourType) {
   // 10 pixels 1010001101, one bit each.
   const Image bits =
       decode_image(make_png(10, 1, PNG_COLOR_TYPE_GRAY, 1, {{0b10100011, 0b01000000}}), "1");
@@ -76,7 +71,7 @@ TEST(ImageFile, PngOfAnyDepthAndColourType) {
   EXPECT_EQ(grey_alpha, Image(2, 1, 1, Bytes{9, 6}));
 }
 
-TEST(ImageFile, InterlacedPngIsTheSamePicture) {
+TEST_F(ImageFile, InterlacedPngIsTheSamePicture) {
   Random random(3);
   const Image image = random_image(random, 33, 17, 1);
   std::vector<Bytes> rows;
@@ -89,7 +84,7 @@ TEST(ImageFile, InterlacedPngIsTheSamePicture) {
             image);
 }
 
-TEST(ImageFile, JpegIsNearTheSource) {
+TEST_F(ImageFile, JpegIsNearTheSource) {
   for (const int channels : {1, 3}) {
     for (const bool progressive : {false, true}) {
       const Image image = smooth_image(61, 35, channels);
@@ -127,7 +122,7 @@ std::size_t decode_and_count_errors(const Bytes& bytes) {
   }
 }
 
-TEST(ImageFile, CutFilesAreRefused) {
+TEST_F(ImageFile, CutFilesAreRefused) {
   Random random(4);
   const std::vector<Bytes> files = sample_files(random);
   for (const Bytes& file : files) {
@@ -142,7 +137,7 @@ TEST(ImageFile, CutFilesAreRefused) {
   }
 }
 
-TEST(ImageFile, DamagedBytesNeverCrash) {
+TEST_F(ImageFile, DamagedBytesNeverCrash) {
   Random random(5);
   const std::vector<Bytes> files = sample_files(random);
   std::size_t refused = 0;
@@ -167,7 +162,7 @@ TEST(ImageFile, DamagedBytesNeverCrash) {
   }
 }
 
-TEST(ImageFile, SizesAreBounded) {
+TEST_F(ImageFile, SizesAreBounded) {
   // Only the head is changed: a small file that promises an enormous picture.
   Bytes file = make_jpeg(smooth_image(16, 16, 1), 90, false);
   const Bytes start_of_frame{0xFF, 0xC0};
@@ -175,32 +170,25 @@ TEST(ImageFile, SizesAreBounded) {
       std::search(file.begin(), file.end(), start_of_frame.begin(), start_of_frame.end());
   ASSERT_NE(at, file.end());
   for (int i = 5; i < 9; ++i) *(at + i) = 0xFD;
-  EXPECT_NE(message_of<FileError>([&] {
-              (void)decode_image(file, "huge.jpg");
-            }).find("huge.jpg: picture is 65021 x 65021 px; allowed:"),
-            std::string::npos);
+  EXPECT_TRUE(contains(message_of<FileError>([&] { (void)decode_image(file, "huge.jpg"); }),
+                       "huge.jpg: picture is 65021 x 65021 px; allowed:"));
 }
 
-TEST(ImageFile, ClearLinesForWhatIsNoPicture) {
-  const TemporaryFolder folder;
-  EXPECT_NE(message_of<FileError>([&] {
-              (void)read_image(folder / "none.png");
-            }).find("none.png: cannot be read: No such file"),
-            std::string::npos);
-  EXPECT_NE(message_of<FileError>([&] { (void)read_image(folder.path()); }).find("is a folder"),
-            std::string::npos);
-  EXPECT_NE(message_of<FileError>([&] {
-              (void)read_image(folder.write("empty.png", ""));
-            }).find("is empty"),
-            std::string::npos);
-  EXPECT_NE(message_of<FileError>([&] {
-              (void)read_image(folder.write("text.png", "hello"));
-            }).find("allowed: PNG, JPEG"),
-            std::string::npos);
+TEST_F(ImageFile, ClearLinesForWhatIsNoPicture) {
+  EXPECT_TRUE(contains(message_of<FileError>([&] { (void)read_image(folder / "none.png"); }),
+                       "none.png: cannot be read: No such file"));
+  EXPECT_TRUE(
+      contains(message_of<FileError>([&] { (void)read_image(folder.path()); }), "is a folder"));
+  EXPECT_TRUE(contains(
+      message_of<FileError>([&] { (void)read_image(folder.write("empty.png", "")); }), "is empty"));
+  EXPECT_TRUE(
+      contains(message_of<FileError>([&] { (void)read_image(folder.write("text.png", "hello")); }),
+               "allowed: PNG, JPEG"));
 }
 
-TEST(AtomicFile, ReplacesWholeAndLeavesNothingBehind) {
-  const TemporaryFolder folder;
+using AtomicFile = InTemporaryFolder;
+
+TEST_F(AtomicFile, ReplacesWholeAndLeavesNothingBehind) {
   const auto path = folder / "a.txt";
   write_file(path, "first");
   write_file(path, "second, longer");
@@ -214,23 +202,23 @@ TEST(AtomicFile, ReplacesWholeAndLeavesNothingBehind) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 2);
 }
 
-TEST(AtomicFile, AFailureLeavesTheOldFile) {
-  const TemporaryFolder folder;
+TEST_F(AtomicFile, AFailureLeavesTheOldFile) {
   EXPECT_THROW(write_file(folder / "no" / "a.txt", "x"), FileError);
   EXPECT_THROW(write_file(folder.path(), "x"), FileError);
   write_file("/dev/null", "x");
   EXPECT_FALSE(std::filesystem::is_regular_file("/dev/null"));
 }
 
-TEST(ImageFile, RealPictures) {
-  const char* data = std::getenv("PANONAV_DATA");
-  if (data == nullptr) GTEST_SKIP() << "PANONAV_DATA is not set: no real pictures to read";
-  const std::filesystem::path root(data);
-  EXPECT_EQ(read_image(root / "mirror_raw" / "KaidanOmni1.jpg").size(), (ImageSize{640, 480}));
-  const Image plants = read_image(root / "gantry_plants" / "im_001_001_001.png");
+TEST_F(ImageFile, RealPictures) {
+  const auto mirrors = real_data("mirror_raw");
+  PANONAV_REQUIRE_DATA(mirrors, "mirror_raw");
+  EXPECT_EQ(read_image(*mirrors / "KaidanOmni1.jpg").size(), (ImageSize{640, 480}));
+  const auto gantry = real_data("gantry_plants");
+  PANONAV_REQUIRE_DATA(gantry, "gantry_plants");
+  const Image plants = read_image(*gantry / "im_001_001_001.png");
   EXPECT_EQ(plants.size(), (ImageSize{90, 7}));
   for (const std::uint8_t value : plants.pixels()) ASSERT_TRUE(value == 0 || value == 255);
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -7,7 +7,7 @@
 #include "panonav/core/error.hpp"
 #include "support/temporary_folder.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 
 // Outside the unnamed namespace: `visit_options` is found by its argument.
 struct SampleOptions {
@@ -28,11 +28,9 @@ void visit_options(SampleOptions& options, OptionVisitor& visitor) {
 
 namespace {
 
-using test::message_of;
-using test::TemporaryFolder;
+using OptionFiles = InTemporaryFolder;
 
-TEST(OptionFile, FieldsReplaceDefaults) {
-  const TemporaryFolder folder;
+TEST_F(OptionFiles, FieldsReplaceDefaults) {
   const OptionFile file(
       folder.write("a.toml",
                    "[sample]\ncount = 7\nradius_m = 2\nfast = true\nkind = \"fancy\"\n"
@@ -52,15 +50,14 @@ TEST(OptionFile, FieldsReplaceDefaults) {
   file.require_sections(std::array<std::string_view, 3>{"half", "sample", "more"});
 }
 
-TEST(OptionFile, FaultsNameFileSectionFieldAndRange) {
-  const TemporaryFolder folder;
+TEST_F(OptionFiles, FaultsNameFileSectionFieldAndRange) {
   const auto expect_fault = [&](std::string_view fields, std::string_view part) {
     const auto path = folder.write("a.toml", "[sample]\n" + std::string(fields) + "\n");
     SampleOptions options;
     const std::string message =
         message_of<FileError>([&] { OptionFile(path).apply("sample", options); });
     EXPECT_EQ(message.rfind(path.string() + ": ", 0), 0U) << message;
-    EXPECT_NE(message.find(part), std::string::npos) << message;
+    EXPECT_TRUE(contains(message, part));
   };
   expect_fault("counts = 7", "[sample] counts is not a known field; known: count, ");
   expect_fault("count = 0", "[sample] count is 0; allowed: >= 1 and <= 10");
@@ -74,14 +71,14 @@ TEST(OptionFile, FaultsNameFileSectionFieldAndRange) {
   expect_fault("count =", "is not TOML");
 
   const auto stray = folder.write("b.toml", "count = 3\n");
-  EXPECT_NE(message_of<FileError>([&] { OptionFile file(stray); }).find("outside all sections"),
-            std::string::npos);
+  EXPECT_TRUE(
+      contains(message_of<FileError>([&] { OptionFile file(stray); }), "outside all sections"));
   const OptionFile file(folder.write("c.toml", "[smaple]\ncount = 3\n"));
-  EXPECT_NE(message_of<FileError>([&] {
-              file.require_sections(std::array<std::string_view, 1>{"sample"});
-            }).find("[smaple] is not a known section; known: sample"),
-            std::string::npos);
+  EXPECT_TRUE(contains(message_of<FileError>([&] {
+                         file.require_sections(std::array<std::string_view, 1>{"sample"});
+                       }),
+                       "[smaple] is not a known section; known: sample"));
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -3,8 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdlib>
-#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -12,19 +10,18 @@
 #include "panonav/io/panorama_reader.hpp"
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav/signature/dissimilarity.hpp"
+#include "support/skips.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
-class SearchOnRecordings : public testing::TestWithParam<const char*> {};
+class SearchOnRecordings : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(SearchOnRecordings, FindsWhatAFullScanFinds) {
-  const char* const data = std::getenv("PANONAV_DATA");
-  if (data == nullptr) GTEST_SKIP() << "PANONAV_DATA is not set: no real recordings";
-  const std::filesystem::path folder = std::filesystem::path(data) / GetParam();
-  if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is not there";
+  const auto folder = real_data(GetParam());
+  PANONAV_REQUIRE_DATA(folder, GetParam());
 
-  const Dataset dataset = read_dataset(folder);
+  const Dataset dataset = read_dataset(*folder);
   const PanoramaReader reader(dataset.source, {0, 0});
   std::vector<FourierSignature> signatures;
   float full_scale = 0.0F;
@@ -63,8 +60,8 @@ TEST_P(SearchOnRecordings, FindsWhatAFullScanFinds) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Recordings, SearchOnRecordings,
-                         testing::Values("gantry_plants", "sussex_route"),
+                         ::testing::Values("gantry_plants", "sussex_route"),
                          [](const auto& instance) { return std::string(instance.param); });
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

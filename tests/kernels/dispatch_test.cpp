@@ -34,7 +34,7 @@ TEST(Dispatch, ChoiceObeysTheEnvironmentOrIsTheWidest) {
 
 // Death tests run in a process of their own, where the choice has not been made yet.
 TEST(DispatchDeathTest, UnknownSetIsRefusedWithTheAllowedOnes) {
-  testing::FLAGS_gtest_death_test_style = "threadsafe";
+  ::testing::FLAGS_gtest_death_test_style = "threadsafe";
   EXPECT_EXIT(
       {
         setenv("PANONAV_INSTRUCTIONS", "mmx", 1);
@@ -48,18 +48,18 @@ TEST(DispatchDeathTest, UnknownSetIsRefusedWithTheAllowedOnes) {
         }
         std::exit(5);
       },
-      testing::ExitedWithCode(3), "");
+      ::testing::ExitedWithCode(3), "");
 }
 
 TEST(DispatchDeathTest, EveryAvailableSetCanBeForced) {
-  testing::FLAGS_gtest_death_test_style = "threadsafe";
+  ::testing::FLAGS_gtest_death_test_style = "threadsafe";
   for (const Instructions set : available_instructions()) {
     EXPECT_EXIT(
         {
           setenv("PANONAV_INSTRUCTIONS", name(set).data(), 1);
           std::exit(chosen_instructions() == set ? 3 : 4);
         },
-        testing::ExitedWithCode(3), "")
+        ::testing::ExitedWithCode(3), "")
         << name(set);
   }
 }

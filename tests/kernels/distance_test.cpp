@@ -23,7 +23,7 @@ std::vector<std::uint8_t> random_mask(Random& random, std::size_t count) {
   return mask;
 }
 
-class Distance : public testing::TestWithParam<Instructions> {
+class Distance : public ::testing::TestWithParam<Instructions> {
  protected:
   const DistanceKernels& kernels = distance_kernels(GetParam());
   const DistanceKernels& scalar = distance_kernels(Instructions::scalar);
@@ -161,8 +161,8 @@ TEST_P(Distance, CollectFindsAllValuesUpToTheLimit) {
 }
 
 INSTANTIATE_TEST_SUITE_P(EachInstructionSet, Distance,
-                         testing::ValuesIn(available_instructions().begin(),
-                                           available_instructions().end()),
+                         ::testing::ValuesIn(available_instructions().begin(),
+                                             available_instructions().end()),
                          [](const auto& instance) { return std::string(name(instance.param)); });
 
 }  // namespace

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <vector>
 
-#include "localisation/ray_cast_room.hpp"
 #include "panonav/core/error.hpp"
+#include "support/remembered_worlds.hpp"
 
 namespace panonav::testing {
 namespace {

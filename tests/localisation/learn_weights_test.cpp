@@ -6,9 +6,9 @@
 #include <numeric>
 #include <vector>
 
-#include "localisation/ray_cast_room.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/signature/dissimilarity.hpp"
+#include "support/remembered_worlds.hpp"
 
 namespace panonav::testing {
 namespace {

@@ -7,8 +7,8 @@
 #include <numbers>
 #include <vector>
 
-#include "localisation/ray_cast_room.hpp"
 #include "panonav/core/error.hpp"
+#include "support/remembered_worlds.hpp"
 
 namespace panonav::testing {
 namespace {

@@ -9,10 +9,10 @@
 #include <numbers>
 #include <vector>
 
-#include "localisation/ray_cast_room.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/motion/path.hpp"
-#include "support/sanitizers.hpp"
+#include "support/remembered_worlds.hpp"
+#include "support/skips.hpp"
 
 namespace panonav::testing {
 namespace {

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <vector>
 
-#include "localisation/ray_cast_room.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
-#include "support/sanitizers.hpp"
+#include "support/remembered_worlds.hpp"
+#include "support/skips.hpp"
 
 namespace panonav::testing {
 namespace {

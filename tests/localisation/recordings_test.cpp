@@ -9,16 +9,13 @@
 #include <numbers>
 #include <vector>
 
-#include "localisation/ray_cast_room.hpp"
-#include "localisation/recordings.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/localisation/localiser.hpp"
+#include "support/recordings.hpp"
+#include "support/remembered_worlds.hpp"
 
 namespace panonav::testing {
 namespace {
-
-#define REQUIRE_RECORDING(recording, name) \
-  if (!(recording)) GTEST_SKIP() << "PANONAV_DATA does not point to a folder with " name
 
 struct Part {
   std::vector<FourierSignature> signatures;
@@ -90,7 +87,7 @@ bool even_column(const Recording& gantry, std::size_t i) {
 
 TEST(SussexRoute, InterpolationBeatsTheNearestReference) {
   const auto route = sussex_route();
-  REQUIRE_RECORDING(route, "sussex_route");
+  PANONAV_REQUIRE_DATA(route, "sussex_route");
   const auto remainder = [&](std::size_t i, int divisor) {
     return trailing_number(route->files[i]) % divisor;
   };
@@ -114,7 +111,7 @@ TEST(SussexRoute, InterpolationBeatsTheNearestReference) {
 
 TEST(GantryPlants, InterpolationHalvesTheErrorBetweenReferences) {
   const auto gantry = gantry_plants();
-  REQUIRE_RECORDING(gantry, "gantry_plants");
+  PANONAV_REQUIRE_DATA(gantry, "gantry_plants");
   // Every second place of the grid is remembered, so that each place asked for lies 0.1 m from up
   // to four references.
   const PositionErrors errors =
@@ -128,7 +125,7 @@ TEST(GantryPlants, InterpolationHalvesTheErrorBetweenReferences) {
 
 TEST(GantryPlants, AbsoluteHeadingBetweenReferences) {
   const auto gantry = gantry_plants();
-  REQUIRE_RECORDING(gantry, "gantry_plants");
+  PANONAV_REQUIRE_DATA(gantry, "gantry_plants");
   const Part memorised = part_of(*gantry, [&](std::size_t i) { return even_column(*gantry, i); });
   const Part asked = part_of(*gantry, [&](std::size_t i) { return !even_column(*gantry, i); });
   const VisualMemory memory = make_memory(memorised.signatures, memorised.poses);
@@ -145,7 +142,7 @@ TEST(GantryPlants, AbsoluteHeadingBetweenReferences) {
 
 TEST(IndoorWalk, EveryTurnedImageFindsItselfAndItsTurn) {
   const auto walk = indoor_walk({20, 256});
-  REQUIRE_RECORDING(walk, "indoor_walk_360");
+  PANONAV_REQUIRE_DATA(walk, "indoor_walk_360");
   const Part all = part_of(*walk, [](std::size_t) { return true; });
   const VisualMemory memory = make_memory(all.signatures, all.poses);
   const Localiser localiser(memory);
@@ -169,7 +166,7 @@ TEST(UnknownPlaces, OtherRecordingsAreRefusedAndOwnOnesKnown) {
   const auto gantry = gantry_plants(shape);
   const auto route = sussex_route(shape);
   const auto walk = indoor_walk(shape);
-  REQUIRE_RECORDING(gantry && route && walk, "gantry_plants, sussex_route and indoor_walk_360");
+  PANONAV_REQUIRE_DATA(gantry && route && walk, "gantry_plants, sussex_route and indoor_walk_360");
   const auto all = [](std::size_t) { return true; };
   struct Case {
     const char* name;

@@ -8,9 +8,9 @@
 #include <set>
 #include <vector>
 
-#include "localisation/ray_cast_room.hpp"
 #include "panonav/core/error.hpp"
-#include "support/sanitizers.hpp"
+#include "support/remembered_worlds.hpp"
+#include "support/skips.hpp"
 
 namespace panonav::testing {
 namespace {

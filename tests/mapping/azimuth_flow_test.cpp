@@ -5,21 +5,21 @@
 #include <cmath>
 #include <numbers>
 
-#include "mapping/round_room.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/mapping/visual_odometry.hpp"
+#include "support/remembered_worlds.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
 constexpr double radius_m = 4.0;
 
-HomingView seen(const test::RoundRoom& room, const Pose2& pose) {
-  return homing_view(room.seen_from(pose));
+HomingView seen(const ToyWorld& room, const Pose2& pose) {
+  return homing_view(round_room_signature(room, pose));
 }
 
 TEST(AzimuthFlow, ATurnOnTheSpotIsATurnAndNothingElse) {
-  const test::RoundRoom room(radius_m, 1);
+  const ToyWorld room = round_room(radius_m, 1);
   for (const double turn : {-0.2, 0.0, 0.1}) {
     const auto flow =
         refine_flow(seen(room, {0.5, 0.2, 0.3}), seen(room, {0.5, 0.2, 0.3 + turn}), {}, 4);
@@ -45,15 +45,15 @@ TEST(AzimuthFlow, TheSecondHarmonicIsTheNearerSide) {
 // Along a wall, near it: without the correction every step looks like a turn to the same side.
 TEST(AzimuthFlow, AlongAWallTurnsAreRight) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    const test::RoundRoom room(radius_m, seed);
+    const ToyWorld room = round_room(radius_m, seed);
     double with = 0.0;
     double without = 0.0;
     constexpr int steps = 20;
     for (int i = 0; i < steps; ++i) {
       const Pose2 before{-1.0 + 0.1 * i, -2.2, 0.0};
       const Pose2 after{before.x_m + 0.1, -2.2, 0.0};
-      const OdometryView a(room.seen_from(before));
-      const OdometryView b(room.seen_from(after));
+      const OdometryView a(round_room_signature(room, before));
+      const OdometryView b(round_room_signature(room, after));
       with += visual_step(a, b).value().before_from_after.heading_rad;
       without += visual_step(a, b, {.nearer_side = false}).value().before_from_after.heading_rad;
     }
@@ -64,7 +64,7 @@ TEST(AzimuthFlow, AlongAWallTurnsAreRight) {
 
 TEST(AzimuthFlow, ViewsWithoutStructureStayWhereTheyStart) {
   const HomingView nothing = homing_view(compute_signature(
-      Panorama(test::RoundRoom::rows, 96, std::nullopt), test::RoundRoom::components));
+      Panorama(round_room_shape.rows, 96, std::nullopt), round_room_shape.components));
   const auto flow = refine_flow(nothing, nothing, {.g0 = 0.1, .b1 = -0.05}, 3);
   EXPECT_NEAR(flow.g0, 0.1, 1e-9);
   EXPECT_NEAR(flow.b1, -0.05, 1e-9);
@@ -72,4 +72,4 @@ TEST(AzimuthFlow, ViewsWithoutStructureStayWhereTheyStart) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

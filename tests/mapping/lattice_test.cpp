@@ -7,21 +7,21 @@
 #include <limits>
 #include <numbers>
 
-#include "localisation/ray_cast_room.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/mapping/lattice_map.hpp"
+#include "support/remembered_worlds.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
-constexpr testing::RoomKind kRoom{.width_m = 6.0, .depth_m = 5.0, .boxes = 3, .contrast = 0.2};
+constexpr RoomKind kRoom{.width_m = 6.0, .depth_m = 5.0, .boxes = 3, .contrast = 0.2};
 
 /// A memory of every free place of a grid in the middle of a room, in random headings.
 struct Place {
-  testing::Room room;
+  Room room;
   std::vector<Pose2> poses;
   VisualMemory memory;
 
@@ -40,7 +40,7 @@ struct Place {
         known.push_back(ReferencePose{x, y, poses.back().heading_rad});
       }
     }
-    return testing::make_memory(signatures, known);
+    return make_memory(signatures, known);
   }
 };
 
@@ -64,15 +64,15 @@ Lattice arrange(const VisualMemory& memory, const LatticeOptions& options = {},
 
 /// Views of some of the room's places, once more from scratch.
 VisualMemory memory_of(const std::vector<FourierSignature>& signatures) {
-  return testing::make_memory(
-      signatures, std::vector<std::optional<ReferencePose>>(signatures.size(), std::nullopt));
+  return make_memory(signatures,
+                     std::vector<std::optional<ReferencePose>>(signatures.size(), std::nullopt));
 }
 
-FourierSignature seen(const testing::Room& room, const Pose2& pose) {
+FourierSignature seen(const Room& room, const Pose2& pose) {
   return compute_signature(room.see(pose, 24, 128));
 }
 
-std::vector<Point2> inner_grid(const testing::Room& room, double step_m) {
+std::vector<Point2> inner_grid(const Room& room, double step_m) {
   std::vector<Point2> points;
   for (const Point2 p : room.grid(step_m)) {
     if (p.x_m > 1.2 && p.x_m < 4.8 && p.y_m > 1.2 && p.y_m < 3.8) points.push_back(p);
@@ -188,8 +188,8 @@ TEST(Lattice, CoarseMotionGivesMetres) {
 }
 
 TEST(Lattice, DisconnectedGroupsStayParts) {
-  const testing::Room one(21, kRoom);
-  const testing::Room other(22, kRoom);
+  const Room one(21, kRoom);
+  const Room other(22, kRoom);
   std::vector<FourierSignature> signatures;
   std::vector<int> room_of;
   for (const auto& [room, number] : {std::pair{&one, 0}, std::pair{&other, 1}}) {
@@ -208,7 +208,7 @@ TEST(Lattice, DisconnectedGroupsStayParts) {
 }
 
 TEST(Lattice, DegenerateMemories) {
-  const testing::Room room(31, kRoom);
+  const Room room(31, kRoom);
   const VisualMemory none({24, 15}, 1.0F, std::nullopt);
   EXPECT_TRUE(arrange(none).nodes.empty());
 
@@ -239,7 +239,7 @@ TEST(Lattice, DegenerateMemories) {
 }
 
 TEST(Lattice, AViewTwiceLiesAtOnePlace) {
-  const testing::Room room(32, kRoom);
+  const Room room(32, kRoom);
   std::vector<FourierSignature> signatures;
   for (const Point2 p : inner_grid(room, 0.4))
     signatures.push_back(seen(room, {p.x_m, p.y_m, 0.0}));
@@ -343,4 +343,4 @@ TEST(Lattice, RefusesMotionsThatAreNone) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -7,23 +7,23 @@
 #include <set>
 #include <string>
 
-#include "mapping/round_room.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/relative_pose/fourier_homing.hpp"
+#include "support/remembered_worlds.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
 constexpr double radius_m = 4.0;
 
 VisualMemory empty_memory() {
-  return {{test::RoundRoom::rows, test::RoundRoom::components}, 0.1F, std::nullopt};
+  return {round_room_shape, 0.1F, std::nullopt};
 }
 
 enum class Known { positions, links };
 
 // A straight way with a view every 2 cm, at random headings.
-VisualMemory along_a_line(const test::RoundRoom& room, int views, Known known) {
+VisualMemory along_a_line(const ToyWorld& room, int views, Known known) {
   VisualMemory memory = empty_memory();
   Random random(3);
   std::optional<ViewId> before;
@@ -31,7 +31,7 @@ VisualMemory along_a_line(const test::RoundRoom& room, int views, Known known) {
     const Pose2 pose{-1.0 + 0.02 * i, 0.3, random.uniform(-3.0, 3.0)};
     ReferenceInfo info{.name = std::to_string(i)};
     if (known == Known::positions) info.pose = ReferencePose{pose.x_m, pose.y_m, pose.heading_rad};
-    const ViewId view = memory.append(room.seen_from(pose), info);
+    const ViewId view = memory.append(round_room_signature(room, pose), info);
     if (before && known == Known::links) memory.link({*before, view, LinkKind::sequence});
     before = view;
   }
@@ -43,7 +43,7 @@ double difference_of(const VisualMemory& memory, ViewId a, ViewId b) {
 }
 
 TEST(SparseMemory, EveryDroppedViewHasOneThatStandsForIt) {
-  const test::RoundRoom room(radius_m, 1);
+  const ToyWorld room = round_room(radius_m, 1);
   for (const Known known : {Known::positions, Known::links}) {
     const auto memory = along_a_line(room, 100, known);
     const SparseMemoryOptions options{.most_difference = 0.05};
@@ -63,7 +63,7 @@ TEST(SparseMemory, EveryDroppedViewHasOneThatStandsForIt) {
 }
 
 TEST(SparseMemory, MoreLossKeepsLess) {
-  const auto memory = along_a_line(test::RoundRoom(radius_m, 2), 100, Known::positions);
+  const auto memory = along_a_line(round_room(radius_m, 2), 100, Known::positions);
   std::size_t before = memory.size() + 1;
   double loss_before = -1.0;
   for (const double difference : {0.0, 0.02, 0.08, 0.3}) {
@@ -82,9 +82,9 @@ TEST(SparseMemory, MoreLossKeepsLess) {
 }
 
 TEST(SparseMemory, FarPlacesThatLookAlikeAreKept) {
-  const test::RoundRoom room(radius_m, 3);
+  const ToyWorld room = round_room(radius_m, 3);
   VisualMemory memory = empty_memory();
-  const auto view = room.seen_from({});
+  const auto view = round_room_signature(room, {});
   memory.append(view, {.name = "here", .pose = ReferencePose{0.0, 0.0, {}}});
   memory.append(view, {.name = "there", .pose = ReferencePose{5.0, 0.0, {}}});
   memory.append(view, {.name = "here again", .pose = ReferencePose{0.1, 0.0, {}}});
@@ -94,17 +94,17 @@ TEST(SparseMemory, FarPlacesThatLookAlikeAreKept) {
 }
 
 TEST(SparseMemory, NewerViewsReplaceOutdatedOnes) {
-  const test::RoundRoom before(radius_m, 4);
-  const test::RoundRoom after(radius_m, 5);  // everything looks different now
+  const ToyWorld before = round_room(radius_m, 4);
+  const ToyWorld after = round_room(radius_m, 5);  // everything looks different now
   VisualMemory memory = empty_memory();
   for (int i = 0; i < 5; ++i) {
     const Pose2 pose{0.5 * i, 0.0, 0.0};
-    memory.append(before.seen_from(pose),
+    memory.append(round_room_signature(before, pose),
                   {.name = "old " + std::to_string(i), .pose = ReferencePose{pose.x_m, 0.0, {}}});
   }
   for (int i = 0; i < 3; ++i) {
     const Pose2 pose{0.5 * i + 0.05, 0.0, 0.0};
-    memory.append(after.seen_from(pose),
+    memory.append(round_room_signature(after, pose),
                   {.name = "new " + std::to_string(i), .pose = ReferencePose{pose.x_m, 0.0, {}}});
   }
   EXPECT_EQ(select_references(memory, {.most_difference = 0.01}).kept.size(), 8U);
@@ -119,7 +119,7 @@ TEST(SparseMemory, NewerViewsReplaceOutdatedOnes) {
 }
 
 TEST(SparseMemory, WhatWasConnectedStaysConnected) {
-  const auto memory = along_a_line(test::RoundRoom(radius_m, 7), 60, Known::links);
+  const auto memory = along_a_line(round_room(radius_m, 7), 60, Known::links);
   const auto selection = select_references(memory, {.most_difference = 0.1});
   ASSERT_GT(selection.redundant.size(), 20U);
   TopologicalMap map;
@@ -150,8 +150,8 @@ TEST(SparseMemory, DegenerateMemories) {
   VisualMemory memory = empty_memory();
   EXPECT_TRUE(select_references(memory).kept.empty());
   EXPECT_EQ(measure_loss(memory, {}).asked, 0U);
-  const test::RoundRoom room(radius_m, 6);
-  const auto view = room.seen_from({});
+  const ToyWorld room = round_room(radius_m, 6);
+  const auto view = round_room_signature(room, {});
   memory.append(view, {.name = "one"});
   EXPECT_EQ(select_references(memory).kept.size(), 1U);
   memory.append(view, {.name = "the same, unlinked"});
@@ -166,4 +166,4 @@ TEST(SparseMemory, DegenerateMemories) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -8,12 +8,12 @@
 #include <string>
 #include <vector>
 
-#include "mapping/round_room.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/motion/odometry.hpp"
+#include "support/remembered_worlds.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
 constexpr double radius_m = 4.0;
@@ -21,7 +21,7 @@ constexpr int round = 110;  // views
 const VisualOdometryOptions in_metres{.scale_m = radius_m};
 
 VisualMemory empty_memory() {
-  return {{test::RoundRoom::rows, test::RoundRoom::components}, 0.1F, std::nullopt};
+  return {round_room_shape, 0.1F, std::nullopt};
 }
 
 /// A mapper with the memory that it looks at.
@@ -54,19 +54,19 @@ std::vector<Point2> positions(std::span<const Pose2> poses) {
 }
 
 FourierSignature empty_view() {
-  return compute_signature(Panorama(test::RoundRoom::rows, 96, std::nullopt),
-                           test::RoundRoom::components);
+  return compute_signature(Panorama(round_room_shape.rows, 96, std::nullopt),
+                           round_room_shape.components);
 }
 
 TEST(TopologicalMapper, ClosesTheLoopOfASecondRound) {
-  const test::RoundRoom world(radius_m, 5);
+  const ToyWorld world = round_room(radius_m, 5);
   const auto truth = rounds(round + 40);
   Mapping open({.close_loops = false});
   Mapping closed;
   std::size_t closures = 0;
   for (const Pose2& pose : truth) {
-    open.add(world.seen_from(pose));
-    for (const LoopClosure& closure : closed.add(world.seen_from(pose)).closures) {
+    open.add(round_room_signature(world, pose));
+    for (const LoopClosure& closure : closed.add(round_room_signature(world, pose)).closures) {
       const Pose2 error = inverse(inverse(truth[closure.earlier]) * truth[closure.later]) *
                           closure.earlier_from_later;
       EXPECT_LT(std::hypot(error.x_m, error.y_m), 0.6);
@@ -88,76 +88,78 @@ TEST(TopologicalMapper, ClosesTheLoopOfASecondRound) {
 }
 
 TEST(TopologicalMapper, WheelLengthsSetTheScale) {
-  const test::RoundRoom world(radius_m, 6);
+  const ToyWorld world = round_room(radius_m, 6);
   const auto truth = rounds(round + 20);
   const auto steps = steps_between(truth);
   Mapping mapping;
   for (std::size_t i = 0; i < truth.size(); ++i) {
-    mapping.add(world.seen_from(truth[i]), i == 0 ? std::nullopt : std::optional(steps[i - 1]));
+    mapping.add(round_room_signature(world, truth[i]),
+                i == 0 ? std::nullopt : std::optional(steps[i - 1]));
   }
   mapping.mapper.finish();
   EXPECT_LT(align(positions(mapping.mapper.poses()), positions(truth)).rms_m, 0.15);
 }
 
 TEST(TopologicalMapper, SameViewsGiveTheSameBits) {
-  const test::RoundRoom world(radius_m, 7);
+  const ToyWorld world = round_room(radius_m, 7);
   Mapping one;
   Mapping two;
   for (const Pose2& pose : rounds(round + 20)) {
-    one.add(world.seen_from(pose));
-    two.add(world.seen_from(pose));
+    one.add(round_room_signature(world, pose));
+    two.add(round_room_signature(world, pose));
   }
   EXPECT_EQ(one.mapper.map(), two.mapper.map());
 }
 
 TEST(TopologicalMapper, OneViewTwoViews) {
-  const test::RoundRoom world(radius_m, 8);
+  const ToyWorld world = round_room(radius_m, 8);
   Mapping mapping;
   mapping.mapper.finish();
   EXPECT_TRUE(mapping.mapper.map().nodes.empty());
-  EXPECT_TRUE(mapping.add(world.seen_from({})).new_part);
+  EXPECT_TRUE(mapping.add(round_room_signature(world, {})).new_part);
   mapping.mapper.finish();
   EXPECT_EQ(mapping.mapper.map().nodes.size(), 1U);
   EXPECT_TRUE(mapping.mapper.map().edges.empty());
-  EXPECT_FALSE(mapping.add(world.seen_from({0.1, 0.0, 0.0})).new_part);
+  EXPECT_FALSE(mapping.add(round_room_signature(world, {0.1, 0.0, 0.0})).new_part);
   EXPECT_EQ(mapping.mapper.map().edges.size(), 1U);
 }
 
 TEST(TopologicalMapper, EqualViewsStayAtOnePlace) {
-  const test::RoundRoom world(radius_m, 9);
+  const ToyWorld world = round_room(radius_m, 9);
   Mapping mapping;
   for (int i = 0; i < 50; ++i) {
-    EXPECT_TRUE(mapping.add(world.seen_from({0.3, 0.1, 0.2})).closures.empty());
+    EXPECT_TRUE(mapping.add(round_room_signature(world, {0.3, 0.1, 0.2})).closures.empty());
   }
   for (const Pose2& pose : mapping.mapper.poses()) {
     EXPECT_NEAR(std::hypot(pose.x_m, pose.y_m), 0.0, 1e-6);
   }
   Mapping keeping({.capture_difference = 0.01});
-  keeping.add(world.seen_from({0.3, 0.1, 0.2}));
-  EXPECT_FALSE(keeping.mapper.is_new(OdometryView(world.seen_from({0.3, 0.1, 0.9}))));
-  EXPECT_TRUE(keeping.mapper.is_new(OdometryView(world.seen_from({0.9, 0.1, 0.2}))));
+  keeping.add(round_room_signature(world, {0.3, 0.1, 0.2}));
+  EXPECT_FALSE(keeping.mapper.is_new(OdometryView(round_room_signature(world, {0.3, 0.1, 0.9}))));
+  EXPECT_TRUE(keeping.mapper.is_new(OdometryView(round_room_signature(world, {0.9, 0.1, 0.2}))));
 }
 
 TEST(TopologicalMapper, WhatNothingConnectsBecomesAPartOfItsOwn) {
-  const test::RoundRoom world(radius_m, 10);
+  const ToyWorld world = round_room(radius_m, 10);
   const auto truth = rounds(round + 60);
   Mapping mapping;
-  for (std::size_t i = 0; i < 60; ++i) mapping.add(world.seen_from(truth[i]));
+  for (std::size_t i = 0; i < 60; ++i) mapping.add(round_room_signature(world, truth[i]));
   EXPECT_TRUE(mapping.add(empty_view()).new_part);
-  EXPECT_TRUE(mapping.add(world.seen_from(truth[60])).new_part);
+  EXPECT_TRUE(mapping.add(round_room_signature(world, truth[60])).new_part);
   EXPECT_EQ(number_of_parts(mapping.mapper.map()), 3U);
   EXPECT_EQ(mapping.mapper.map().nodes.back().part, 2U);
   // Wheels bridge what the views do not show.
   Mapping with_wheels;
-  with_wheels.add(world.seen_from(truth[0]));
+  with_wheels.add(round_room_signature(world, truth[0]));
   EXPECT_FALSE(with_wheels.add(empty_view(), Pose2{0.1, 0.0, 0.0}).new_part);
   EXPECT_EQ(number_of_parts(with_wheels.mapper.map()), 1U);
   Mapping bridged({.bridge_m = 0.5});
-  bridged.add(world.seen_from(truth[0]));
+  bridged.add(round_room_signature(world, truth[0]));
   EXPECT_FALSE(bridged.add(empty_view()).new_part);
   EXPECT_NEAR(bridged.mapper.poses().back().x_m, 0.5, 1e-9);
   // The second round joins the parts again.
-  for (std::size_t i = 61; i < truth.size(); ++i) mapping.add(world.seen_from(truth[i]));
+  for (std::size_t i = 61; i < truth.size(); ++i)
+    mapping.add(round_room_signature(world, truth[i]));
   mapping.mapper.finish();
   const TopologicalMap map = mapping.mapper.map();
   EXPECT_EQ(number_of_parts(map), 2U);
@@ -165,9 +167,9 @@ TEST(TopologicalMapper, WhatNothingConnectsBecomesAPartOfItsOwn) {
 }
 
 TEST(TopologicalMapper, RefusesWhatHasNoMeaning) {
-  const test::RoundRoom world(radius_m, 11);
+  const ToyWorld world = round_room(radius_m, 11);
   Mapping mapping;
-  const auto signature = world.seen_from({});
+  const auto signature = round_room_signature(world, {});
   mapping.add(signature);
   const ViewId first = mapping.memory.views().front();
   EXPECT_THROW(mapping.mapper.add(first, OdometryView(signature)), ContractError);
@@ -183,4 +185,4 @@ TEST(TopologicalMapper, RefusesWhatHasNoMeaning) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -7,18 +7,18 @@
 #include <numbers>
 #include <vector>
 
-#include "homing/cylinder_world.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/motion/odometry.hpp"
+#include "support/remembered_worlds.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
 constexpr double radius_m = 4.0;
 
-OdometryView view_at(const test::CylinderWorld& world, const Pose2& pose) {
-  return OdometryView(world.signature_from(pose));
+OdometryView view_at(const ToyWorld& world, const Pose2& pose) {
+  return OdometryView(striped_signature(world, pose));
 }
 
 std::vector<Point2> positions(const std::vector<Pose2>& poses) {
@@ -32,7 +32,7 @@ FourierSignature empty_view() {
 }
 
 TEST(VisualOdometry, ShortStepsAreReadFromTwoViews) {
-  const test::CylinderWorld world(radius_m, 1);
+  const ToyWorld world = striped_round_room(radius_m, 1);
   int steps = 0;
   for (const double direction : {-2.5, -1.0, 0.0, 0.7, 3.0}) {
     for (const double turn : {-1.0, 0.0, 0.4}) {
@@ -51,7 +51,7 @@ TEST(VisualOdometry, ShortStepsAreReadFromTwoViews) {
 }
 
 TEST(VisualOdometry, ThereAndBackIsNoMotion) {
-  const test::CylinderWorld world(radius_m, 2);
+  const ToyWorld world = striped_round_room(radius_m, 2);
   const auto a = view_at(world, {0.0, 0.0, 0.3});
   const auto b = view_at(world, {0.2, 0.1, -0.9});
   const auto there = visual_step(a, b);
@@ -64,7 +64,7 @@ TEST(VisualOdometry, ThereAndBackIsNoMotion) {
 }
 
 TEST(VisualOdometry, TheSameViewTwiceIsNoMotion) {
-  const test::CylinderWorld world(radius_m, 3);
+  const ToyWorld world = striped_round_room(radius_m, 3);
   const auto view = view_at(world, {0.5, 0.0, 1.0});
   for (const StepRule rule : {StepRule::published, StepRule::home_vector}) {
     const auto step = visual_step(view, view, {.rule = rule});
@@ -75,7 +75,7 @@ TEST(VisualOdometry, TheSameViewTwiceIsNoMotion) {
 }
 
 TEST(VisualOdometry, ViewsWithoutStructureShowNoStep) {
-  const test::CylinderWorld world(radius_m, 3);
+  const ToyWorld world = striped_round_room(radius_m, 3);
   const OdometryView nothing(empty_view());
   const auto view = view_at(world, {});
   for (const StepRule rule : {StepRule::published, StepRule::home_vector}) {
@@ -92,7 +92,7 @@ TEST(VisualOdometry, ViewsWithoutStructureShowNoStep) {
 }
 
 TEST(VisualOdometry, FollowsARoundTrip) {
-  const test::CylinderWorld world(radius_m, 4);
+  const ToyWorld world = striped_round_room(radius_m, 4);
   std::vector<Pose2> truth;
   for (int i = 0; i < 80; ++i) {
     const double angle = 2.0 * std::numbers::pi * i / 80.0;
@@ -135,14 +135,14 @@ TEST(VisualOdometry, KnownStepsTellTheScale) {
 
 TEST(VisualOdometry, RefusesWhatHasNoMeaning) {
   EXPECT_THROW(VisualOdometry({.scale_m = 0.0}), OptionError);
-  const test::CylinderWorld world(radius_m, 3);
-  EXPECT_THROW(OdometryView(world.signature_from({}, 2)), ContractError);
+  const ToyWorld world = striped_round_room(radius_m, 3);
+  EXPECT_THROW(OdometryView(striped_signature(world, {}, 2)), ContractError);
   const auto view = view_at(world, {});
-  const OdometryView other(world.signature_from({}, 9));
+  const OdometryView other(striped_signature(world, {}, 9));
   const OdometryView two_rows(compute_signature(Panorama(2, 256, std::nullopt), 14));
   EXPECT_THROW((void)visual_step(view, two_rows), ContractError);
   EXPECT_NO_THROW((void)visual_step(view, other));
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -5,15 +5,10 @@
 #include "panonav/core/error.hpp"
 #include "panonav/kernels/dispatch.hpp"
 #include "panonav/memory/internal/exact_search.hpp"
-#include "search_oracle.hpp"
+#include "support/search_oracle.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
-
-using testing_memory::Kind;
-using testing_memory::named;
-using testing_memory::Oracle;
-using testing_memory::ViewMaker;
 
 struct Filled {
   VisualMemory memory;
@@ -53,7 +48,7 @@ struct Case {
   std::size_t views;
 };
 
-class ExactSearch : public testing::TestWithParam<Case> {};
+class ExactSearch : public ::testing::TestWithParam<Case> {};
 
 TEST_P(ExactSearch, FindsWhatAFullScanFinds) {
   const Case& given = GetParam();
@@ -119,7 +114,7 @@ TEST_P(ExactSearch, HierarchyHoldsExactlyTheViewsWithinItsLimit) {
   }
 }
 
-std::string case_name(const testing::TestParamInfo<Case>& info) {
+std::string case_name(const ::testing::TestParamInfo<Case>& info) {
   const char* const kinds[] = {"Random", "Clustered", "Repeated", "Dark"};
   return std::string(kinds[static_cast<int>(info.param.kind)]) + std::to_string(info.param.views) +
          "Of" + std::to_string(info.param.shape.rows) + "x" +
@@ -128,13 +123,13 @@ std::string case_name(const testing::TestParamInfo<Case>& info) {
 
 INSTANTIATE_TEST_SUITE_P(
     Shapes, ExactSearch,
-    testing::Values(Case{{80, 15}, Kind::clustered, 5000}, Case{{80, 15}, Kind::random, 3000},
-                    Case{{80, 15}, Kind::repeated, 2500}, Case{{80, 15}, Kind::dark, 1500},
-                    Case{{80, 15}, Kind::clustered, 40}, Case{{80, 15}, Kind::clustered, 1},
-                    Case{{7, 15}, Kind::clustered, 1200}, Case{{7, 15}, Kind::random, 700},
-                    Case{{25, 13}, Kind::clustered, 1500}, Case{{33, 3}, Kind::repeated, 900},
-                    Case{{1, 20}, Kind::random, 600}, Case{{4, 1}, Kind::random, 600},
-                    Case{{129, 31}, Kind::clustered, 400}),
+    ::testing::Values(Case{{80, 15}, Kind::clustered, 5000}, Case{{80, 15}, Kind::random, 3000},
+                      Case{{80, 15}, Kind::repeated, 2500}, Case{{80, 15}, Kind::dark, 1500},
+                      Case{{80, 15}, Kind::clustered, 40}, Case{{80, 15}, Kind::clustered, 1},
+                      Case{{7, 15}, Kind::clustered, 1200}, Case{{7, 15}, Kind::random, 700},
+                      Case{{25, 13}, Kind::clustered, 1500}, Case{{33, 3}, Kind::repeated, 900},
+                      Case{{1, 20}, Kind::random, 600}, Case{{4, 1}, Kind::random, 600},
+                      Case{{129, 31}, Kind::clustered, 400}),
     case_name);
 
 TEST(VisualMemorySearch, StaysExactWhileViewsComeAndGo) {
@@ -294,4 +289,4 @@ TEST(VisualMemorySearch, RefusesWhatIsOutOfRange) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -7,14 +7,10 @@
 #include <numbers>
 
 #include "panonav/core/error.hpp"
-#include "search_oracle.hpp"
+#include "support/search_oracle.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
-
-using testing_memory::Kind;
-using testing_memory::named;
-using testing_memory::ViewMaker;
 
 constexpr SignatureShape shape{20, 6};
 
@@ -196,4 +192,4 @@ TEST(VisualMemory, CopiesAreIndependent) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -8,13 +8,12 @@
 #include <numeric>
 #include <vector>
 
-#include "navigation/random_graphs.hpp"
 #include "panonav/core/error.hpp"
+#include "support/random_graphs.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
-using test::all_ways;
 constexpr double pi = std::numbers::pi;
 
 bool is_connected(const NavigationGraph& graph, const SubAreas& areas, std::size_t area) {
@@ -69,7 +68,7 @@ NavigationGraph rooms_in_a_row(int rooms, int side, Random& random) {
     if (room(a) == room(b)) return true;
     return a.y_m == side / 2 && b.y_m == side / 2;
   };
-  return test::posed_graph(poses, 1.5, sees);
+  return posed_graph(poses, 1.5, sees);
 }
 
 TEST(SubAreas, TwoRoomsAreCutAtTheirDoor) {
@@ -95,13 +94,13 @@ TEST(SubAreas, FiveRoomsAreCutAtTheirDoors) {
 
 TEST(SubAreas, AnyGraphIsDividedIntoConnectedAreasOfSimilarSize) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    const NavigationGraph graph = test::random_graph(300, 250 + 20 * seed, seed);
+    const NavigationGraph graph = random_graph(300, 250 + 20 * seed, seed);
     expect_partition(graph, divide(graph, {.views_per_area = 30}));
   }
   Random random(9);
   std::vector<Pose2> poses;
   for (int i = 0; i < 900; ++i) poses.push_back({i % 30 + 0.0, i / 30 + 0.0, 0.0});
-  const NavigationGraph graph = test::posed_graph(poses, 1.5, [](Point2, Point2) { return true; });
+  const NavigationGraph graph = posed_graph(poses, 1.5, [](Point2, Point2) { return true; });
   const SubAreas areas = divide(graph, {.views_per_area = 50});
   expect_partition(graph, areas);
   for (const auto& nodes : areas.nodes) {
@@ -126,7 +125,7 @@ TEST(SubAreas, DoorsAreNarrowAndOpenBordersAreNot) {
   }
   std::vector<Pose2> poses;
   for (int i = 0; i < 400; ++i) poses.push_back({i % 20 + 0.0, i / 20 + 0.0, 0.0});
-  const NavigationGraph open = test::posed_graph(poses, 1.5, [](Point2, Point2) { return true; });
+  const NavigationGraph open = posed_graph(poses, 1.5, [](Point2, Point2) { return true; });
   const SubAreas areas = divide(open, {.views_per_area = 100});
   ASSERT_GT(areas.nodes.size(), 2U);
   const auto none = narrow_places(open, areas, 2);
@@ -136,7 +135,7 @@ TEST(SubAreas, DoorsAreNarrowAndOpenBordersAreNot) {
 TEST(AreaPlanner, WithAllGatesEveryWayIsAShortestOne) {
   std::size_t compared = 0;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
-    const NavigationGraph graph = test::random_graph(120, 130 + 15 * seed, seed);
+    const NavigationGraph graph = random_graph(120, 130 + 15 * seed, seed);
     AreaPlanner planner(graph, {.areas = {.views_per_area = 15}, .gates_per_border = 0});
     ASSERT_GT(planner.areas().nodes.size(), 4U);
     std::vector<std::uint8_t> closed(graph.passages().size(), 0);
@@ -182,7 +181,7 @@ TEST(AreaPlanner, FewGatesReachTheGoalFromEverywhereByWaysHardlyLonger) {
   for (int i = 0; i < 1600; ++i) {
     poses.push_back({i % 40 + 0.0, i / 40 + 0.0, random.uniform(-pi, pi)});
   }
-  const NavigationGraph graph = test::posed_graph(poses, 1.5, [](Point2, Point2) { return true; });
+  const NavigationGraph graph = posed_graph(poses, 1.5, [](Point2, Point2) { return true; });
   AreaPlanner planner(graph, {.areas = {.views_per_area = 100}});
   EXPECT_LT(planner.gates(), planner.areas().gates.size());
   double longer = 0.0;
@@ -223,4 +222,4 @@ TEST(AreaPlanner, AClosedDoorIsGoneRoundOrMakesTheGoalUnreachable) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -8,25 +8,20 @@
 #include <optional>
 #include <vector>
 
-#include "navigation/walled_world.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/homing/chain_recorder.hpp"
 #include "panonav/motion/steering.hpp"
 #include "panonav/navigation/navigator.hpp"
-#include "support/sanitizers.hpp"
+#include "support/remembered_worlds.hpp"
+#include "support/skips.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
-
-using test::RememberedWorld;
-using test::SimulatedRobot;
-using test::two_rooms;
-using test::WalledWorld;
 
 // Two rooms whose door no reference shows: only a chain, recorded on a drive, leads through it.
 struct TwoIslands {
-  WalledWorld world;
+  ToyWorld world;
   RememberedWorld remembered;
   SnapshotChain chain;
   std::vector<Pose2> places;  // of the snapshots
@@ -50,13 +45,13 @@ struct TwoIslands {
     OdometryNoise odometry;
     Pose2 robot{2.6, 2.8, 0.0};
     std::vector<Pose2> driven{robot};
-    recorder.add(homing_view(world.seen_from(robot, noise)), {});
+    recorder.add(homing_view(two_rooms_signature(world, robot, noise)), {});
     Pose2 moved;
     while (const auto step = follower.next_step(robot)) {
       robot = robot * *step;
       moved = moved * sample_step(*step, odometry, noise);
       if (std::hypot(moved.x_m, moved.y_m) < 0.1) continue;
-      recorder.add(homing_view(world.seen_from(robot, noise)), moved);
+      recorder.add(homing_view(two_rooms_signature(world, robot, noise)), moved);
       driven.push_back(robot);
       moved = {};
     }
@@ -132,7 +127,7 @@ TEST(ChainJoin, PlansLeadOverAChain) {
       RobotReport report;
       NavigationDecision decision;
       for (int look = 0; look < 300; ++look) {
-        decision = navigator.look(islands.world.seen_from(robot.pose(), noise), report);
+        decision = navigator.look(two_rooms_signature(islands.world, robot.pose(), noise), report);
         if (decision.state != NavigationState::moving) break;
         report.obstacle = robot.go(decision.direction_rad, decision.advance_m);
       }
@@ -189,4 +184,4 @@ TEST(ChainJoin, RefusesWhatDoesNotFitAndChangesNothing) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

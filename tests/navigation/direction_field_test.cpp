@@ -6,14 +6,13 @@
 #include <numbers>
 #include <vector>
 
-#include "navigation/random_graphs.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "support/random_graphs.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
-using test::all_ways;
 constexpr double pi = std::numbers::pi;
 
 // The nodes from `start` to where the tree ends.
@@ -29,7 +28,7 @@ TEST(DirectionField, WaysAreTheShortestOnes) {
   std::size_t unreachable = 0;
   std::size_t compared = 0;
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
-    const NavigationGraph graph = test::random_graph(30, 20 + seed, seed);
+    const NavigationGraph graph = random_graph(30, 20 + seed, seed);
     std::vector<std::uint8_t> closed(graph.passages().size(), 0);
     for (std::size_t p = 0; p < closed.size(); p += 7) closed[p] = 1;
     const auto ways = all_ways(graph, closed);
@@ -69,7 +68,7 @@ TEST(DirectionField, DirectionsPointAlongTheWayInTheFrameOfEachView) {
     poses.push_back({1.0 * (i % 8) + random.uniform(-0.2, 0.2),
                      1.0 * (i / 8) + random.uniform(-0.2, 0.2), random.uniform(-pi, pi)});
   }
-  const NavigationGraph graph = test::posed_graph(poses, 1.7, [](Point2, Point2) { return true; });
+  const NavigationGraph graph = posed_graph(poses, 1.7, [](Point2, Point2) { return true; });
   const std::size_t goal = 27;
   const auto one = direction_field(graph, graph.view(goal), {.links_ahead = 1});
   const auto three = direction_field(graph, graph.view(goal), {.links_ahead = 3});
@@ -96,14 +95,14 @@ TEST(DirectionField, DirectionsPointAlongTheWayInTheFrameOfEachView) {
 TEST(DirectionField, DoesNotLookRoundCorners) {
   // East twice, then north: from the start the third passage must not count.
   const std::vector<Pose2> poses{{0, 0, 0.5}, {1, 0, 0}, {1, 1, 0}, {1, 2, 0}};
-  const NavigationGraph graph = test::posed_graph(poses, 1.1, [](Point2, Point2) { return true; });
+  const NavigationGraph graph = posed_graph(poses, 1.1, [](Point2, Point2) { return true; });
   const auto guides = direction_field(graph, graph.view(3), {.links_ahead = 3});
   ASSERT_TRUE(guides[0].direction_rad.has_value());
   EXPECT_NEAR(*guides[0].direction_rad, -0.5, 1e-9);
 }
 
 TEST(DirectionField, RefusesWhatIsNotThere) {
-  const NavigationGraph graph = test::random_graph(5, 6, 1);
+  const NavigationGraph graph = random_graph(5, 6, 1);
   EXPECT_THROW((void)direction_field(graph, ViewId{11}), ContractError);
   EXPECT_THROW((void)direction_field(graph, graph.view(0), {.links_ahead = 0}), OptionError);
   const std::vector<std::uint8_t> wrong(1, 0);
@@ -134,4 +133,4 @@ TEST(NavigationGraph, KnowsBothWaysOfAPassage) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

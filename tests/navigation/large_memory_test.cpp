@@ -7,18 +7,12 @@
 #include <set>
 #include <vector>
 
-#include "navigation/fifty_rooms.hpp"
 #include "panonav/memory/view_source.hpp"
 #include "panonav/navigation/navigator.hpp"
+#include "support/fifty_rooms.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
-
-using test::graph_of_rooms;
-using test::memory_of;
-using test::room_height;
-using test::room_width;
-using test::width;
 
 TEST(LargeMemory, EveryPlaceIsFoundWithOneAreaInMemory) {
   const NavigationGraph graph = graph_of_rooms();
@@ -66,4 +60,4 @@ TEST(LargeMemory, EveryPlaceIsFoundWithOneAreaInMemory) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

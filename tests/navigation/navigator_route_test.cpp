@@ -8,25 +8,22 @@
 #include <string>
 #include <vector>
 
-#include "navigation/walled_world.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/motion/path.hpp"
 #include "panonav/navigation/navigator.hpp"
 #include "panonav/route/route_place.hpp"
+#include "support/remembered_worlds.hpp"
+#include "support/text.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
-using test::RememberedWorld;
-using test::SimulatedRobot;
-using test::two_rooms;
-using test::WalledWorld;
 constexpr double spacing_m = 0.4;
 constexpr double beside_m = 0.4;
 
 // Two rooms, a grid of views in them, and a route from one into the other.
 struct World {
-  WalledWorld walls = two_rooms(1, false);
+  ToyWorld walls = two_rooms(1, false);
   RememberedWorld remembered{walls, {8.0, 4.0}, spacing_m, 1};
   MemoryViewSource source{remembered.memory};
   std::vector<Pose2> path = smooth_path(
@@ -36,7 +33,7 @@ struct World {
 
   World() {
     RoutePanorama route;
-    for (const Pose2& pose : path) route.append(pose, walls.line_from(pose));
+    for (const Pose2& pose : path) route.append(pose, two_rooms_line(walls, pose));
     std::vector<RouteView> views;
     for (const ViewId view : remembered.memory.views()) {
       views.push_back({view, remembered.pose_of(view)});
@@ -97,10 +94,11 @@ Drive drive(Navigator& navigator, ViewId goal, const Pose2& start, std::uint64_t
   for (int look = 1; look <= 400; ++look) {
     RobotReport report{.obstacle = obstacle, .moved = robot.take_odometry()};
     std::vector<float> line;
-    if (options.lines) line = world().walls.line_from(robot.pose());
+    if (options.lines) line = two_rooms_line(world().walls, robot.pose());
     report.line = line;
     run.path.push_back(robot.pose());
-    run.decisions.push_back(navigator.look(world().walls.seen_from(robot.pose(), noise), report));
+    run.decisions.push_back(
+        navigator.look(two_rooms_signature(world().walls, robot.pose(), noise), report));
     const NavigationDecision& decision = run.decisions.back();
     if (decision.state != NavigationState::moving) break;
     obstacle = robot.go(decision.direction_rad, decision.advance_m);
@@ -113,7 +111,7 @@ Drive drive(Navigator& navigator, ViewId goal, const Pose2& start, std::uint64_t
 
 TEST(NavigatorOnARoute, RepeatsItTowardsGoalsAtBothEndsAndArrives) {
   ASSERT_TRUE(std::ranges::all_of(
-      world().path, [](const Pose2& pose) { return world().walls.is_free(pose.position()); }));
+      world().path, [](const Pose2& pose) { return robot_fits(world().walls, pose.position()); }));
   Navigator navigator = world().navigator();
   navigator.set_routes(world().routes);
   for (const bool back : {false, true}) {
@@ -135,7 +133,7 @@ TEST(NavigatorOnARoute, RepeatsItTowardsGoalsAtBothEndsAndArrives) {
       EXPECT_LE(decision.advance_m, 0.25);
       if (!decision.on_route) continue;
       EXPECT_FALSE(decision.homing);
-      EXPECT_NE(describe(decision).find("along a route"), std::string::npos);
+      EXPECT_TRUE(contains(describe(decision), "along a route"));
       // From the first half metre on it is on the way that was driven.
       const double off_m = world().off_m(run.path[i].position());
       EXPECT_LT(off_m, looks > 3 ? 0.1 : beside_m) << "look " << i + 1;
@@ -178,8 +176,8 @@ TEST(NavigatorOnARoute, ARobotThatIsCarriedAwayLeavesItAndArrives) {
 
 // The door is shut after route and views were made.
 TEST(NavigatorOnARoute, AShutDoorEndsTheLegAndTheRouteIsNotTriedAgain) {
-  WalledWorld walls = two_rooms(1, false);
-  walls.add_wall({4, 2.4}, {4, 3.2}, 0.8);
+  ToyWorld walls = two_rooms(1, false);
+  walls.add_wall({4, 2.4}, {4, 3.2}, Texture(walls.random(), 0.15), 0.8);
   Navigator navigator = world().navigator();
   navigator.set_routes(world().routes);
   const ViewId goal = world().view_at(world().path.back().position());
@@ -194,9 +192,9 @@ TEST(NavigatorOnARoute, AShutDoorEndsTheLegAndTheRouteIsNotTriedAgain) {
   constexpr int enough_looks = 40;
   while (since_left < enough_looks) {
     RobotReport report{.obstacle = obstacle, .moved = robot.take_odometry()};
-    const auto line = walls.line_from(robot.pose());
+    const auto line = two_rooms_line(walls, robot.pose());
     report.line = line;
-    decision = navigator.look(walls.seen_from(robot.pose(), noise), report);
+    decision = navigator.look(two_rooms_signature(walls, robot.pose(), noise), report);
     for (const NavigationEvent event : decision.events) {
       begun_after += static_cast<int>(left > 0 && event == NavigationEvent::route);
       left += static_cast<int>(event == NavigationEvent::route_left);
@@ -212,4 +210,4 @@ TEST(NavigatorOnARoute, AShutDoorEndsTheLegAndTheRouteIsNotTriedAgain) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

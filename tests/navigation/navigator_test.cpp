@@ -1,4 +1,5 @@
 #include "panonav/navigation/navigator.hpp"
+#include "support/text.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,19 +9,15 @@
 #include <string>
 #include <vector>
 
-#include "navigation/walled_world.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/core/statistics.hpp"
-#include "support/sanitizers.hpp"
+#include "support/remembered_worlds.hpp"
+#include "support/skips.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
-using test::RememberedWorld;
-using test::SimulatedRobot;
-using test::two_rooms;
-using test::WalledWorld;
 constexpr double pi = std::numbers::pi;
 constexpr double spacing_m = 0.3;
 constexpr Point2 high{8.0, 4.0};
@@ -44,7 +41,7 @@ AreaPlanner phase_planner(const VisualMemory& memory, int views_per_area = 60) {
 }
 
 // Drives until the navigator stops. `kidnap_look`: then the robot is carried to `kidnap_to`.
-Drive drive(const WalledWorld& world, const RememberedWorld& remembered, Navigator& navigator,
+Drive drive(const ToyWorld& world, const RememberedWorld& remembered, Navigator& navigator,
             ViewId goal, const Pose2& start, DriveKind kind, std::uint64_t seed, double light = 1.0,
             int kidnap_look = 0, const Pose2& kidnap_to = {}) {
   SimulatedRobot robot(world, start, kind, seed);
@@ -55,7 +52,8 @@ Drive drive(const WalledWorld& world, const RememberedWorld& remembered, Navigat
   RobotReport report;
   for (int look = 1; look <= 600; ++look) {
     if (look == kidnap_look) robot.carry_to(kidnap_to);
-    const auto decision = navigator.look(world.seen_from(robot.pose(), noise, light), report);
+    const auto decision =
+        navigator.look(two_rooms_signature(world, robot.pose(), noise, light), report);
     run.events.insert(run.events.end(), decision.events.begin(), decision.events.end());
     run.bytes_read += decision.bytes_read;
     run.end = decision;
@@ -67,7 +65,7 @@ Drive drive(const WalledWorld& world, const RememberedWorld& remembered, Navigat
   return run;
 }
 
-Pose2 free_pose(const WalledWorld& world, Random& random, double low_x = 0.0, double high_x = 8.0) {
+Pose2 free_pose(const ToyWorld& world, Random& random, double low_x = 0.0, double high_x = 8.0) {
   for (;;) {
     const Pose2 pose{random.uniform(low_x, high_x), random.uniform(0.0, high.y_m),
                      random.uniform(-pi, pi)};
@@ -81,7 +79,7 @@ TEST(Navigator, ArrivesFromAnywhereByPhasesAlone) {
   int arrived = 0;
   std::vector<double> ratios;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    const WalledWorld world = two_rooms(seed, seed % 2 == 0);
+    const ToyWorld world = two_rooms(seed, seed % 2 == 0);
     const RememberedWorld remembered(world, high, spacing_m, seed);
     const MemoryViewSource source(remembered.memory);
     Navigator navigator(source, phase_planner(remembered.memory));
@@ -133,7 +131,7 @@ TEST(Navigator, ArrivesInOtherLight) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   Outcome outcome;
   for (std::uint64_t seed = 1; seed <= 2; ++seed) {
-    const WalledWorld world = two_rooms(seed, true);
+    const ToyWorld world = two_rooms(seed, true);
     const RememberedWorld remembered(world, high, spacing_m, seed);
     const MemoryViewSource source(remembered.memory);
     Navigator navigator(source, phase_planner(remembered.memory));
@@ -162,7 +160,7 @@ TEST(Navigator, FewComponentsInTheOpenAreEnoughAndCostLess) {
   Work coarse_work;
   Work full_work;
   for (std::uint64_t seed = 1; seed <= 2; ++seed) {
-    const WalledWorld world = two_rooms(seed, true);
+    const ToyWorld world = two_rooms(seed, true);
     const RememberedWorld remembered(world, high, spacing_m, seed);
     const MemoryViewSource source(remembered.memory);
     for (const bool all : {true, false}) {
@@ -192,7 +190,7 @@ TEST(Navigator, FewComponentsInTheOpenAreEnoughAndCostLess) {
 
 // All components at the goal, in a narrow place and where the robot does not know where it is.
 TEST(Navigator, ComparesAllComponentsWhereItMatters) {
-  const WalledWorld world = two_rooms(1, false);
+  const ToyWorld world = two_rooms(1, false);
   const RememberedWorld remembered(world, high, spacing_m, 1);
   const MemoryViewSource source(remembered.memory);
   AreaPlanner planner = phase_planner(remembered.memory);
@@ -211,7 +209,7 @@ TEST(Navigator, ComparesAllComponentsWhereItMatters) {
   int coarse = 0;
   for (std::size_t i = 0; i < way.size(); ++i) {
     const Pose2& pose = remembered.pose_of(graph.view(way[i]));
-    const auto decision = navigator.look(world.seen_from(pose, noise));
+    const auto decision = navigator.look(two_rooms_signature(world, pose, noise));
     ASSERT_EQ(decision.nearest, graph.view(way[i]));
     EXPECT_GT(decision.bytes_read, 0U);
     // What counts is the place where the robot was before it looked.
@@ -228,7 +226,7 @@ TEST(Navigator, AKidnappedRobotStillArrives) {
   Outcome outcome;
   int noticed = 0;
   for (std::uint64_t seed = 1; seed <= 2; ++seed) {
-    const WalledWorld world = two_rooms(seed, true);
+    const ToyWorld world = two_rooms(seed, true);
     const RememberedWorld remembered(world, high, spacing_m, seed);
     const MemoryViewSource source(remembered.memory);
     Navigator navigator(source, phase_planner(remembered.memory));
@@ -264,9 +262,9 @@ TEST(Navigator, AShutDoorIsGoneRoundOrMakesTheGoalUnreachable) {
   int looks = 0;
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     for (const bool second_door : {true, false}) {
-      WalledWorld world = two_rooms(seed, second_door);
+      ToyWorld world = two_rooms(seed, second_door);
       const RememberedWorld remembered(world, high, spacing_m, seed);
-      world.add_wall({4, 2.4}, {4, 3.2}, 0.8);
+      world.add_wall({4, 2.4}, {4, 3.2}, Texture(world.random(), 0.15), 0.8);
       const MemoryViewSource source(remembered.memory);
       Navigator navigator(source, phase_planner(remembered.memory));
       Random random(seed, 6);
@@ -299,9 +297,9 @@ TEST(Navigator, AShutDoorIsGoneRoundOrMakesTheGoalUnreachable) {
 }
 
 TEST(Navigator, IsLostInAnotherPlace) {
-  const WalledWorld world = two_rooms(1, false);
+  const ToyWorld world = two_rooms(1, false);
   const RememberedWorld remembered(world, high, spacing_m, 1);
-  const WalledWorld elsewhere = two_rooms(2, false);
+  const ToyWorld elsewhere = two_rooms(2, false);
   const MemoryViewSource source(remembered.memory);
   Navigator navigator(source, phase_planner(remembered.memory));
   Random random(3);
@@ -315,7 +313,7 @@ TEST(Navigator, IsLostInAnotherPlace) {
 }
 
 TEST(Navigator, GoesNowhereWithoutAWay) {
-  const WalledWorld world = two_rooms(1, false);
+  const ToyWorld world = two_rooms(1, false);
   RememberedWorld remembered(world, high, spacing_m, 1);
   const ViewId goal = remembered.memory.views().front();
   for (const ViewId neighbour : remembered.memory.neighbours(goal)) {
@@ -335,7 +333,7 @@ TEST(Navigator, GoesNowhereWithoutAWay) {
 TEST(Navigator, ArrivesOverReferencesThatStandCloseTogether) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   constexpr double close_m = 0.1;
-  const WalledWorld world = two_rooms(3, false);
+  const ToyWorld world = two_rooms(3, false);
   const RememberedWorld remembered(world, {3.0, 2.0}, close_m, 3);
   const MemoryViewSource source(remembered.memory);
   Navigator navigator(source, phase_planner(remembered.memory, 200));
@@ -363,7 +361,7 @@ TEST(Navigator, ArrivesOverReferencesThatStandCloseTogether) {
 
 // The memory lacks the passages of some views: a robot that stands at one goes on by another.
 TEST(Navigator, GoesOnFromAPlaceWithoutAWay) {
-  const WalledWorld world = two_rooms(1, false);
+  const ToyWorld world = two_rooms(1, false);
   RememberedWorld remembered(world, high, spacing_m, 1);
   Random random(5);
   const ViewId goal = remembered.memory.views().back();
@@ -390,7 +388,7 @@ TEST(Navigator, GoesOnFromAPlaceWithoutAWay) {
 }
 
 TEST(Navigator, SameCallsGiveTheSameDecisions) {
-  const WalledWorld world = two_rooms(2, true);
+  const ToyWorld world = two_rooms(2, true);
   const RememberedWorld remembered(world, high, spacing_m, 2);
   const MemoryViewSource source(remembered.memory);
   std::vector<std::string> logs[2];
@@ -401,37 +399,37 @@ TEST(Navigator, SameCallsGiveTheSameDecisions) {
     Random noise(5);
     RobotReport report;
     for (int look = 0; look < 30; ++look) {
-      const auto decision = navigator.look(world.seen_from(robot.pose(), noise), report);
+      const auto decision = navigator.look(two_rooms_signature(world, robot.pose(), noise), report);
       log.push_back(describe(decision));
       report.obstacle = robot.go(decision.direction_rad, decision.advance_m);
     }
   }
   EXPECT_EQ(logs[0], logs[1]);
-  EXPECT_NE(logs[0].front().find("relocalised"), std::string::npos);
+  EXPECT_TRUE(contains(logs[0].front(), "relocalised"));
 }
 
 TEST(Navigator, TakesThePlaceOfAnotherEstimate) {
-  const WalledWorld world = two_rooms(2, true);
+  const ToyWorld world = two_rooms(2, true);
   const RememberedWorld remembered(world, high, spacing_m, 2);
   const MemoryViewSource source(remembered.memory);
   Navigator navigator(source, phase_planner(remembered.memory));
   navigator.set_goal(remembered.memory.views().back());
   Random noise(5);
   const ViewId here = remembered.memory.views()[20];
-  const auto decision =
-      navigator.look(world.seen_from(remembered.pose_of(here), noise), {.estimate = here});
+  const auto decision = navigator.look(two_rooms_signature(world, remembered.pose_of(here), noise),
+                                       {.estimate = here});
   EXPECT_EQ(decision.nearest, here);
   EXPECT_TRUE(std::ranges::find(decision.events, NavigationEvent::relocalised) ==
               decision.events.end());
 }
 
 TEST(Navigator, RefusesWhatItCannotDo) {
-  const WalledWorld world = two_rooms(1, false);
+  const ToyWorld world = two_rooms(1, false);
   const RememberedWorld remembered(world, high, 0.8, 1);
   const MemoryViewSource source(remembered.memory);
   Navigator navigator(source, phase_planner(remembered.memory));
   Random noise(1);
-  EXPECT_THROW((void)navigator.look(world.seen_from({1, 1, 0}, noise)), ContractError);
+  EXPECT_THROW((void)navigator.look(two_rooms_signature(world, {1, 1, 0}, noise)), ContractError);
   EXPECT_THROW(navigator.set_goal(ViewId{99999}), ContractError);
   EXPECT_THROW(Navigator(source, phase_planner(remembered.memory), {.step_m = 0.0}), OptionError);
   EXPECT_THROW(Navigator(source, phase_planner(remembered.memory), {.shortest_leg_m = 0.0}),
@@ -442,4 +440,4 @@ TEST(Navigator, RefusesWhatItCannotDo) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

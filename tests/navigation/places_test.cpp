@@ -7,9 +7,6 @@
 #include <numbers>
 #include <vector>
 
-#include "localisation/ray_cast_room.hpp"
-#include "mapping/round_room.hpp"
-#include "navigation/random_graphs.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/geometry/angles.hpp"
@@ -21,15 +18,17 @@
 #include "panonav/navigation/place_scale.hpp"
 #include "panonav/relative_pose/fourier_homing.hpp"
 #include "panonav/relative_pose/view_pair.hpp"
+#include "support/random_graphs.hpp"
+#include "support/remembered_worlds.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
 constexpr double pi = std::numbers::pi;
 
 // A grid in a round room of 3 m, 0.5 m apart, headings at random.
 struct Grid {
-  test::RoundRoom room{3.0, 5};
+  ToyWorld room = round_room(3.0, 5);
   std::vector<Pose2> poses;
   VisualMemory memory;
 
@@ -41,10 +40,9 @@ struct Grid {
     std::vector<FourierSignature> signatures;
     for (int i = 0; i < 36; ++i) {
       poses.push_back({-1.25 + 0.5 * (i % 6), -1.25 + 0.5 * (i / 6), random.uniform(-pi, pi)});
-      signatures.push_back(room.seen_from(poses.back()));
+      signatures.push_back(round_room_signature(room, poses.back()));
     }
-    VisualMemory made = testing::make_memory(
-        signatures, std::vector<std::optional<ReferencePose>>(signatures.size()));
+    VisualMemory made = make_memory(signatures);
     for (std::size_t a = 0; a < poses.size(); ++a) {
       for (std::size_t b = a + 1; b < poses.size(); ++b) {
         if (distance(poses[a].position(), poses[b].position()) < 0.75) {
@@ -278,7 +276,7 @@ TEST(PlaceScale, ArrivalMeansHalfTheSpacing) {
         const Pose2 pose{grid.poses[node].x_m + way_m * std::cos(direction),
                          grid.poses[node].y_m + way_m * std::sin(direction),
                          random.uniform(-pi, pi)};
-        const HomingView view = homing_view(grid.room.seen_from(pose));
+        const HomingView view = homing_view(round_room_signature(grid.room, pose));
         return image_difference(home, view) <= scale.difference &&
                home_vector(home, view).length() <= scale.length;
       };
@@ -311,7 +309,7 @@ TEST(AreaViews, HoldsAnAreaAndFindsWhatTheWholeMemoryFinds) {
       for (const auto& exit : graph.exits(node)) EXPECT_TRUE(views.holds(graph.view(exit.node)));
       // Between references, in any heading.
       const Pose2 pose = grid.poses[node] * Pose2{0.08, 0.05, 1.0};
-      const FourierSignature seen = grid.room.seen_from(pose);
+      const FourierSignature seen = round_room_signature(grid.room, pose);
       const SeenView view(seen, grid.memory.full_scale());
       const auto found = views.nearest(graph, view);
       const auto match = grid.memory.search(view.packed, {.top = 1}).matches.front();
@@ -400,7 +398,7 @@ TEST(Obstacle, ClosesAllThatCrossesItAndNothingElse) {
   std::vector<Pose2> poses;
   Random random(3);
   for (int i = 0; i < 25; ++i) poses.push_back({i % 5 + 0.0, i / 5 + 0.0, random.uniform(-pi, pi)});
-  const NavigationGraph graph = test::posed_graph(poses, 1.5, [](Point2, Point2) { return true; });
+  const NavigationGraph graph = posed_graph(poses, 1.5, [](Point2, Point2) { return true; });
   // From the middle, the way to the east is shut over one spacing either way.
   const std::size_t node = 12;
   const double direction = angle_difference(0.0, poses[node].heading_rad);
@@ -424,4 +422,4 @@ TEST(Obstacle, ClosesAllThatCrossesItAndNothingElse) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -11,9 +11,9 @@
 #include "panonav/motion/odometry.hpp"
 #include "panonav/motion/path.hpp"
 #include "panonav/route/route_place.hpp"
-#include "route/textured_room.hpp"
+#include "support/toy_world.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
 constexpr double step_m = 0.25;
@@ -21,7 +21,7 @@ constexpr double shortest_m = 0.75;
 
 // A route through a room and a view every 0.3 m along it.
 struct RecordedRoute {
-  testing::TexturedRoom room{31};
+  ToyWorld room = pillared_room(31);
   std::vector<Pose2> path;
   std::vector<ViewId> views;
   std::vector<KnownRoute> known;
@@ -105,7 +105,7 @@ TEST(RoutePilot, BeginsOnlyWhereLineAndViewAgreeAndTheWayIsLong) {
   EXPECT_TRUE(pilot.begin(route.way(4, 7), here, shortest_m));
   // Another place of the route, another place, a way over other views, no way.
   EXPECT_FALSE(pilot.begin(way, route.room.line(route.pose_of(route.views[12])), shortest_m));
-  EXPECT_FALSE(pilot.begin(way, testing::TexturedRoom(777).line({0.3, 0.4, 1.0}), shortest_m));
+  EXPECT_FALSE(pilot.begin(way, pillared_room(777).line({0.3, 0.4, 1.0}), shortest_m));
   EXPECT_FALSE(pilot.begin(std::vector<ViewId>{ViewId{900}, ViewId{901}}, here, shortest_m));
   EXPECT_FALSE(pilot.begin({}, here, shortest_m));
   EXPECT_FALSE(RoutePilot().begin(way, here, shortest_m));
@@ -129,7 +129,7 @@ TEST(RoutePilot, CountsLooksThatTellNoPlaceOnTheLeg) {
   const Pose2 start = route.pose_of(way.front());
   ASSERT_TRUE(pilot.begin(way, route.room.line(start), shortest_m));
   // Lines of another room, lines of the route beyond the leg, no lines.
-  const auto strange = testing::TexturedRoom(777).line({0.3, 0.4, 1.0});
+  const auto strange = pillared_room(777).line({0.3, 0.4, 1.0});
   const auto beyond = route.room.line(route.pose_of(route.views[17]));
   for (const auto& line : {strange, beyond, std::vector<float>{}}) {
     RoutePilot other = pilot;
@@ -151,4 +151,4 @@ TEST(RoutePilot, CountsLooksThatTellNoPlaceOnTheLeg) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

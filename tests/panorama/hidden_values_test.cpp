@@ -11,9 +11,9 @@
 #include "panonav/core/random.hpp"
 #include "panonav/panorama/preprocessing.hpp"
 #include "panonav/signature/dissimilarity.hpp"
-#include "panorama/test_cameras.hpp"
+#include "support/test_cameras.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
 using Hidden = std::vector<std::uint8_t>;
@@ -149,7 +149,7 @@ TEST(FillHiddenValues, AMaskOnATurningRobotDisturbsLessThanBlackPaintOrTheRowsMe
 }
 
 TEST(ValuesHiddenBy, AreThoseThatLookAtTheMask) {
-  const Camera camera = testing_cameras::mirror_camera();
+  const Camera camera = mirror_camera();
   const Unwarper unwarper(camera, {.rows = 20, .columns = 120});
   // The robot is seen between azimuths 1.0 and 1.6.
   Image mask(camera.image_size.width, camera.image_size.height);
@@ -187,7 +187,7 @@ TEST(ValuesHiddenBy, AreThoseThatLookAtTheMask) {
 }
 
 TEST(ValuesHiddenBy, RefusesMasksThatDoNotFitOrHideEverything) {
-  const Camera camera = testing_cameras::mirror_camera();
+  const Camera camera = mirror_camera();
   const Unwarper unwarper(camera, {.rows = 8, .columns = 32});
   for (const Image& mask : {Image(10, 10), Image(640, 480), Image(640, 480, 3)}) {
     EXPECT_THROW((void)values_hidden_by(mask.view(), unwarper), ContractError);
@@ -198,4 +198,4 @@ TEST(ValuesHiddenBy, RefusesMasksThatDoNotFitOrHideEverything) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -11,13 +11,10 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panorama/test_cameras.hpp"
+#include "support/test_cameras.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
-
-using testing_cameras::mirror_camera;
-using testing_cameras::render;
 
 constexpr double pi = std::numbers::pi;
 
@@ -283,4 +280,4 @@ TEST(Unwarper, RefusesBadInput) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -10,60 +10,30 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "support/toy_world.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
 constexpr double pi = std::numbers::pi;
 constexpr ElevationBand band{-0.6, 0.6};
 
-// What stands on a cylinder of radius 1 around the place of the home view: brightness by azimuth
-// and height above the camera.
-struct Surroundings {
-  struct Wave {
-    int frequency;
-    double height_rate, amplitude, phase;
-  };
-  std::vector<Wave> waves;
-
-  [[nodiscard]] double brightness(double azimuth, double height) const {
-    double value = 0.5;
-    for (const Wave& w : waves) {
-      value += w.amplitude * std::cos(w.frequency * azimuth + w.height_rate * height + w.phase);
-    }
-    return value;
-  }
-
-  // The view from (x, y) of a robot with this heading, by ray casting.
-  [[nodiscard]] Panorama seen_from(double x, double y, double heading, int rows) const {
-    constexpr int columns = 256;
-    Panorama view(rows, columns, rows > 1 ? std::optional(band) : std::nullopt);
-    for (int r = 0; r < rows; ++r) {
-      const double slope = rows > 1 ? std::tan(view.elevation_rad(r)) : 0.0;
-      for (int c = 0; c < columns; ++c) {
-        const double direction = heading + 2.0 * pi * c / columns;
-        const double ux = std::cos(direction);
-        const double uy = std::sin(direction);
-        const double along = x * ux + y * uy;
-        const double range = -along + std::sqrt(along * along + 1.0 - x * x - y * y);
-        const double azimuth = std::atan2(y + range * uy, x + range * ux);
-        view.at(r, c) = static_cast<float>(brightness(azimuth, range * slope));
-      }
-    }
-    return view;
-  }
-};
-
-Surroundings random_surroundings(std::uint64_t seed, double height_rate = 0.0) {
+// What stands on a cylinder of radius 1 m around the place of the home view.
+ToyWorld random_surroundings(std::uint64_t seed, double height_rate = 0.0) {
   Random random(seed);
-  Surroundings made;
+  std::vector<CylinderWave> waves;
   for (int k = 1; k <= 12; ++k) {
     for (int i = 0; i < 2; ++i) {
-      made.waves.push_back({k, random.uniform(-height_rate, height_rate),
-                            0.3 / k * random.uniform(0.5, 1.0), random.uniform(-pi, pi)});
+      waves.push_back({k, random.uniform(-height_rate, height_rate),
+                       0.3 / k * random.uniform(0.5, 1.0), random.uniform(-pi, pi)});
     }
   }
-  return made;
+  return waved_cylinder(1.0, std::move(waves));
+}
+
+// The view from (x, y) of a robot with this heading.
+Panorama seen_from(const ToyWorld& around, double x, double y, double heading, int rows) {
+  return around.panorama({x, y, heading}, rows, 256, rows > 1 ? std::optional(band) : std::nullopt);
 }
 
 HomingView view_of(const Panorama& panorama, int components = 16) {
@@ -120,14 +90,14 @@ class EveryRule : public ::testing::TestWithParam<Rule> {};
 TEST_P(EveryRule, PointsHomeAndTellsDistanceAndHeadingWhereAllThingsAreEquallyFar) {
   Random random(11);
   for (int trial = 0; trial < 40; ++trial) {
-    const Surroundings around = random_surroundings(100 + trial);
+    const ToyWorld around = random_surroundings(100 + trial);
     const double angle = random.uniform(-pi, pi);
     const double heading = random.uniform(-pi, pi);
     constexpr double d = 0.02;
     const double x = d * std::cos(angle);
     const double y = d * std::sin(angle);
-    const HomingView home = view_of(around.seen_from(0.0, 0.0, 0.0, 1));
-    const HomingView current = view_of(around.seen_from(x, y, heading, 1));
+    const HomingView home = view_of(seen_from(around, 0.0, 0.0, 0.0, 1));
+    const HomingView current = view_of(seen_from(around, x, y, heading, 1));
     const HomeVector v = home_vector(home, current, GetParam().options);
     const double truth = std::atan2(-y, -x) - heading;
     EXPECT_LT(std::abs(angle_difference(v.direction_rad(), truth)), radians(12.0)) << trial;
@@ -140,9 +110,9 @@ TEST_P(EveryRule, PointsHomeAndTellsDistanceAndHeadingWhereAllThingsAreEquallyFa
 
 TEST_P(EveryRule, TurningTheRobotTurnsTheVectorAndNothingElse) {
   for (int trial = 0; trial < 20; ++trial) {
-    const Surroundings around = random_surroundings(200 + trial, 2.0);
-    const HomingView home = view_of(around.seen_from(0.0, 0.0, 0.3, 12));
-    const HomingView current = view_of(around.seen_from(0.1, -0.05, 1.0, 12));
+    const ToyWorld around = random_surroundings(200 + trial, 2.0);
+    const HomingView home = view_of(seen_from(around, 0.0, 0.0, 0.3, 12));
+    const HomingView current = view_of(seen_from(around, 0.1, -0.05, 1.0, 12));
     const HomeVector v = home_vector(home, current, GetParam().options);
     constexpr double delta = 2.1;
     const HomeVector other = home_vector(home, turn(current, delta), GetParam().options);
@@ -159,8 +129,8 @@ TEST_P(EveryRule, TurningTheRobotTurnsTheVectorAndNothingElse) {
 
 TEST_P(EveryRule, IdenticalViewsGiveNoWayAndNoConfidence) {
   for (const int rows : {1, 12}) {
-    const Surroundings around = random_surroundings(7, 2.0);
-    const HomingView home = view_of(around.seen_from(0.0, 0.0, 0.0, rows));
+    const ToyWorld around = random_surroundings(7, 2.0);
+    const HomingView home = view_of(seen_from(around, 0.0, 0.0, 0.0, rows));
     for (const double heading : {0.0, 1.7}) {
       const HomeVector v = home_vector(home, turn(home, heading), GetParam().options);
       EXPECT_LT(v.length(), 1e-4);
@@ -176,7 +146,7 @@ TEST_P(EveryRule, IdenticalViewsGiveNoWayAndNoConfidence) {
 
 TEST_P(EveryRule, ViewsWithoutStructureGiveNothingAndNoNaN) {
   const HomingView blank = view_of(Panorama(4, 64, band));
-  const HomingView seen = view_of(random_surroundings(5, 1.0).seen_from(0, 0, 0, 4));
+  const HomingView seen = view_of(seen_from(random_surroundings(5, 1.0), 0, 0, 0, 4));
   for (const auto& [home, current] :
        {std::pair(blank, blank), std::pair(blank, seen), std::pair(seen, blank)}) {
     const HomeVector v = home_vector(home, current, GetParam().options);
@@ -212,9 +182,9 @@ TEST(FourierHoming, IterationsExplainAFarViewBetter) {
   double length_once = 0.0;
   double length_often = 0.0;
   for (int trial = 0; trial < 30; ++trial) {
-    const Surroundings around = random_surroundings(300 + trial);
-    const HomingView home = view_of(around.seen_from(0.0, 0.0, 0.0, 1), 40);
-    const HomingView current = view_of(around.seen_from(0.3, 0.0, 0.0, 1), 40);
+    const ToyWorld around = random_surroundings(300 + trial);
+    const HomingView home = view_of(seen_from(around, 0.0, 0.0, 0.0, 1), 40);
+    const HomingView current = view_of(seen_from(around, 0.3, 0.0, 0.0, 1), 40);
     const HomeVector once = home_vector(home, current, published_homing(8));
     const HomeVector often = home_vector(home, current, published_homing(8, 4));
     residual_once += once.residual;
@@ -255,10 +225,10 @@ TEST(FourierHoming, LeanIsToldFromDisplacement) {
   double with = 0.0;
   double without = 0.0;
   for (int trial = 0; trial < 30; ++trial) {
-    const Surroundings around = random_surroundings(600 + trial, 6.0);
-    const HomingView home = view_of(around.seen_from(0.0, 0.0, 0.0, 40));
+    const ToyWorld around = random_surroundings(600 + trial, 6.0);
+    const HomingView home = view_of(seen_from(around, 0.0, 0.0, 0.0, 40));
     const HomingView current =
-        view_of(leaning(around.seen_from(0.05, 0.03, 0.0, 40), radians(1.5)));
+        view_of(leaning(seen_from(around, 0.05, 0.03, 0.0, 40), radians(1.5)));
     const auto error = [&](bool solved) {
       const HomeVector v = home_vector(home, current, {.lean = solved});
       return std::hypot(v.xi + 0.05, v.eta + 0.03);
@@ -274,8 +244,8 @@ TEST(ImageDifference, LeanIsNotADifference) {
   double leaning_at_home = 0.0;
   double flat = 0.0;
   for (int trial = 0; trial < 30; ++trial) {
-    const Surroundings around = random_surroundings(700 + trial, 6.0);
-    const Panorama level = around.seen_from(0.0, 0.0, 0.0, 40);
+    const ToyWorld around = random_surroundings(700 + trial, 6.0);
+    const Panorama level = seen_from(around, 0.0, 0.0, 0.0, 40);
     const Panorama tilted = leaning(level, radians(1.5));
     leaning_at_home += image_difference(view_of(level), turn(view_of(tilted), 1.0)) / 30;
     // Without elevations nothing is known of a lean.
@@ -293,9 +263,9 @@ TEST(FourierHoming, VerticalMotionIsTakenIntoAccount) {
   double with = 0.0;
   double without = 0.0;
   for (int trial = 0; trial < 30; ++trial) {
-    const Surroundings around = random_surroundings(400 + trial, 6.0);
-    const HomingView home = view_of(around.seen_from(0.0, 0.0, 0.0, 24));
-    const HomingView current = view_of(around.seen_from(0.05, 0.03, 0.0, 24));
+    const ToyWorld around = random_surroundings(400 + trial, 6.0);
+    const HomingView home = view_of(seen_from(around, 0.0, 0.0, 0.0, 24));
+    const HomingView current = view_of(seen_from(around, 0.05, 0.03, 0.0, 24));
     const auto error = [&](bool vertical) {
       const HomeVector v = home_vector(
           home, current, {.weights = HomingWeights::equal, .vertical_motion = vertical});
@@ -313,11 +283,11 @@ TEST(FourierHoming, SearchFindsTheWayFromFarAway) {
   double without = 0.0;
   Random random(77);
   for (int trial = 0; trial < 60; ++trial) {
-    const Surroundings around = random_surroundings(500 + trial);
+    const ToyWorld around = random_surroundings(500 + trial);
     const double angle = random.uniform(-pi, pi);
-    const HomingView home = view_of(around.seen_from(0.0, 0.0, 0.0, 1), 20);
+    const HomingView home = view_of(seen_from(around, 0.0, 0.0, 0.0, 1), 20);
     const HomingView current =
-        view_of(around.seen_from(0.55 * std::cos(angle), 0.55 * std::sin(angle), 2.0, 1), 20);
+        view_of(seen_from(around, 0.55 * std::cos(angle), 0.55 * std::sin(angle), 2.0, 1), 20);
     const auto component = [&](bool search) {
       const HomeVector v = home_vector(home, current, {.displacement_search = search});
       return std::cos(v.direction_rad() - (angle + pi - 2.0));
@@ -330,11 +300,11 @@ TEST(FourierHoming, SearchFindsTheWayFromFarAway) {
 }
 
 TEST(FourierHoming, CoherenceTakesFewerFrequenciesFromAfar) {
-  const Surroundings around = random_surroundings(9);
-  const HomingView home = view_of(around.seen_from(0.0, 0.0, 0.0, 1));
+  const ToyWorld around = random_surroundings(9);
+  const HomingView home = view_of(seen_from(around, 0.0, 0.0, 0.0, 1));
   double before = 100.0;
   for (const double d : {0.01, 0.2, 0.5, 0.8}) {
-    const HomeVector v = home_vector(home, view_of(around.seen_from(d, 0.0, 0.0, 1)),
+    const HomeVector v = home_vector(home, view_of(seen_from(around, d, 0.0, 0.0, 1)),
                                      {.displacement_search = false});
     EXPECT_LE(v.frequencies, before + 0.5) << d;
     before = v.frequencies;
@@ -343,12 +313,12 @@ TEST(FourierHoming, CoherenceTakesFewerFrequenciesFromAfar) {
 }
 
 TEST(FourierHoming, DifferenceIsZeroAtHomeAndGrowsWithTheDistance) {
-  const Surroundings around = random_surroundings(21);
-  const HomingView home = view_of(around.seen_from(0.0, 0.0, 0.0, 1));
+  const ToyWorld around = random_surroundings(21);
+  const HomingView home = view_of(seen_from(around, 0.0, 0.0, 0.0, 1));
   EXPECT_NEAR(image_difference(home, turn(home, 0.8)), 0.0, 1e-5);
   double before = 0.0;
   for (const double d : {0.02, 0.1, 0.3}) {
-    const double difference = image_difference(home, view_of(around.seen_from(d, 0.0, 1.0, 1)));
+    const double difference = image_difference(home, view_of(seen_from(around, d, 0.0, 1.0, 1)));
     EXPECT_GT(difference, before);
     before = difference;
   }
@@ -360,13 +330,14 @@ TEST(FourierHoming, ATurnKnownCoarselyTellsAlikeTurnsApart) {
   int told_apart = 0;
   for (int trial = 0; trial < 20; ++trial) {
     Random random(900 + trial);
-    Surroundings around;
+    std::vector<CylinderWave> waves;
     for (int k = 1; k <= 12; ++k) {
-      around.waves.push_back(
+      waves.push_back(
           {k, 0.0, k % 4 == 0 ? random.uniform(0.05, 0.1) : 0.004, random.uniform(-pi, pi)});
     }
-    const HomingView home = view_of(around.seen_from(0.0, 0.0, 0.0, 1));
-    const HomingView current = view_of(around.seen_from(0.05, 0.02, 0.3, 1));
+    const ToyWorld around = waved_cylinder(1.0, std::move(waves));
+    const HomingView home = view_of(seen_from(around, 0.0, 0.0, 0.0, 1));
+    const HomingView current = view_of(seen_from(around, 0.05, 0.02, 0.3, 1));
     for (int quarter = -1; quarter <= 2; ++quarter) {
       const double middle = -0.3 + quarter * 0.5 * pi;
       const HomeVector near = home_vector_near(home, current, middle, 0.25 * pi);
@@ -381,15 +352,15 @@ TEST(FourierHoming, ATurnKnownCoarselyTellsAlikeTurnsApart) {
               home_vector(home, current).heading_rad);
   }
   EXPECT_GE(told_apart, 60);
-  const HomingView one = view_of(random_surroundings(1).seen_from(0, 0, 0, 1));
+  const HomingView one = view_of(seen_from(random_surroundings(1), 0, 0, 0, 1));
   EXPECT_THROW((void)home_vector_near(one, one, NAN, 1.0), ContractError);
   EXPECT_THROW((void)home_vector_near(one, one, 0.0, 0.0), ContractError);
   EXPECT_THROW((void)home_vector_near(one, one, 0.0, 1.0, published_homing(3)), ContractError);
 }
 
 TEST(FourierHoming, RefusesViewsThatDoNotFit) {
-  const HomingView one = view_of(random_surroundings(1).seen_from(0, 0, 0, 1));
-  const HomingView four = view_of(random_surroundings(1).seen_from(0, 0, 0, 4));
+  const HomingView one = view_of(seen_from(random_surroundings(1), 0, 0, 0, 1));
+  const HomingView four = view_of(seen_from(random_surroundings(1), 0, 0, 0, 4));
   EXPECT_THROW((void)home_vector(one, four), ContractError);
   EXPECT_THROW((void)home_vector(one, one, {.highest = 15}), ContractError);
   EXPECT_NO_THROW((void)home_vector(one, one, {.highest = 14}));
@@ -402,8 +373,8 @@ TEST(FourierHoming, RefusesViewsThatDoNotFit) {
 }
 
 TEST(HomingView, HorizonViewIsTheMeanOfTheRowsAroundTheHorizon) {
-  const Surroundings around = random_surroundings(31, 3.0);
-  const Panorama panorama = around.seen_from(0, 0, 0, 12);
+  const ToyWorld around = random_surroundings(31, 3.0);
+  const Panorama panorama = seen_from(around, 0, 0, 0, 12);
   const FourierSignature signature = compute_signature(panorama, 10);
   const HomingView middle = horizon_view(signature, 0.11);  // rows at +-0.05 only
   ASSERT_EQ(middle.rows(), 1);
@@ -416,4 +387,4 @@ TEST(HomingView, HorizonViewIsTheMeanOfTheRowsAroundTheHorizon) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

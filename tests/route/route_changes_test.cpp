@@ -7,12 +7,12 @@
 
 #include "panonav/geometry/angles.hpp"
 #include "panonav/route/route_fit.hpp"
-#include "textured_room.hpp"
+#include "support/toy_world.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
-RoutePanorama straight_route(const testing::TexturedRoom& room, double spacing_m) {
+RoutePanorama straight_route(const ToyWorld& room, double spacing_m) {
   RoutePanorama route;
   for (int i = 0; i * spacing_m <= 4.0; ++i) {
     const Pose2 pose{-2.0 + i * spacing_m, 0.0, 0.0};
@@ -28,7 +28,7 @@ struct Named {
   int right = 0;
   int ranges = 0;
 };
-Named drive(const RouteLines& lines, const testing::TexturedRoom& room, Point2 thing) {
+Named drive(const RouteLines& lines, const ToyWorld& room, Point2 thing) {
   RouteChanges changes;
   Named named;
   for (int i = 0; i <= 40; ++i) {
@@ -52,10 +52,10 @@ Named drive(const RouteLines& lines, const testing::TexturedRoom& room, Point2 t
 TEST(RouteChanges, UnchangedRoomsShowNothingAndAMovedPillarIsNamedWhereItStands) {
   int rooms_with_change = 0;
   for (const std::uint64_t seed : {31, 32, 33, 34, 35, 36, 37, 38}) {
-    const testing::TexturedRoom room(seed);
+    const ToyWorld room = pillared_room(seed);
     const RouteLines lines(straight_route(room, 0.1));
     EXPECT_EQ(drive(lines, room, {}).pictures, 0) << seed;
-    testing::TexturedRoom changed = room;
+    ToyWorld changed = room;
     const Point2 before = room.pillar(0);
     changed.move_pillar({0.5, 0.0});
     const Named named = drive(lines, changed, {before.x_m + 0.25, before.y_m});
@@ -86,4 +86,4 @@ TEST(RouteChanges, TakesFivePicturesAndStartsAnewAfterAMiss) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -9,16 +9,14 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "textured_room.hpp"
+#include "support/toy_world.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
-
-using testing::TexturedRoom;
 
 constexpr double pi = std::numbers::pi;
 
-RoutePanorama straight_route(const TexturedRoom& room) {
+RoutePanorama straight_route(const ToyWorld& room) {
   RoutePanorama route;
   for (int i = 0; i <= 150; ++i) {
     const Pose2 pose{0.02 * i - 1.5, 0.0, 0.0};
@@ -32,14 +30,14 @@ TEST(RouteContours, ConvergeFromBothSidesOntoThePoseThatOdometryNearlyKnows) {
   double predicted_error = 0.0;
   int met = 0;
   constexpr int trials = 24;
-  std::vector<TexturedRoom> rooms;
+  std::vector<ToyWorld> rooms;
   std::vector<RouteContours> routes;
   for (std::uint64_t seed = 60; seed < 63; ++seed) {
-    rooms.emplace_back(seed, 30.0);
+    rooms.push_back(pillared_room(seed, 30.0));
     routes.emplace_back(straight_route(rooms.back()));
   }
   for (int trial = 0; trial < trials; ++trial) {
-    const TexturedRoom& room = rooms[static_cast<std::size_t>(trial % 3)];
+    const ToyWorld& room = rooms[static_cast<std::size_t>(trial % 3)];
     const RouteContours& contours = routes[static_cast<std::size_t>(trial % 3)];
     Random random(100 + static_cast<std::uint64_t>(trial));
     const Pose2 truth{random.uniform(-0.7, 0.7), random.uniform(-0.4, 0.4),
@@ -60,7 +58,7 @@ TEST(RouteContours, ConvergeFromBothSidesOntoThePoseThatOdometryNearlyKnows) {
 }
 
 TEST(RouteContours, NoAnswerWithoutEdgesOrOutOfReach) {
-  const TexturedRoom room(3);
+  const ToyWorld room = pillared_room(3);
   const RouteContours contours(straight_route(room));
   EXPECT_FALSE(contours.fit(std::vector<float>(360, 0.4F), {0, 0.1, 0}).has_value());
   EXPECT_THROW((void)contours.fit(std::vector<float>(12, 0.4F), {0, 0.1, 0}), ContractError);
@@ -71,4 +69,4 @@ TEST(RouteContours, NoAnswerWithoutEdgesOrOutOfReach) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

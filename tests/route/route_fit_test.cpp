@@ -11,12 +11,10 @@
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/motion/path.hpp"
-#include "textured_room.hpp"
+#include "support/toy_world.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
-
-using testing::TexturedRoom;
 
 constexpr double pi = std::numbers::pi;
 
@@ -27,7 +25,7 @@ std::vector<Pose2> straight_path(double length_m, double spacing_m) {
   return path;
 }
 
-RoutePanorama record(const TexturedRoom& room, const std::vector<Pose2>& path) {
+RoutePanorama record(const ToyWorld& room, const std::vector<Pose2>& path) {
   RoutePanorama route;
   for (const Pose2& pose : path) route.append(pose, room.line(pose));
   return route;
@@ -104,7 +102,7 @@ TEST(RouteCrossing, ChangesWithTheViewpointAsItSays) {
 }
 
 TEST(RouteFit, FindsPosesBesideAStraightPath) {
-  const TexturedRoom room(5);
+  const ToyWorld room = pillared_room(5);
   for (const auto& [spacing_m, most_m] : {std::pair{0.02, 0.006}, std::pair{0.1, 0.012}}) {
     const RouteLines lines(record(room, straight_path(5.0, spacing_m)));
     Random random(11);
@@ -127,7 +125,7 @@ TEST(RouteFit, FindsPosesBesideAStraightPath) {
 }
 
 TEST(RouteFit, CurvedPathsAndHeadingsOfTheirOwn) {
-  const TexturedRoom room(8);
+  const ToyWorld room = pillared_room(8);
   auto path = smooth_path(std::vector<Point2>{{-2.5, -0.8}, {-1, 0.3}, {0.5, -0.2}, {2.3, 0.9}},
                           {.spacing_m = 0.05});
   Random random(4);
@@ -148,7 +146,7 @@ TEST(RouteFit, CurvedPathsAndHeadingsOfTheirOwn) {
 }
 
 TEST(RouteFit, TheFrameOfTheWorldDoesNotMatter) {
-  const TexturedRoom room(9);
+  const ToyWorld room = pillared_room(9);
   const auto path = straight_path(4.0, 0.05);
   const Pose2 world{3.0, -7.0, 2.1};
   RoutePanorama here;
@@ -169,7 +167,7 @@ TEST(RouteFit, TheFrameOfTheWorldDoesNotMatter) {
 }
 
 TEST(RouteFit, AnotherLightChangesNothing) {
-  const TexturedRoom room(6);
+  const ToyWorld room = pillared_room(6);
   const RouteLines lines(record(room, straight_path(5.0, 0.05)));
   const Pose2 truth{0.2, 0.35, -0.4};
   auto line = room.line(truth);
@@ -182,7 +180,7 @@ TEST(RouteFit, AnotherLightChangesNothing) {
 }
 
 TEST(RouteFit, ChangedPartsCountLessAndAreReported) {
-  TexturedRoom room(12);
+  ToyWorld room = pillared_room(12);
   const RouteLines lines(record(room, straight_path(5.0, 0.05)));
   const RouteLines trusting(record(room, straight_path(5.0, 0.05)), {.robust = false});
   room.move_pillar({0.5, 0.0});
@@ -208,7 +206,7 @@ TEST(RouteFit, ChangedPartsCountLessAndAreReported) {
 }
 
 TEST(RouteFit, CovarianceIsThatOfTheNoise) {
-  const TexturedRoom room(14);
+  const ToyWorld room = pillared_room(14);
   const RouteLines lines(record(room, straight_path(5.0, 0.02)));
   const Pose2 truth{0.3, 0.25, 0.2};
   const auto clean = room.line(truth);
@@ -231,7 +229,7 @@ TEST(RouteFit, CovarianceIsThatOfTheNoise) {
 }
 
 TEST(RouteFit, SynthesisShowsWhatIsSeen) {
-  const TexturedRoom room(15);
+  const ToyWorld room = pillared_room(15);
   const RouteLines lines(record(room, straight_path(5.0, 0.02)));
   const Pose2 pose{0.5, 0.2, 0.8};
   const auto shown = lines.synthesise(pose);
@@ -248,7 +246,7 @@ TEST(RouteFit, SynthesisShowsWhatIsSeen) {
 }
 
 TEST(RouteFit, NoAnswerRatherThanAWrongOne) {
-  const TexturedRoom room(1);
+  const ToyWorld room = pillared_room(1);
   const RouteLines lines(record(room, straight_path(2.0, 0.05)), {.reach_m = 1.0});
   EXPECT_FALSE(lines.fit(room.line({0, 0, 0}), {0.0, 5.0, 0.0}).has_value());
   EXPECT_FALSE(lines.fit(std::vector<float>(360, 0.5F), {0, 0, 0}).has_value());
@@ -280,7 +278,7 @@ TEST(RouteFit, ExplainsAtLeastAsMuchAsWithoutSmoothing) {
   Random random(21);
   int better = 0;
   for (const std::uint64_t seed : {31U, 32U, 33U}) {
-    const TexturedRoom room(seed);
+    const ToyWorld room = pillared_room(seed);
     const RoutePanorama route = record(room, straight_path(4.0, 0.05));
     const RouteLines lines(route);
     const RouteLines plain(route, {.levels = 1});
@@ -301,4 +299,4 @@ TEST(RouteFit, ExplainsAtLeastAsMuchAsWithoutSmoothing) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

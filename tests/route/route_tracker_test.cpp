@@ -9,12 +9,10 @@
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/motion/path.hpp"
-#include "textured_room.hpp"
+#include "support/toy_world.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
-
-using testing::TexturedRoom;
 
 constexpr double pi = std::numbers::pi;
 
@@ -30,7 +28,7 @@ class RouteTracking : public ::testing::Test {
     return path[i] * Pose2{0.0, lateral_m, turn_rad};
   }
 
-  TexturedRoom room{31};
+  ToyWorld room = pillared_room(31);
   std::vector<Pose2> path;
   RoutePanorama route;
 };
@@ -56,7 +54,7 @@ TEST_F(RouteTracking, SaysThatAnotherPlaceIsNotOnThisRoute) {
   Random random(6);
   int refused = 0;
   for (int trial = 0; trial < 40; ++trial) {
-    const TexturedRoom other(500 + static_cast<std::uint64_t>(trial));
+    const ToyWorld other = pillared_room(500 + static_cast<std::uint64_t>(trial));
     const Pose2 there{random.uniform(-2.0, 2.0), random.uniform(-0.8, 0.8),
                       random.uniform(-pi, pi)};
     refused += tracker.search(other.line(there)) ? 0 : 1;
@@ -123,4 +121,4 @@ TEST_F(RouteTracking, ChecksItsInputs) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -13,12 +13,10 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "signature/random_views.hpp"
+#include "support/random_views.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
-
-using testing_views::random_signature;
 
 double correlation_at(const FourierSignature& query, const FourierSignature& reference,
                       double heading_rad) {
@@ -352,4 +350,4 @@ TEST(Compass, UsesTheComponentsAskedFor) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -7,12 +7,10 @@
 #include <vector>
 
 #include "panonav/core/error.hpp"
-#include "signature/random_views.hpp"
+#include "support/random_views.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
-
-using testing_views::random_signature;
 
 TEST(Dissimilarity, FollowsTheFormulas) {
   // Two rows, three components, by hand.
@@ -97,4 +95,4 @@ TEST(Similarities, RunFrom0To1000) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

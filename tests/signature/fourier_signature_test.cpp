@@ -11,13 +11,10 @@
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/signature/dissimilarity.hpp"
-#include "signature/random_views.hpp"
+#include "support/random_views.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
-
-using testing_views::random_panorama;
-using testing_views::random_signature;
 
 std::complex<double> coefficient(const FourierSignature& signature, int row, int k) {
   return std::polar(static_cast<double>(signature.magnitude(row, k)),
@@ -250,4 +247,4 @@ TEST(PackedSignature, RefusesBadScalesAndSizes) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -21,8 +21,9 @@
 #include "panonav/panorama/preprocessing.hpp"
 #include "panonav/signature/compass.hpp"
 #include "panonav/signature/dissimilarity.hpp"
+#include "support/skips.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
 constexpr int components = 15;
@@ -33,14 +34,12 @@ struct View {
   FourierSignature signature;
 };
 
-class Gantry : public testing::Test {
+class Gantry : public ::testing::Test {
  protected:
   void SetUp() override {
-    const char* const data = std::getenv("PANONAV_DATA");
-    if (data == nullptr) GTEST_SKIP() << "PANONAV_DATA is not set: no real recordings";
-    const std::filesystem::path folder = std::filesystem::path(data) / "gantry_plants";
-    if (!std::filesystem::exists(folder / "poses.csv")) GTEST_SKIP() << folder << " is not there";
-    std::ifstream poses(folder / "poses.csv");
+    const auto folder = real_data("gantry_plants");
+    PANONAV_REQUIRE_DATA(folder, "gantry_plants");
+    std::ifstream poses(*folder / "poses.csv");
     std::string line;
     std::getline(poses, line);
     ASSERT_EQ(line, "file,x_m,y_m,heading_deg");
@@ -50,7 +49,7 @@ class Gantry : public testing::Test {
       std::getline(fields, file, ',');
       std::getline(fields, x, ',');
       std::getline(fields, y, ',');
-      const Image image = read_image(folder / file);
+      const Image image = read_image(*folder / file);
       Panorama panorama = panorama_from_picture(
           image.view(), {.direction = ColumnDirection::clockwise, .forward_column = 0.5});
       FourierSignature signature = compute_signature(panorama, components);
@@ -181,4 +180,4 @@ TEST_F(Gantry, CompassReadsTheTurnOfTheRobot) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

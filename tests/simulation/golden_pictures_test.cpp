@@ -41,7 +41,7 @@ Camera small_mirror_camera() {
 
 // Not looking along any wall.
 Viewpoint viewpoint_in(const Scene& scene) {
-  return test::viewpoint_on_tour(scene, 0.3, 0.4);
+  return testing::viewpoint_on_tour(scene, 0.3, 0.4);
 }
 
 struct Pictures {
@@ -82,7 +82,7 @@ bool is_the_same(const Difference& found) {
   return found.mean_levels <= 0.1 && found.share_of_far_pixels <= 0.002;
 }
 
-class GoldenPicture : public testing::TestWithParam<std::string_view> {};
+class GoldenPicture : public ::testing::TestWithParam<std::string_view> {};
 
 void compare(const Image& picture, const fs::path& file) {
   if (std::getenv("PANONAV_WRITE_GOLDEN") != nullptr) write_png(file, picture.view());
@@ -118,8 +118,8 @@ TEST_P(GoldenPicture, IsRenderedAgainAndSmallChangesWouldBeNoticed) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, GoldenPicture,
-                         testing::Values("office", "hall", "hall_periodic", "arena", "lab", "loop",
-                                         "corridor", "garden"),
+                         ::testing::Values("office", "hall", "hall_periodic", "arena", "lab",
+                                           "loop", "corridor", "garden"),
                          [](const auto& scene) { return std::string(scene.param); });
 
 }  // namespace

@@ -53,7 +53,7 @@ const Material& material_of(const Scene& scene, const std::string& object, std::
   throw Error("no such part of " + object);
 }
 
-class GazeboWorld : public testing::Test {
+class GazeboWorld : public ::testing::Test {
  protected:
   void SetUp() override {
     try {
@@ -63,7 +63,7 @@ class GazeboWorld : public testing::Test {
       GTEST_SKIP() << "built without sdformat or assimp";
     }
   }
-  const test::TemporaryFolder folder_;
+  const testing::TemporaryFolder folder_;
 };
 
 TEST_F(GazeboWorld, PosesScalesAndUnitsAreComposed) {
@@ -188,8 +188,8 @@ TEST_F(GazeboWorld, BrokenFilesGiveOneClearLineAndNothingOnTheConsole) {
           folder_.write("cut" + std::to_string(length) + ".world", good.substr(0, length)));
     }
   }
-  testing::internal::CaptureStdout();
-  testing::internal::CaptureStderr();
+  ::testing::internal::CaptureStdout();
+  ::testing::internal::CaptureStderr();
   std::vector<std::string> failures;
   for (const fs::path& file : files) {
     try {
@@ -201,8 +201,8 @@ TEST_F(GazeboWorld, BrokenFilesGiveOneClearLineAndNothingOnTheConsole) {
         failures.push_back(text);
     }
   }
-  EXPECT_EQ(testing::internal::GetCapturedStdout(), "");
-  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  EXPECT_EQ(::testing::internal::GetCapturedStdout(), "");
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
   for (const auto& failure : failures) ADD_FAILURE() << failure;
 }
 

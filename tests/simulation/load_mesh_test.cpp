@@ -33,7 +33,7 @@ void expect_extent(const Scene& scene, const Vector3& low, const Vector3& high) 
   }
 }
 
-class MeshFile : public testing::Test {
+class MeshFile : public ::testing::Test {
  protected:
   void SetUp() override {
     try {
@@ -43,7 +43,7 @@ class MeshFile : public testing::Test {
       GTEST_SKIP() << "built without assimp";
     }
   }
-  const test::TemporaryFolder folder_;
+  const testing::TemporaryFolder folder_;
 };
 
 TEST_F(MeshFile, ColladaUnitIsAppliedAndZStaysUp) {

@@ -11,7 +11,7 @@
 namespace panonav {
 namespace {
 
-class Recording : public testing::Test {
+class Recording : public ::testing::Test {
  protected:
   const Scene scene_ = make_scene("lab");
   const FreeSpace space_{scene_};

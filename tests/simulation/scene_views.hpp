@@ -8,7 +8,7 @@
 #include "panonav/simulation/renderer.hpp"
 #include "panonav/simulation/scene.hpp"
 
-namespace panonav::test {
+namespace panonav::testing {
 
 /// A free place at this share (0 .. 1) of the shortest way along the first side of the scene's
 /// round trip.
@@ -22,4 +22,4 @@ inline Viewpoint viewpoint_on_tour(const Scene& scene, double share, double head
   return {.pose = {at.x_m, at.y_m, heading_rad}, .height_m = scene.camera_height_m};
 }
 
-}  // namespace panonav::test
+}  // namespace panonav::testing

@@ -20,13 +20,13 @@ namespace {
 constexpr std::uint64_t kSeeds[] = {1, 2, 300};
 constexpr PanoramaRendering kSmall{.rows = 20, .columns = 128, .rays_per_axis = 1};
 
-class EveryScene : public testing::TestWithParam<std::string_view> {
+class EveryScene : public ::testing::TestWithParam<std::string_view> {
  protected:
   [[nodiscard]] static Scene scene(std::uint64_t seed) { return make_scene(GetParam(), {seed}); }
 };
 
 Viewpoint viewpoint_in(const Scene& scene) {
-  return test::viewpoint_on_tour(scene, 0.5, 0.3);
+  return testing::viewpoint_on_tour(scene, 0.5, 0.3);
 }
 
 double mean_difference(const Panorama& a, const Panorama& b) {
@@ -164,7 +164,7 @@ TEST_P(EveryScene, MovedObjectsMoveAndNothingElseDoes) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, EveryScene, testing::ValuesIn(scene_names()),
+INSTANTIATE_TEST_SUITE_P(Scenes, EveryScene, ::testing::ValuesIn(scene_names()),
                          [](const auto& scene) { return std::string(scene.param); });
 
 // Free area of the scene on the rectangle that it promises.

@@ -46,7 +46,7 @@ struct Case {
   Pose2 pose;
 };
 
-class UnwarpedMirror : public testing::TestWithParam<Case> {};
+class UnwarpedMirror : public ::testing::TestWithParam<Case> {};
 
 TEST_P(UnwarpedMirror, AgreesWithThePanorama) {
   const Scene scene = make_scene(GetParam().scene, {.seed = 3});
@@ -80,11 +80,11 @@ TEST_P(UnwarpedMirror, AgreesWithThePanorama) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, UnwarpedMirror,
-                         testing::Values(Case{"office", {2.5, 1.0, 0.4}},
-                                         Case{"office", {1.0, 0.5, -2.0}},
-                                         Case{"lab", {3.0, 2.0, 1.5}},
-                                         Case{"garden", {5.0, 4.0, 3.0}},
-                                         Case{"arena", {0.3, 0.2, -1.0}}));
+                         ::testing::Values(Case{"office", {2.5, 1.0, 0.4}},
+                                           Case{"office", {1.0, 0.5, -2.0}},
+                                           Case{"lab", {3.0, 2.0, 1.5}},
+                                           Case{"garden", {5.0, 4.0, 3.0}},
+                                           Case{"arena", {0.3, 0.2, -1.0}}));
 
 }  // namespace
 }  // namespace panonav

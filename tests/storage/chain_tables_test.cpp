@@ -1,23 +1,15 @@
 // Chains of snapshots in a memory file.
 #include <gtest/gtest.h>
-#include <sqlite3.h>
 
-#include <fstream>
-#include <iterator>
 #include <limits>
 
 #include "panonav/core/error.hpp"
 #include "panonav/storage/memory_file.hpp"
-#include "storage/memory_samples.hpp"
+#include "support/memory_samples.hpp"
 #include "support/temporary_folder.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
-
-using test::message_of;
-using test::random_view;
-using test::small_header;
-using test::TemporaryFolder;
 
 SnapshotChain random_chain(std::uint64_t seed, int snapshots, int rows = 3, int components = 6,
                            std::optional<ElevationBand> band = std::nullopt) {
@@ -39,22 +31,9 @@ SnapshotChain random_chain(std::uint64_t seed, int snapshots, int rows = 3, int 
   return chain;
 }
 
-void run_sql(const std::filesystem::path& path, const std::string& sql) {
-  sqlite3* database = nullptr;
-  ASSERT_EQ(sqlite3_open(path.c_str(), &database), SQLITE_OK);
-  EXPECT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK)
-      << sqlite3_errmsg(database);
-  sqlite3_close(database);
-}
+using ChainTables = MemoryFileTest;
 
-std::string bytes_of(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
-TEST(ChainTables, WhatIsSavedIsReadBackBitForBit) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+TEST_F(ChainTables, WhatIsSavedIsReadBackBitForBit) {
   const auto out = random_chain(1, 12);
   const auto back = random_chain(2, 1, 20, 16, ElevationBand{-0.5, 0.25});
   {
@@ -73,9 +52,8 @@ TEST(ChainTables, WhatIsSavedIsReadBackBitForBit) {
   EXPECT_EQ(file.info().chains, 2U);
 }
 
-TEST(ChainTables, SavingAgainReplacesAndRemovingRemoves) {
-  const TemporaryFolder folder;
-  MemoryFile file = MemoryFile::create(folder / "m.panonav", small_header());
+TEST_F(ChainTables, SavingAgainReplacesAndRemovingRemoves) {
+  MemoryFile file = MemoryFile::create(path, small_header());
   EXPECT_THROW(file.remove_chain("way"), ContractError);
   file.save_chain("way", random_chain(1, 9));
   file.save_chain("way", random_chain(2, 4));
@@ -89,9 +67,7 @@ TEST(ChainTables, SavingAgainReplacesAndRemovingRemoves) {
 }
 
 // Who has no chains keeps a file that versions without chains read.
-TEST(ChainTables, TheFirstChainMakesTheFormatNewer) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+TEST_F(ChainTables, TheFirstChainMakesTheFormatNewer) {
   MemoryFile file = MemoryFile::create(path, small_header());
   Random random(3);
   const ViewId view = file.append(random_view(random, small_header().shape, 1));
@@ -108,9 +84,8 @@ TEST(ChainTables, TheFirstChainMakesTheFormatNewer) {
   EXPECT_EQ(again.chain("way"), random_chain(1, 3));
 }
 
-TEST(ChainTables, WrongChainsAreRefusedAndChangeNothing) {
-  const TemporaryFolder folder;
-  MemoryFile file = MemoryFile::create(folder / "m.panonav", small_header());
+TEST_F(ChainTables, WrongChainsAreRefusedAndChangeNothing) {
+  MemoryFile file = MemoryFile::create(path, small_header());
   EXPECT_THROW(file.save_chain("", random_chain(1, 2)), ContractError);
   EXPECT_THROW(file.save_chain("way", {}), ContractError);
   SnapshotChain backwards = random_chain(1, 3);
@@ -125,9 +100,7 @@ TEST(ChainTables, WrongChainsAreRefusedAndChangeNothing) {
   EXPECT_EQ(file.chain("way"), random_chain(5, 3)) << "the chain before is kept";
 }
 
-TEST(ChainTables, RowsThatWereTamperedWith) {
-  const TemporaryFolder folder;
-  int number = 0;
+TEST_F(ChainTables, RowsThatWereTamperedWith) {
   for (const std::string sql :
        {"UPDATE chains SET snapshots = 3", "UPDATE chains SET name = 'other'",
         "UPDATE chains SET components = 5", "UPDATE chains SET elevation_top_rad = 0.5",
@@ -138,7 +111,7 @@ TEST(ChainTables, RowsThatWereTamperedWith) {
         "UPDATE chain_snapshots SET heading_rad = 1.5 WHERE number = 2",
         "UPDATE chain_snapshots SET coefficients = x'00' WHERE number = 2",
         "UPDATE chain_snapshots SET number = 9 WHERE number = 3"}) {
-    const auto path = folder / ("m" + std::to_string(number++) + ".panonav");
+    std::filesystem::remove(path);
     {
       MemoryFile file = MemoryFile::create(path, small_header());
       file.save_chain("way", random_chain(1, 4));
@@ -152,7 +125,7 @@ TEST(ChainTables, RowsThatWereTamperedWith) {
         (void)file.chain(name);
       } catch (const FileError& error) {
         refused = true;
-        EXPECT_NE(std::string(error.what()).find("chain "), std::string::npos) << error.what();
+        EXPECT_TRUE(contains(error.what(), "chain "));
       }
     }
     EXPECT_TRUE(refused) << sql;
@@ -160,20 +133,15 @@ TEST(ChainTables, RowsThatWereTamperedWith) {
   }
 }
 
-TEST(ChainTables, AFileThatClaimsChainsWithoutTheirTablesIsRefused) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+TEST_F(ChainTables, AFileThatClaimsChainsWithoutTheirTablesIsRefused) {
   { (void)MemoryFile::create(path, small_header()); }
   run_sql(path, "PRAGMA journal_mode=DELETE; PRAGMA user_version=2");
-  EXPECT_NE(message_of<FileError>([&] {
-              (void)MemoryFile::open(path, Access::read_only);
-            }).find("table chain_snapshots is missing"),
-            std::string::npos);
+  EXPECT_TRUE(
+      contains(message_of<FileError>([&] { (void)MemoryFile::open(path, Access::read_only); }),
+               "table chain_snapshots is missing"));
 }
 
-TEST(ChainTables, NothingIsReadThatWasNotWritten) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+TEST_F(ChainTables, NothingIsReadThatWasNotWritten) {
   const auto expected = random_chain(7, 300, 4, 12);  // most of the file is chain
   {
     MemoryFile file = MemoryFile::create(path, small_header());
@@ -184,23 +152,16 @@ TEST(ChainTables, NothingIsReadThatWasNotWritten) {
   int refused = 0;
   constexpr int trials = 300;
   for (int trial = 0; trial < trials; ++trial) {
-    std::string damaged = good;
-    const std::size_t at = random.index(damaged.size());
-    if (trial % 2 == 0) {
-      damaged[at] = static_cast<char>(damaged[at] ^ (1 << random.index(8)));
-    } else {
-      const std::size_t count = std::min<std::size_t>(512, damaged.size() - at);
-      std::fill_n(damaged.begin() + static_cast<std::ptrdiff_t>(at), count, '\0');
-    }
-    const auto copy = folder.write("damaged.panonav", damaged);
+    SCOPED_TRACE(trial);
+    const auto copy = folder.write("damaged.panonav", damaged_bytes(good, random, trial));
     try {
       const MemoryFile file = MemoryFile::open(copy, Access::read_only);
       const bool intact = file.verify().empty();
       const auto read = file.chain("way");
       if (read.has_value()) {
-        EXPECT_EQ(*read, expected) << "at byte " << at;
+        EXPECT_EQ(*read, expected);
       } else {
-        EXPECT_FALSE(intact) << "lost without a fault, at byte " << at;
+        EXPECT_FALSE(intact) << "lost without a fault";
       }
       refused += intact ? 0 : 1;
     } catch (const FileError& error) {
@@ -213,4 +174,4 @@ TEST(ChainTables, NothingIsReadThatWasNotWritten) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -1,20 +1,15 @@
 // Maps in a memory file.
 #include <gtest/gtest.h>
-#include <sqlite3.h>
 
 #include <limits>
 
 #include "panonav/core/error.hpp"
 #include "panonav/storage/memory_file.hpp"
-#include "storage/memory_samples.hpp"
+#include "support/memory_samples.hpp"
 #include "support/temporary_folder.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
-
-using test::random_view;
-using test::small_header;
-using test::TemporaryFolder;
 
 std::vector<ViewId> append_views(MemoryFile& file, int count) {
   Random random(9);
@@ -41,9 +36,9 @@ TopologicalMap random_map(const std::vector<ViewId>& views, std::uint64_t seed) 
   return map;
 }
 
-TEST(MapTables, WhatIsSavedIsReadBackBitForBit) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+using MapTables = MemoryFileTest;
+
+TEST_F(MapTables, WhatIsSavedIsReadBackBitForBit) {
   TopologicalMap map;
   {
     MemoryFile file = MemoryFile::create(path, small_header());
@@ -70,9 +65,8 @@ TEST(MapTables, WhatIsSavedIsReadBackBitForBit) {
   EXPECT_THROW(file.remove_map("other"), ContractError);
 }
 
-TEST(MapTables, ForgottenViewsLeaveTheMap) {
-  const TemporaryFolder folder;
-  MemoryFile file = MemoryFile::create(folder / "m.panonav", small_header());
+TEST_F(MapTables, ForgottenViewsLeaveTheMap) {
+  MemoryFile file = MemoryFile::create(path, small_header());
   const auto views = append_views(file, 6);
   file.save_map("map", random_map(views, 1));
   const std::vector<ViewId> dropped{views[3]};
@@ -84,9 +78,8 @@ TEST(MapTables, ForgottenViewsLeaveTheMap) {
   EXPECT_TRUE(file.verify().empty());
 }
 
-TEST(MapTables, WrongMapsAreRefusedAndChangeNothing) {
-  const TemporaryFolder folder;
-  MemoryFile file = MemoryFile::create(folder / "m.panonav", small_header());
+TEST_F(MapTables, WrongMapsAreRefusedAndChangeNothing) {
+  MemoryFile file = MemoryFile::create(path, small_header());
   const auto views = append_views(file, 4);
   const TopologicalMap good = random_map(views, 1);
   file.save_map("map", good);
@@ -109,22 +102,17 @@ TEST(MapTables, WrongMapsAreRefusedAndChangeNothing) {
   EXPECT_EQ(file.map("map"), good);
 }
 
-TEST(MapTables, RowsThatWereTamperedWith) {
-  const TemporaryFolder folder;
-  int number = 0;
+TEST_F(MapTables, RowsThatWereTamperedWith) {
   for (const std::string sql :
        {"UPDATE maps SET nodes = x'00'", "UPDATE maps SET nodes = substr(nodes, 33)",
         "UPDATE maps SET edges = substr(edges, 45)", "UPDATE maps SET name = 'other'",
         "UPDATE maps SET checksum = checksum + 1"}) {
-    const auto path = folder / ("m" + std::to_string(number++) + ".panonav");
+    std::filesystem::remove(path);
     {
       MemoryFile file = MemoryFile::create(path, small_header());
       file.save_map("map", random_map(append_views(file, 4), 1));
     }
-    sqlite3* database = nullptr;
-    ASSERT_EQ(sqlite3_open(path.c_str(), &database), SQLITE_OK);
-    EXPECT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK);
-    sqlite3_close(database);
+    run_sql(path, sql);
     const MemoryFile file = MemoryFile::open(path, Access::read_only);
     EXPECT_FALSE(file.verify().empty()) << sql;
     const std::string name = file.map_names().front();
@@ -134,4 +122,4 @@ TEST(MapTables, RowsThatWereTamperedWith) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -14,16 +14,11 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/storage/memory_file.hpp"
-#include "storage/memory_samples.hpp"
+#include "support/memory_samples.hpp"
 #include "support/temporary_folder.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
-
-using test::message_of;
-using test::random_view;
-using test::small_header;
-using test::TemporaryFolder;
 
 // The view of that number, the same in every process.
 NewView numbered_view(SignatureShape shape, int number) {
@@ -54,9 +49,9 @@ struct Acknowledgement {
   std::uint32_t id;
 };
 
-TEST(MemoryFileCrash, EveryAcknowledgedViewSurvivesAKill) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+using MemoryFileCrash = MemoryFileTest;
+
+TEST_F(MemoryFileCrash, EveryAcknowledgedViewSurvivesAKill) {
   const SignatureShape shape = small_header().shape;
   { (void)MemoryFile::create(path, small_header()); }
 
@@ -113,9 +108,7 @@ TEST(MemoryFileCrash, EveryAcknowledgedViewSurvivesAKill) {
 }
 
 // A write beyond the limit fails as on a full disk.
-TEST(MemoryFileCrash, AFullDiskLosesNothing) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+TEST_F(MemoryFileCrash, AFullDiskLosesNothing) {
   MemoryHeader header = small_header();
   header.shape = {80, 15};
   header.panorama_columns = 512;
@@ -154,9 +147,7 @@ TEST(MemoryFileCrash, AFullDiskLosesNothing) {
   EXPECT_GT(file.append(numbered_view(header.shape, appended)), memory.views().back());
 }
 
-TEST(MemoryFileCrash, AFullDiskWhileCreatingLeavesNothing) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+TEST_F(MemoryFileCrash, AFullDiskWhileCreatingLeavesNothing) {
   EXPECT_EQ(exit_code_of(start_child([&] {
               ::signal(SIGXFSZ, SIG_IGN);
               const rlimit limit{20000, 20000};
@@ -169,9 +160,7 @@ TEST(MemoryFileCrash, AFullDiskWhileCreatingLeavesNothing) {
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 
-TEST(MemoryFileCrash, AFullDiskDoesNotKeepAMemoryFromBeingRead) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+TEST_F(MemoryFileCrash, AFullDiskDoesNotKeepAMemoryFromBeingRead) {
   {
     MemoryFile file = MemoryFile::create(path, small_header());
     file.append(numbered_view(small_header().shape, 0));
@@ -196,7 +185,7 @@ int as_ordinary_user(const std::function<int()>& body) {
   }));
 }
 
-class ReadOnlyMemoryFile : public ::testing::Test {
+class ReadOnlyMemoryFile : public MemoryFileTest {
  protected:
   void SetUp() override {
     MemoryFile file = MemoryFile::create(path, small_header());
@@ -220,9 +209,6 @@ class ReadOnlyMemoryFile : public ::testing::Test {
   void set_permissions(const std::filesystem::path& what, unsigned mode) const {
     std::filesystem::permissions(what, static_cast<std::filesystem::perms>(mode));
   }
-
-  TemporaryFolder folder;
-  std::filesystem::path path = folder / "m.panonav";
 };
 
 TEST_F(ReadOnlyMemoryFile, FileAndFolderReadOnly) {
@@ -295,4 +281,4 @@ TEST_F(ReadOnlyMemoryFile, CreatingNeedsPermission) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

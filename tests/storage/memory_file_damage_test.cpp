@@ -1,29 +1,13 @@
 // Files that are not as they were written: damaged, cut, foreign, newer.
 #include <gtest/gtest.h>
-#include <sqlite3.h>
-
-#include <fstream>
-#include <iterator>
 
 #include "panonav/core/error.hpp"
 #include "panonav/storage/memory_file.hpp"
-#include "storage/memory_samples.hpp"
+#include "support/memory_samples.hpp"
 #include "support/temporary_folder.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
-
-using test::message_of;
-using test::mirror_header;
-using test::random_view;
-using test::same_content;
-using test::small_header;
-using test::TemporaryFolder;
-
-std::string bytes_of(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 struct Sample {
   explicit Sample(const std::filesystem::path& path, int views = 60) {
@@ -70,9 +54,9 @@ bool reads_the_same(const std::filesystem::path& path, const VisualMemory& expec
   }
 }
 
-TEST(MemoryFileDamage, NothingIsReadThatWasNotWritten) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+using MemoryFileDamage = MemoryFileTest;
+
+TEST_F(MemoryFileDamage, NothingIsReadThatWasNotWritten) {
   const Sample sample(path);
   const std::string good = bytes_of(path);
   ASSERT_TRUE(reads_the_same(path, *sample.content));
@@ -80,21 +64,9 @@ TEST(MemoryFileDamage, NothingIsReadThatWasNotWritten) {
   int refused = 0;
   constexpr int trials = 400;
   for (int trial = 0; trial < trials; ++trial) {
-    std::string damaged = good;
-    // A third each: one bit, some bytes, a stretch of zeros.
-    const std::size_t at = random.index(damaged.size());
-    if (trial % 3 == 0) {
-      damaged[at] = static_cast<char>(damaged[at] ^ (1 << random.index(8)));
-    } else if (trial % 3 == 1) {
-      for (int i = 0; i < 4; ++i) {
-        damaged[random.index(damaged.size())] = static_cast<char>(random.index(256));
-      }
-    } else {
-      const std::size_t count = std::min<std::size_t>(512, damaged.size() - at);
-      std::fill_n(damaged.begin() + static_cast<std::ptrdiff_t>(at), count, '\0');
-    }
+    SCOPED_TRACE(trial);
+    const std::string damaged = damaged_bytes(good, random, trial);
     const auto copy = folder.write("damaged.panonav", damaged);
-    SCOPED_TRACE("trial " + std::to_string(trial) + " at byte " + std::to_string(at));
     refused += !reads_the_same(copy, *sample.content);
     ASSERT_EQ(bytes_of(copy), damaged) << "a damaged file was changed";
     if (HasFailure()) return;
@@ -103,9 +75,7 @@ TEST(MemoryFileDamage, NothingIsReadThatWasNotWritten) {
 }
 
 // Pages hold the structure of the tables at their beginning; there damage is worst.
-TEST(MemoryFileDamage, DamagedPageHeads) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+TEST_F(MemoryFileDamage, DamagedPageHeads) {
   const Sample sample(path);
   const std::string good = bytes_of(path);
   Random random(3);
@@ -127,9 +97,7 @@ TEST(MemoryFileDamage, DamagedPageHeads) {
   EXPECT_GT(refused, 100);
 }
 
-TEST(MemoryFileDamage, CutFilesAreRefused) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+TEST_F(MemoryFileDamage, CutFilesAreRefused) {
   const Sample sample(path);
   const std::string good = bytes_of(path);
   for (const std::size_t size :
@@ -141,9 +109,7 @@ TEST(MemoryFileDamage, CutFilesAreRefused) {
   }
 }
 
-TEST(MemoryFileDamage, VerifyNamesTheDamagedView) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+TEST_F(MemoryFileDamage, VerifyNamesTheDamagedView) {
   { const Sample sample(path); }
   const std::string good = bytes_of(path);
   // The signature of view 30 as it lies in the file.
@@ -166,16 +132,7 @@ TEST(MemoryFileDamage, VerifyNamesTheDamagedView) {
   ASSERT_EQ(faults.size(), 1U);
   EXPECT_EQ(faults[0].view, view);
   EXPECT_EQ(faults[0].what, "view 31 does not match its checksum");
-  EXPECT_NE(message_of<FileError>([&] { (void)file.load(); }).find("is damaged: view 31"),
-            std::string::npos);
-}
-
-void run_sql(const std::filesystem::path& path, const std::string& sql) {
-  sqlite3* database = nullptr;
-  ASSERT_EQ(sqlite3_open(path.c_str(), &database), SQLITE_OK);
-  EXPECT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK)
-      << sqlite3_errmsg(database);
-  sqlite3_close(database);
+  EXPECT_TRUE(contains(message_of<FileError>([&] { (void)file.load(); }), "is damaged: view 31"));
 }
 
 void expect_refused_unchanged(const std::filesystem::path& path, std::string_view part) {
@@ -183,40 +140,35 @@ void expect_refused_unchanged(const std::filesystem::path& path, std::string_vie
   for (const Access access : {Access::read_only, Access::read_write}) {
     const std::string message =
         message_of<FileError>([&] { (void)MemoryFile::open(path, access); });
-    EXPECT_NE(message.find(part), std::string::npos) << message;
+    EXPECT_TRUE(contains(message, part));
     EXPECT_EQ(bytes_of(path), before);
   }
 }
 
-TEST(MemoryFileDamage, ForeignFilesAreRefused) {
-  const TemporaryFolder folder;
+TEST_F(MemoryFileDamage, ForeignFilesAreRefused) {
   expect_refused_unchanged(folder.write("text.panonav", std::string(1000, 'x')),
                            "is no memory file");
   expect_refused_unchanged(folder.write("empty.panonav", ""), "is no memory file");
   const auto other = folder / "other.sqlite";
   run_sql(other, "CREATE TABLE songs(title TEXT)");
   expect_refused_unchanged(other, "application_id is 0x00000000; allowed: 0x504e4156");
-  EXPECT_NE(message_of<FileError>([&] {
-              (void)MemoryFile::open(folder.path(), Access::read_only);
-            }).find("is a folder"),
-            std::string::npos);
-  EXPECT_NE(message_of<FileError>([&] {
-              (void)MemoryFile::open(folder / "none.panonav", Access::read_write);
-            }).find("No such file"),
-            std::string::npos);
+  EXPECT_TRUE(contains(
+      message_of<FileError>([&] { (void)MemoryFile::open(folder.path(), Access::read_only); }),
+      "is a folder"));
+  EXPECT_TRUE(contains(message_of<FileError>([&] {
+                         (void)MemoryFile::open(folder / "none.panonav", Access::read_write);
+                       }),
+                       "No such file"));
   EXPECT_FALSE(std::filesystem::exists(folder / "none.panonav"));
 }
 
-TEST(MemoryFileDamage, NewerFilesAreRefused) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+TEST_F(MemoryFileDamage, NewerFilesAreRefused) {
   { (void)MemoryFile::create(path, small_header()); }
   run_sql(path, "PRAGMA journal_mode=DELETE; PRAGMA user_version=5");
   expect_refused_unchanged(path, "newer version: format version is 5; allowed: 1 .. 4");
 }
 
-TEST(MemoryFileDamage, OtherTablesAreRefused) {
-  const TemporaryFolder folder;
+TEST_F(MemoryFileDamage, OtherTablesAreRefused) {
   int number = 0;
   const auto refused_after = [&](const std::string& sql, std::string_view part) {
     const auto path = folder / ("m" + std::to_string(number++) + ".panonav");
@@ -233,8 +185,7 @@ TEST(MemoryFileDamage, OtherTablesAreRefused) {
   refused_after("INSERT INTO settings VALUES('rows2', 3, 0)", "checksum of setting rows2");
 }
 
-TEST(MemoryFileDamage, RowsThatWereTamperedWith) {
-  const TemporaryFolder folder;
+TEST_F(MemoryFileDamage, RowsThatWereTamperedWith) {
   int number = 0;
   const auto refused_after = [&](const std::string& sql) {
     const auto path = folder / ("m" + std::to_string(number++) + ".panonav");
@@ -254,9 +205,7 @@ TEST(MemoryFileDamage, RowsThatWereTamperedWith) {
 }
 
 // A file in SQLite's other journal mode (copied with its tools, say) is as good.
-TEST(MemoryFileDamage, AFileWithoutWriteAheadLogIsRead) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+TEST_F(MemoryFileDamage, AFileWithoutWriteAheadLogIsRead) {
   const Sample sample(path);
   run_sql(path, "PRAGMA journal_mode=DELETE");
   EXPECT_TRUE(reads_the_same(path, *sample.content));
@@ -267,4 +216,4 @@ TEST(MemoryFileDamage, AFileWithoutWriteAheadLogIsRead) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -8,22 +8,15 @@
 #include <thread>
 
 #include "panonav/core/error.hpp"
-#include "storage/memory_samples.hpp"
+#include "support/memory_samples.hpp"
 #include "support/temporary_folder.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
-using test::message_of;
-using test::mirror_header;
-using test::random_packed;
-using test::random_view;
-using test::same_content;
-using test::small_header;
-using test::TemporaryFolder;
+using MemoryFileContent = MemoryFileTest;
 
-TEST(MemoryFile, HeadersComeBack) {
-  const TemporaryFolder folder;
+TEST_F(MemoryFileContent, HeadersComeBack) {
   MemoryHeader plain = small_header();
   plain.created_s.reset();
   MemoryHeader picture = small_header();
@@ -51,8 +44,7 @@ TEST(MemoryFile, HeadersComeBack) {
   }
 }
 
-TEST(MemoryFile, ContentComesBack) {
-  const TemporaryFolder folder;
+TEST_F(MemoryFileContent, ContentComesBack) {
   const auto path = folder / "a b%20?#.panonav";
   const MemoryHeader header = mirror_header();
   VisualMemory expected(header.shape, header.full_scale, header.elevations);
@@ -116,10 +108,8 @@ TEST(MemoryFile, ContentComesBack) {
   EXPECT_EQ(info.views_with_heading, headings);
 }
 
-TEST(MemoryFile, IdsAreNeverUsedTwice) {
-  const TemporaryFolder folder;
+TEST_F(MemoryFileContent, IdsAreNeverUsedTwice) {
   Random random(2);
-  const auto path = folder / "m.panonav";
   const SignatureShape shape = small_header().shape;
   ViewId last;
   {
@@ -133,9 +123,7 @@ TEST(MemoryFile, IdsAreNeverUsedTwice) {
   EXPECT_GT(file.append(random_view(random, shape, 1)), last);
 }
 
-TEST(MemoryFile, ParametersAreKept) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+TEST_F(MemoryFileContent, ParametersAreKept) {
   {
     MemoryFile file = MemoryFile::create(path, small_header());
     EXPECT_EQ(file.parameter("unknown place"), std::nullopt);
@@ -147,11 +135,10 @@ TEST(MemoryFile, ParametersAreKept) {
   EXPECT_EQ(file.header(), small_header());
 }
 
-TEST(MemoryFile, ABadViewChangesNothing) {
-  const TemporaryFolder folder;
+TEST_F(MemoryFileContent, ABadViewChangesNothing) {
   Random random(3);
   const SignatureShape shape = small_header().shape;
-  MemoryFile file = MemoryFile::create(folder / "m.panonav", small_header());
+  MemoryFile file = MemoryFile::create(path, small_header());
   file.append(random_view(random, shape, 1));
   const VisualMemory before = file.load();
   ASSERT_EQ(before.size(), 1U);
@@ -159,7 +146,7 @@ TEST(MemoryFile, ABadViewChangesNothing) {
   const auto refused = [&](NewView view, std::string_view part) {
     const std::vector<NewView> views{random_view(random, shape, 100), std::move(view)};
     const std::string message = message_of<ContractError>([&] { file.append(views); });
-    EXPECT_NE(message.find(part), std::string::npos) << message;
+    EXPECT_TRUE(contains(message, part));
     EXPECT_TRUE(same_content(file.load(), before));
   };
   refused(random_view(random, shape, 1), "\"view_1.png\"");
@@ -184,10 +171,9 @@ TEST(MemoryFile, ABadViewChangesNothing) {
   EXPECT_TRUE(same_content(file.load(), before));
 }
 
-TEST(MemoryFile, ImpossibleHeadersAreRefused) {
-  const TemporaryFolder folder;
+TEST_F(MemoryFileContent, ImpossibleHeadersAreRefused) {
   const auto refused = [&](const MemoryHeader& header) {
-    EXPECT_THROW(MemoryFile::create(folder / "m.panonav", header), Error);
+    EXPECT_THROW(MemoryFile::create(path, header), Error);
     EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
   };
   MemoryHeader header = small_header();
@@ -219,21 +205,16 @@ TEST(MemoryFile, ImpossibleHeadersAreRefused) {
   refused(header);
 }
 
-TEST(MemoryFile, CreateNeverReplaces) {
-  const TemporaryFolder folder;
+TEST_F(MemoryFileContent, CreateNeverReplaces) {
   const auto path = folder.write("m.panonav", "something else");
-  EXPECT_NE(message_of<FileError>([&] {
-              MemoryFile::create(path, small_header());
-            }).find("is there already"),
-            std::string::npos);
+  EXPECT_TRUE(contains(message_of<FileError>([&] { MemoryFile::create(path, small_header()); }),
+                       "is there already"));
   EXPECT_EQ(std::filesystem::file_size(path), 14U);
   EXPECT_THROW(MemoryFile::create(folder / "no" / "m.panonav", small_header()), FileError);
 }
 
-TEST(MemoryFile, NothingIsLeftBesideAClosedFile) {
-  const TemporaryFolder folder;
+TEST_F(MemoryFileContent, NothingIsLeftBesideAClosedFile) {
   Random random(4);
-  const auto path = folder / "m.panonav";
   {
     MemoryFile file = MemoryFile::create(path, small_header());
     file.append(random_view(random, small_header().shape, 0));
@@ -242,9 +223,7 @@ TEST(MemoryFile, NothingIsLeftBesideAClosedFile) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
 }
 
-TEST(MemoryFile, ReadersBesideOneWriter) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+TEST_F(MemoryFileContent, ReadersBesideOneWriter) {
   const SignatureShape shape = small_header().shape;
   constexpr int rounds = 100;
   constexpr int views_per_round = 3;
@@ -286,9 +265,7 @@ TEST(MemoryFile, ReadersBesideOneWriter) {
   }
 }
 
-TEST(MemoryFile, TwoWritersTakeTurns) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+TEST_F(MemoryFileContent, TwoWritersTakeTurns) {
   Random random(6);
   const SignatureShape shape = small_header().shape;
   MemoryFile first = MemoryFile::create(path, small_header());
@@ -304,9 +281,7 @@ TEST(MemoryFile, TwoWritersTakeTurns) {
 
 // Many pages and several levels of the tables; how long loading takes is bench/storage_bench's
 // question.
-TEST(MemoryFile, ALargeMemoryComesBackWhole) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+TEST_F(MemoryFileContent, ALargeMemoryComesBackWhole) {
   MemoryHeader header = small_header();
   header.shape = {80, 15};
   header.panorama_columns = 512;
@@ -331,4 +306,4 @@ TEST(MemoryFile, ALargeMemoryComesBackWhole) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

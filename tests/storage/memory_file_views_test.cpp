@@ -3,19 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 
 #include "panonav/core/error.hpp"
-#include "storage/memory_samples.hpp"
+#include "support/memory_samples.hpp"
 #include "support/temporary_folder.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
-
-using test::random_view;
-using test::small_header;
-using test::TemporaryFolder;
 
 // Views 1 .. 60 but for every seventh, with links.
 VisualMemory write_sample(const std::filesystem::path& path) {
@@ -48,11 +42,12 @@ void expect_same_views(const VisualMemory& part, const VisualMemory& whole) {
   }
 }
 
-TEST(MemoryFileViews, AreThoseOfTheWholeMemory) {
-  const TemporaryFolder folder;
-  const VisualMemory whole = write_sample(folder / "m.panonav");
+using ViewsOfAMemoryFile = MemoryFileTest;
+
+TEST_F(ViewsOfAMemoryFile, AreThoseOfTheWholeMemory) {
+  const VisualMemory whole = write_sample(path);
   ASSERT_EQ(whole.size(), 51U);
-  const MemoryFileViews source(folder / "m.panonav");
+  const MemoryFileViews source(path);
   EXPECT_TRUE(std::ranges::equal(source.views(), whole.views()));
   EXPECT_TRUE(std::ranges::equal(source.file().links(), whole.links()));
   EXPECT_EQ(source.load({}).size(), 0U);
@@ -72,10 +67,9 @@ TEST(MemoryFileViews, AreThoseOfTheWholeMemory) {
   }
 }
 
-TEST(MemoryFileViews, RefuseWhatIsNotThere) {
-  const TemporaryFolder folder;
-  const VisualMemory whole = write_sample(folder / "m.panonav");
-  const MemoryFileViews source(folder / "m.panonav");
+TEST_F(ViewsOfAMemoryFile, RefuseWhatIsNotThere) {
+  const VisualMemory whole = write_sample(path);
+  const MemoryFileViews source(path);
   const ViewId there = whole.views().front();
   ASSERT_FALSE(whole.contains(ViewId{1}));
   EXPECT_THROW((void)source.load(std::vector<ViewId>{ViewId{1}}), ContractError);
@@ -87,9 +81,7 @@ TEST(MemoryFileViews, RefuseWhatIsNotThere) {
   EXPECT_THROW(MemoryFileViews(folder / "foreign.panonav"), FileError);
 }
 
-TEST(MemoryFileViews, SeeWhatOthersChange) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+TEST_F(ViewsOfAMemoryFile, SeeWhatOthersChange) {
   const VisualMemory whole = write_sample(path);
   const MemoryFileViews source(path);
   const std::vector<ViewId> first{whole.views()[0]};
@@ -102,24 +94,15 @@ TEST(MemoryFileViews, SeeWhatOthersChange) {
 }
 
 // Whatever is damaged, a view is what was written or refused as a fault of the file.
-TEST(MemoryFileViews, DamageIsAFaultOfTheFile) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+TEST_F(ViewsOfAMemoryFile, DamageIsAFaultOfTheFile) {
   const VisualMemory whole = write_sample(path);
-  std::ifstream file(path, std::ios::binary);
-  const std::string good{std::istreambuf_iterator<char>(file), {}};
+  const std::string good = bytes_of(path);
   Random random(3);
   int views_refused = 0;
   int views_read = 0;
   for (int trial = 0; trial < 200; ++trial) {
-    std::string damaged = good;
-    const std::size_t at = random.index(damaged.size());
-    const std::size_t count = std::min<std::size_t>(trial % 2 == 0 ? 1 : 256, damaged.size() - at);
-    for (std::size_t i = 0; i < count; ++i) {
-      damaged[at + i] = static_cast<char>(random.index(256));
-    }
-    const auto copy = folder.write("damaged.panonav", damaged);
-    SCOPED_TRACE("trial " + std::to_string(trial) + " at byte " + std::to_string(at));
+    SCOPED_TRACE(trial);
+    const auto copy = folder.write("damaged.panonav", damaged_bytes(good, random, trial));
     try {
       const MemoryFileViews source(copy);
       for (const ViewId view : whole.views()) {
@@ -139,4 +122,4 @@ TEST(MemoryFileViews, DamageIsAFaultOfTheFile) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -1,13 +1,11 @@
 // Route panoramas in a memory file.
 #include <gtest/gtest.h>
 #include <signal.h>
-#include <sqlite3.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <numbers>
@@ -15,15 +13,12 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/storage/memory_file.hpp"
-#include "route/textured_room.hpp"
-#include "storage/memory_samples.hpp"
+#include "support/memory_samples.hpp"
 #include "support/temporary_folder.hpp"
+#include "support/toy_world.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
-
-using test::small_header;
-using test::TemporaryFolder;
 
 // Noise, which nothing can be gained from, at random places.
 RoutePanorama random_route(std::size_t lines, std::uint64_t seed, int columns = 360) {
@@ -44,9 +39,9 @@ RoutePanorama part(const RoutePanorama& route, std::size_t first, std::size_t en
   return result;
 }
 
-TEST(RouteTables, WhatIsAppendedIsReadBackBitForBit) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+using RouteTables = MemoryFileTest;
+
+TEST_F(RouteTables, WhatIsAppendedIsReadBackBitForBit) {
   // Less than a block, one exactly, and several.
   const std::vector<std::size_t> sizes{1, 7, 255, 256, 257, 1300};
   {
@@ -75,9 +70,8 @@ TEST(RouteTables, WhatIsAppendedIsReadBackBitForBit) {
 }
 
 // In whatever batches a route is appended, it is the same route, byte by byte of its blocks.
-TEST(RouteTables, BatchesMakeTheSameRoute) {
-  const TemporaryFolder folder;
-  MemoryFile file = MemoryFile::create(folder / "m.panonav", small_header());
+TEST_F(RouteTables, BatchesMakeTheSameRoute) {
+  MemoryFile file = MemoryFile::create(path, small_header());
   const RoutePanorama route = random_route(1200, 3, 16);
   file.append_route("whole", route);
   Random random(4);
@@ -95,18 +89,16 @@ TEST(RouteTables, BatchesMakeTheSameRoute) {
   EXPECT_EQ(file.route_bytes("batches"), file.route_bytes("whole"));
 }
 
-TEST(RouteTables, WhereTheRobotStoodStillNothingIsAdded) {
-  const TemporaryFolder folder;
-  MemoryFile file = MemoryFile::create(folder / "m.panonav", small_header());
+TEST_F(RouteTables, WhereTheRobotStoodStillNothingIsAdded) {
+  MemoryFile file = MemoryFile::create(path, small_header());
   const RoutePanorama route = random_route(5, 5);
   file.append_route("route", route);
   EXPECT_EQ(file.append_route("route", part(route, 4, 5)), 0U);
   EXPECT_EQ(file.route("route"), route);
 }
 
-TEST(RouteTables, WrongLinesAreRefusedAndChangeNothing) {
-  const TemporaryFolder folder;
-  MemoryFile file = MemoryFile::create(folder / "m.panonav", small_header());
+TEST_F(RouteTables, WrongLinesAreRefusedAndChangeNothing) {
+  MemoryFile file = MemoryFile::create(path, small_header());
   EXPECT_THROW(file.append_route("route", RoutePanorama(360)), ContractError);
   EXPECT_EQ(file.info().format_version, 1);  // tables and all are taken back
   const RoutePanorama route = random_route(5, 5);
@@ -117,13 +109,11 @@ TEST(RouteTables, WrongLinesAreRefusedAndChangeNothing) {
 }
 
 // [Y03 section 2.2]: 3.6 MB a kilometre at a line every 10 cm, measured on the file.
-TEST(RouteTables, TakesLessThan360BytesALineOfTheFile) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+TEST_F(RouteTables, TakesLessThan360BytesALineOfTheFile) {
   { (void)MemoryFile::create(path, small_header()); }
   const auto before = std::filesystem::file_size(path);
   // Round and round in the room; every line is seen anew, with the noise of a camera.
-  const testing::TexturedRoom room(1);
+  const ToyWorld room = pillared_room(1);
   constexpr int places = 120;
   constexpr int laps = 25;
   constexpr int lines = places * laps;
@@ -158,9 +148,7 @@ TEST(RouteTables, TakesLessThan360BytesALineOfTheFile) {
 }
 
 // After a kill every batch is there whole or not at all, and all those that append returned for.
-TEST(RouteTables, KilledWriterLeavesWholeBatches) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+TEST_F(RouteTables, KilledWriterLeavesWholeBatches) {
   { (void)MemoryFile::create(path, small_header()); }
   constexpr std::size_t batch = 37;
   const RoutePanorama route = random_route(batch * 200, 7, 32);
@@ -209,9 +197,7 @@ TEST(RouteTables, KilledWriterLeavesWholeBatches) {
   EXPECT_GE(kills_while_appending, 2) << "most kills came before the first append";
 }
 
-TEST(RouteTables, RowsThatWereTamperedWith) {
-  const TemporaryFolder folder;
-  int number = 0;
+TEST_F(RouteTables, RowsThatWereTamperedWith) {
   for (const std::string sql :
        {"UPDATE routes SET columns = 32", "UPDATE routes SET columns = 1 << 40",
         "UPDATE routes SET lines = lines - 1", "UPDATE routes SET lines = 1 << 60",
@@ -224,44 +210,32 @@ TEST(RouteTables, RowsThatWereTamperedWith) {
         "UPDATE route_blocks SET lines = zeroblob(100)",
         "UPDATE route_blocks SET checksum = 0 WHERE number = 1",
         "UPDATE route_blocks SET route = 'other' WHERE number = 1"}) {
-    const auto path = folder / ("m" + std::to_string(number++) + ".panonav");
+    std::filesystem::remove(path);
     {
       MemoryFile file = MemoryFile::create(path, small_header());
       file.append_route("route", random_route(600, 1, 16));
     }
-    sqlite3* database = nullptr;
-    ASSERT_EQ(sqlite3_open(path.c_str(), &database), SQLITE_OK);
-    EXPECT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK) << sql;
-    sqlite3_close(database);
+    run_sql(path, sql);
     MemoryFile file = MemoryFile::open(path, Access::read_write);
     EXPECT_FALSE(file.verify().empty()) << sql;
     const std::string name = sql.find("name = 'other'") == std::string::npos ? "route" : "other";
     EXPECT_THROW((void)file.route(name), FileError) << sql;
     EXPECT_EQ(file.load().size(), 0U);  // the views are not harmed
   }
-  EXPECT_EQ(number, 15);
 }
 
 // Bytes of the file damaged at random: one clear error or the very same route.
-TEST(RouteTables, DamagedBytes) {
-  const TemporaryFolder folder;
-  const auto path = folder / "m.panonav";
+TEST_F(RouteTables, DamagedBytes) {
   const RoutePanorama route = random_route(1200, 1, 64);
   {
     MemoryFile file = MemoryFile::create(path, small_header());
     file.append_route("route", route);
   }
-  const auto size = std::filesystem::file_size(path);
+  const std::string good = bytes_of(path);
   Random random(8);
   int refused = 0;
   for (int round = 0; round < 100; ++round) {
-    const auto copy = folder / "copy.panonav";
-    std::filesystem::copy_file(path, copy, std::filesystem::copy_options::overwrite_existing);
-    std::FILE* raw = std::fopen(copy.c_str(), "r+b");
-    ASSERT_NE(raw, nullptr);
-    std::fseek(raw, static_cast<long>(random.index(size)), SEEK_SET);
-    for (int i = 0; i < 16; ++i) std::fputc(static_cast<int>(random.index(256)), raw);
-    std::fclose(raw);
+    const auto copy = folder.write("copy.panonav", damaged_bytes(good, random, round));
     try {
       const MemoryFile file = MemoryFile::open(copy, Access::read_only);
       const auto read = file.route("route");
@@ -276,4 +250,4 @@ TEST(RouteTables, DamagedBytes) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

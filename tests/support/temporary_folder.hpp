@@ -1,14 +1,18 @@
 #pragma once
 
+#include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 
-namespace panonav::test {
+#include "support/text.hpp"
+
+namespace panonav::testing {
 
 /// A new folder that is removed with all that is in it.
 class TemporaryFolder {
@@ -40,15 +44,15 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-/// The message of the ErrorType that `call` throws; "no error" when it throws none.
-template <class ErrorType, class Call>
-std::string message_of(Call&& call) {
-  try {
-    call();
-  } catch (const ErrorType& error) {
-    return error.what();
-  }
-  return "no error";
+inline std::string bytes_of(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
-}  // namespace panonav::test
+/// A folder for each test.
+class InTemporaryFolder : public ::testing::Test {
+ protected:
+  TemporaryFolder folder;
+};
+
+}  // namespace panonav::testing

@@ -9,7 +9,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/navigation/navigation_graph.hpp"
 
-namespace panonav::test {
+namespace panonav::testing {
 
 /// Views 10, 13, 16, ..: ids are not places.
 inline std::vector<ViewId> numbered_views(std::size_t count) {
@@ -73,4 +73,4 @@ inline std::vector<double> all_ways(const NavigationGraph& graph,
   return ways;
 }
 
-}  // namespace panonav::test
+}  // namespace panonav::testing

@@ -11,7 +11,7 @@
 #include "panonav/core/image.hpp"
 #include "panonav/core/random.hpp"
 
-namespace panonav::testing_support {
+namespace panonav::testing {
 
 enum class Surroundings { dark, plain, lamps, textured };
 
@@ -197,4 +197,4 @@ inline Image paint_without_mirror(Plain kind, ImageSize size, std::uint64_t seed
   return image;
 }
 
-}  // namespace panonav::testing_support
+}  // namespace panonav::testing

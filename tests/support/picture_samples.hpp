@@ -13,7 +13,7 @@
 #include "panonav/core/image.hpp"
 #include "panonav/core/random.hpp"
 
-namespace panonav::test {
+namespace panonav::testing {
 
 inline Image random_image(Random& random, int width, int height, int channels) {
   Image image(width, height, channels);
@@ -89,4 +89,4 @@ inline std::vector<std::uint8_t> make_jpeg(const Image& image, int quality, bool
   return bytes;
 }
 
-}  // namespace panonav::test
+}  // namespace panonav::testing

@@ -7,7 +7,7 @@
 
 #include "panonav/camera/camera.hpp"
 
-namespace panonav::testing_cameras {
+namespace panonav::testing {
 
 /// 640 x 480, the mirror off the middle, so that nothing is symmetric by chance. Looks from -60 to
 /// +30 degrees.
@@ -44,4 +44,4 @@ inline Image render(const Camera& camera, const std::function<double(double, dou
   return image;
 }
 
-}  // namespace panonav::testing_cameras
+}  // namespace panonav::testing

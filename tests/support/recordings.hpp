@@ -2,7 +2,6 @@
 
 // The real recordings, read straight from their pictures and tables.
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -13,6 +12,7 @@
 #include "panonav/io/image_file.hpp"
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav/panorama/picture.hpp"
+#include "support/skips.hpp"
 
 namespace panonav::testing {
 
@@ -21,15 +21,6 @@ struct Recording {
   std::vector<Panorama> views;
   std::vector<std::optional<ReferencePose>> poses;
 };
-
-/// Where the recordings lie; empty when PANONAV_DATA is not set or the folder is not there.
-inline std::optional<std::filesystem::path> recording_folder(const std::string& name) {
-  const char* const root = std::getenv("PANONAV_DATA");
-  if (root == nullptr) return std::nullopt;
-  const auto folder = std::filesystem::path(root) / name;
-  if (!std::filesystem::is_directory(folder)) return std::nullopt;
-  return folder;
-}
 
 inline Recording read_recording(const std::filesystem::path& folder, const std::string& table,
                                 const PictureLayout& layout, PanoramaShape shape = {}) {
@@ -60,20 +51,20 @@ inline Recording read_recording(const std::filesystem::path& folder, const std::
 
 /// `shape` 0 x 0 keeps the size of the pictures.
 inline std::optional<Recording> gantry_plants(PanoramaShape shape = {}) {
-  const auto folder = recording_folder("gantry_plants");
+  const auto folder = real_data("gantry_plants");
   if (!folder) return std::nullopt;
   return read_recording(*folder, "poses.csv", {.direction = ColumnDirection::clockwise}, shape);
 }
 
 inline std::optional<Recording> sussex_route(PanoramaShape shape = {}) {
-  const auto folder = recording_folder("sussex_route");
+  const auto folder = real_data("sussex_route");
   if (!folder) return std::nullopt;
   return read_recording(*folder, "poses.csv", {.direction = ColumnDirection::counter_clockwise},
                         shape);
 }
 
 inline std::optional<Recording> indoor_walk(PanoramaShape shape) {
-  const auto folder = recording_folder("indoor_walk_360");
+  const auto folder = real_data("indoor_walk_360");
   if (!folder) return std::nullopt;
   return read_recording(*folder, "images.csv",
                         {.direction = ColumnDirection::clockwise,

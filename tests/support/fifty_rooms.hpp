@@ -13,7 +13,7 @@
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav/navigation/navigation_graph.hpp"
 
-namespace panonav::test {
+namespace panonav::testing {
 
 inline constexpr int rooms_across = 10;
 inline constexpr int rooms_along = 5;
@@ -74,4 +74,4 @@ inline VisualMemory memory_of(std::size_t views) {
   return memory;
 }
 
-}  // namespace panonav::test
+}  // namespace panonav::testing

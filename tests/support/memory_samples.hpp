@@ -1,12 +1,17 @@
 #pragma once
 
+#include <gtest/gtest.h>
+#include <sqlite3.h>
+
+#include <algorithm>
 #include <string>
 #include <vector>
 
 #include "panonav/core/random.hpp"
 #include "panonav/storage/memory_file.hpp"
+#include "support/temporary_folder.hpp"
 
-namespace panonav::test {
+namespace panonav::testing {
 
 inline PackedSignature random_packed(Random& random, SignatureShape shape) {
   PackedSignature packed{shape, std::vector<std::uint8_t>(shape.size()),
@@ -61,6 +66,37 @@ inline MemoryHeader mirror_header() {
   return header;
 }
 
+/// A folder and the path of a memory file in it for each test.
+class MemoryFileTest : public InTemporaryFolder {
+ protected:
+  std::filesystem::path path = folder / "m.panonav";
+};
+
+/// Changes a file behind the library's back.
+inline void run_sql(const std::filesystem::path& path, const std::string& sql) {
+  sqlite3* database = nullptr;
+  ASSERT_EQ(sqlite3_open(path.c_str(), &database), SQLITE_OK);
+  EXPECT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK)
+      << sqlite3_errmsg(database);
+  sqlite3_close(database);
+}
+
+/// The bytes of a file after an accident: by `trial` one bit, four bytes, or a stretch of zeros.
+inline std::string damaged_bytes(std::string bytes, Random& random, int trial) {
+  const std::size_t at = random.index(bytes.size());
+  if (trial % 3 == 0) {
+    bytes[at] = static_cast<char>(bytes[at] ^ (1 << random.index(8)));
+  } else if (trial % 3 == 1) {
+    for (int i = 0; i < 4; ++i) {
+      bytes[random.index(bytes.size())] = static_cast<char>(random.index(256));
+    }
+  } else {
+    const std::size_t count = std::min<std::size_t>(512, bytes.size() - at);
+    std::fill_n(bytes.begin() + static_cast<std::ptrdiff_t>(at), count, '\0');
+  }
+  return bytes;
+}
+
 /// What two memories hold is the same.
 inline bool same_content(const VisualMemory& a, const VisualMemory& b) {
   if (a.shape() != b.shape() || a.full_scale() != b.full_scale() ||
@@ -80,4 +116,4 @@ inline bool same_content(const VisualMemory& a, const VisualMemory& b) {
   return true;
 }
 
-}  // namespace panonav::test
+}  // namespace panonav::testing

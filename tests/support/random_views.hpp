@@ -6,7 +6,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/signature/fourier_signature.hpp"
 
-namespace panonav::testing_views {
+namespace panonav::testing {
 
 /// Magnitudes 0.1 .. 1 and phases all over the circle; k = 0 is real and positive, as for a view.
 inline FourierSignature random_signature(Random& random, SignatureShape shape) {
@@ -29,4 +29,4 @@ inline Panorama random_panorama(Random& random, int rows, int columns,
   return panorama;
 }
 
-}  // namespace panonav::testing_views
+}  // namespace panonav::testing

@@ -10,7 +10,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/memory/visual_memory.hpp"
 
-namespace panonav::testing_memory {
+namespace panonav::testing {
 
 /// A memory as plain as can be: what `VisualMemory` must agree with.
 struct Oracle {
@@ -125,4 +125,4 @@ inline ReferenceInfo named(std::size_t number) {
   return {"view " + std::to_string(number), {}, {}};
 }
 
-}  // namespace panonav::testing_memory
+}  // namespace panonav::testing
