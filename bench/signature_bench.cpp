@@ -138,13 +138,6 @@ void compass_packed(benchmark::State& state) {
 }
 BENCHMARK(compass_packed);
 
-void compass_sequential(benchmark::State& state) {
-  const FourierSignature query = compute_signature(random_panorama(1), components);
-  const FourierSignature reference = compute_signature(random_panorama(2), components);
-  for (auto _ : state) benchmark::DoNotOptimize(sequential_compass(query, reference));
-}
-BENCHMARK(compass_sequential);
-
 #ifdef PANONAV_HAS_OPENCV
 /// remap with linear interpolation, no anti-aliasing, to 80 x 512; conversion to float; dft of
 /// every row. What a signature needs beyond that (magnitudes, phases, packing) is not counted.
