@@ -46,14 +46,13 @@ double mean_of(std::span<const float> values) {
 }  // namespace
 
 void visit_options(ExpectedImageOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "reach",
-                 .help = "how far away positions are tried, in units of the assumed distance",
-                 .low = 0.01,
-                 .high = 0.99},
-                options.reach);
-  visitor.visit(
-      {.name = "positions", .help = "positions that are tried at most", .low = 5, .high = 10000},
-      options.positions);
+  using T = ExpectedImageOptions;
+  constexpr OptionTable table{
+      option<&T::reach>("how far away positions are tried, in units of the assumed distance", 0.01,
+                        0.99),
+      option<&T::positions>("positions that are tried at most", 5, 10000),
+  };
+  table.visit(options, visitor);
 }
 
 ExpectedImageHoming::ExpectedImageHoming(int columns, const ExpectedImageOptions& options)

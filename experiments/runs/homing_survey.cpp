@@ -75,24 +75,15 @@ void check_poses(std::span<const Pose2> poses, const char* what) {
 }  // namespace
 
 void visit_options(HomingSurveyOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "typical_distance_m",
-                 .help = "distance of things: what a home vector of length 1 is worth",
-                 .low = 1e-3,
-                 .high = 1e3},
-                options.typical_distance_m);
-  visitor.visit({.name = "longest_step_m",
-                 .help = "the robot takes a new view after this way at most",
-                 .low = 1e-3,
-                 .high = 1e3},
-                options.longest_step_m);
-  visitor.visit({.name = "obstacle_m",
-                 .help = "a step that ends farther from all places stops the run",
-                 .low = 1e-3,
-                 .high = 1e3},
-                options.obstacle_m);
-  visitor.visit(
-      {.name = "most_steps", .help = "steps after which a run stops", .low = 1, .high = 1e6},
-      options.most_steps);
+  using T = HomingSurveyOptions;
+  constexpr OptionTable table{
+      option<&T::typical_distance_m>("distance of things: what a home vector of length 1 is worth",
+                                     1e-3, 1e3),
+      option<&T::longest_step_m>("the robot takes a new view after this way at most", 1e-3, 1e3),
+      option<&T::obstacle_m>("a step that ends farther from all places stops the run", 1e-3, 1e3),
+      option<&T::most_steps>("steps after which a run stops", 1, 1e6),
+  };
+  table.visit(options, visitor);
 }
 
 HomingSurvey survey_homing(std::span<const Pose2> goals, std::span<const Pose2> places,

@@ -23,12 +23,13 @@ struct SampleOptions {
 };
 
 void visit_options(SampleOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "views", .help = "how many", .low = 1, .high = 9}, options.views);
-  visitor.visit({.name = "radius_m", .help = "how far", .low = 0, .low_open = true},
-                options.radius_m);
-  visitor.visit({.name = "tolerance", .help = "any number"}, options.tolerance);
-  visitor.visit({.name = "packed", .help = "or not"}, options.packed);
-  visitor.visit({.name = "norm", .help = "which"}, norms, options.norm);
+  using T = SampleOptions;
+  constexpr OptionTable table{
+      option<&T::views>("how many", 1, 9), option<&T::radius_m>("how far", above(0)),
+      option<&T::tolerance>("any number"), option<&T::packed>("or not"),
+      option<&T::norm>("which", norms),
+  };
+  table.visit(options, visitor);
 }
 
 std::string fault_of(const SampleOptions& options) {

@@ -19,11 +19,14 @@ struct SampleOptions {
 };
 
 void visit_options(SampleOptions& options, OptionVisitor& visitor) {
-  static constexpr std::array<std::string_view, 2> kinds{"plain", "fancy"};
-  visitor.visit({.name = "count", .help = "", .low = 1, .high = 10}, options.count);
-  visitor.visit({.name = "radius_m", .help = "", .low = 0, .low_open = true}, options.radius_m);
-  visitor.visit({.name = "fast", .help = ""}, options.fast);
-  visitor.visit({.name = "kind", .help = ""}, kinds, options.kind);
+  using T = SampleOptions;
+  constexpr OptionTable table{
+      option<&T::count>("", 1, 10),
+      option<&T::radius_m>("", above(0)),
+      option<&T::fast>(""),
+      choice<&T::kind>("", "plain", "fancy"),
+  };
+  table.visit(options, visitor);
 }
 
 namespace {

@@ -26,8 +26,15 @@ struct Arguments::Implementation {
     std::function<void()> check;
     OptionEntries entries;
   };
+  struct Former {
+    std::string flag;
+    std::string name;  ///< of the value; of the flag where `value` is false
+    std::string now;
+    bool value = false;
+  };
   CLI::App& app;
-  std::deque<Section> sections;  // a deque: the parser keeps references into it
+  std::deque<Section> sections = {};  // a deque: the parser keeps references into it
+  std::vector<Former> former = {};
 };
 
 namespace {
@@ -42,8 +49,13 @@ std::string flag_of(std::string_view name) {
 /// Adds a flag for each member that it visits, and remembers what is typed as text.
 class FlagDeclarer final : public OptionVisitor {
  public:
-  FlagDeclarer(CLI::App& app, std::string group, std::string prefix, OptionEntries& entries)
-      : app_(app), group_(std::move(group)), prefix_(std::move(prefix)), entries_(entries) {}
+  FlagDeclarer(Arguments& arguments, CLI::App& app, std::string group, std::string prefix,
+               OptionEntries& entries)
+      : arguments_(arguments),
+        app_(app),
+        group_(std::move(group)),
+        prefix_(std::move(prefix)),
+        entries_(entries) {}
 
   void visit(const OptionInfo& info, int& value) override {
     declare(info, "INT", std::to_string(value), range_text(info));
@@ -59,6 +71,11 @@ class FlagDeclarer final : public OptionVisitor {
     std::string all;
     for (const auto choice : choices) all += (all.empty() ? "" : ", ") + std::string(choice);
     declare(info, "NAME", std::string(choices[static_cast<std::size_t>(value)]), all);
+    for (std::size_t i = 0; i < info.former_choices.size(); ++i) {
+      if (info.former_choices[i].empty()) continue;
+      arguments_.formerly(flag_of(prefix_ + std::string(info.name)),
+                          std::string(info.former_choices[i]), std::string(choices[i]));
+    }
   }
 
  private:
@@ -68,10 +85,12 @@ class FlagDeclarer final : public OptionVisitor {
     std::string help(info.help);
     help += " (default " + initial;
     if (range != "any finite number") help += "; " + range;
-    app_.add_option(flag_of(prefix_ + std::string(info.name)), text, help + ")")
-        ->type_name(type)
-        ->group(group_);
+    const std::string flag = flag_of(prefix_ + std::string(info.name));
+    app_.add_option(flag, text, help + ")")->type_name(type)->group(group_);
+    if (info.former.empty()) return;
+    arguments_.formerly(flag_of(prefix_ + std::string(info.former)), flag);
   }
+  Arguments& arguments_;
   CLI::App& app_;
   std::string group_;
   std::string prefix_;
@@ -153,7 +172,7 @@ std::string one_line(const CLI::ParseError& error, const CLI::App& app) {
 }  // namespace
 
 Arguments::Arguments(Parser& parser)
-    : implementation_(std::make_unique<Implementation>(Implementation{parser.app, {}})) {}
+    : implementation_(std::make_unique<Implementation>(Implementation{parser.app})) {}
 Arguments::~Arguments() = default;
 
 void Arguments::positional(const std::string& name, std::string& value, const std::string& help) {
@@ -271,11 +290,56 @@ void Arguments::flag(const std::string& flag, bool& value, const std::string& he
   implementation_->app.add_flag(flag, value, help);
 }
 
+void Arguments::formerly(const std::string& former, const std::string& now) {
+  implementation_->former.push_back({now, former, now});
+}
+
+void Arguments::formerly(const std::string& flag, const std::string& former,
+                         const std::string& now) {
+  implementation_->former.push_back({flag, former, now, true});
+}
+
+std::vector<std::string> Arguments::renamed(std::vector<std::string> typed) const {
+  /// Whether the word is this flag, alone or with its value behind "=".
+  const auto is = [](const std::string& word, const std::string& flag) {
+    return word.starts_with(flag) && (word.size() == flag.size() || word[flag.size()] == '=');
+  };
+  for (const auto& former : implementation_->former) {
+    bool now_typed = false;
+    bool former_typed = false;
+    for (std::size_t i = 0; i < typed.size() && typed[i] != "--"; ++i) {
+      std::string& word = typed[i];
+      if (former.value) {
+        if (word == former.flag + "=" + former.name) {
+          word = former.flag + "=" + former.now;
+        } else if (i > 0 && typed[i - 1] == former.flag && word == former.name) {
+          word = former.now;
+        } else {
+          continue;
+        }
+      } else {
+        now_typed = now_typed || is(word, former.now);
+        if (!is(word, former.name)) continue;
+        word.replace(0, former.name.size(), former.now);
+      }
+      former_typed = true;
+    }
+    if (!former_typed) continue;
+    if (now_typed) {
+      throw UsageError(former.name + " is the former name of " + former.now +
+                       "; allowed: one of the two");
+    }
+    std::cerr << (former.value ? former.flag + " " : "") << former.name << " is now " << former.now
+              << '\n';
+  }
+  return typed;
+}
+
 void Arguments::add_section(const std::string& section, const std::string& prefix, Visit visit,
                             std::function<void()> check) {
   auto& added = implementation_->sections.emplace_back(
       Implementation::Section{section, std::move(visit), std::move(check), {}});
-  FlagDeclarer declarer(implementation_->app, "Options of [" + section + "]",
+  FlagDeclarer declarer(*this, implementation_->app, "Options of [" + section + "]",
                         prefix.empty() ? "" : prefix + "_", added.entries);
   added.visit(declarer);
 }
@@ -296,6 +360,8 @@ void Arguments::resolve(const std::optional<std::string>& config,
     section.visit(applier);
     section.check();
   }
+  if (!file) return;
+  for (const auto& warning : file->warnings()) std::cerr << warning << '\n';
 }
 
 std::vector<std::string_view> Arguments::sections() const {
@@ -388,8 +454,15 @@ std::optional<ParsedCommand> parse(std::span<const Verb> verbs, int argc, const 
     sub->footer(footer + "Example:\n" + std::string(verb.example));
   }
 
+  std::vector<std::string> typed(argv, argv + argc);
+  const auto asked = std::ranges::find(verbs, verb_in(verbs, argc, argv), &Verb::name);
+  if (asked != verbs.end()) {
+    typed = declared[static_cast<std::size_t>(asked - verbs.begin())].arguments->renamed(typed);
+  }
+  std::vector<const char*> words;
+  for (const auto& word : typed) words.push_back(word.c_str());
   try {
-    app.parse(argc, argv);
+    app.parse(argc, words.data());
   } catch (const CLI::Success& success) {  // --help, --version
     app.exit(success, std::cout, std::cout);
     return std::nullopt;

@@ -64,14 +64,23 @@ class Arguments {
 
   /// One flag for each member that visit_options shows: `cell_size_m` becomes `--cell-size-m`, with
   /// a prefix "area" `--area-cell-size-m`. The same members are read from the table [`section`] of
-  /// a
-  /// --config file; flags win over the file, the file over defaults.
+  /// a --config file; flags win over the file, the file over defaults. Former names of members and
+  /// of their choices are taken, too.
   template <class Options>
   void options(const std::string& section, Options& values, const std::string& prefix = "") {
     add_section(
         section, prefix, [&values](OptionVisitor& visitor) { visit_options(values, visitor); },
         [&values] { validate(values); });
   }
+
+  /// `former` is what the flag `now` was called in the last version: `--help` does not show it, but
+  /// it is taken, with a warning.
+  void formerly(const std::string& former, const std::string& now);
+  /// The same of one value of a flag.
+  void formerly(const std::string& flag, const std::string& former, const std::string& now);
+  /// What was typed, with new names in the place of former ones; warns of them on standard error.
+  /// Throws UsageError when a flag is there under both names.
+  [[nodiscard]] std::vector<std::string> renamed(std::vector<std::string> typed) const;
 
   /// Whether the user gave this member by flag or file; an empty name: any member of the section.
   /// Meaningful once the verb runs.

@@ -1,4 +1,3 @@
-#include <array>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -32,43 +31,22 @@ struct MirrorOptions {
 };
 
 void visit_options(MirrorOptions& options, OptionVisitor& visitor) {
-  static constexpr std::array<std::string_view, 3> profiles{"equiangular", "hyperboloidal",
-                                                            "unified"};
-  static constexpr std::array<std::string_view, 2> directions{"clockwise", "counter-clockwise"};
-  visitor.visit({.name = "profile", .help = "Shape of the mirror"}, profiles, options.profile);
-  visitor.visit({.name = "inner_elevation_deg",
-                 .help = "Elevation seen at the inner radius (equiangular)",
-                 .low = -90,
-                 .high = 90},
-                options.inner_elevation_deg);
-  visitor.visit({.name = "rim_elevation_deg",
-                 .help = "Elevation seen at the mirror's rim",
-                 .low = -90,
-                 .high = 90},
-                options.rim_elevation_deg);
-  visitor.visit({.name = "mirror_a_mm",
-                 .help = "a of the hyperboloid [Y03 eq. 1]",
-                 .low = 0,
-                 .low_open = true},
-                options.mirror_a_mm);
-  visitor.visit({.name = "mirror_b_mm",
-                 .help = "b of the hyperboloid [Y03 eq. 1]",
-                 .low = 0,
-                 .low_open = true},
-                options.mirror_b_mm);
-  visitor.visit(
-      {.name = "xi", .help = "Mirror parameter of the unified model", .low = 0, .high = 10},
-      options.xi);
-  visitor.visit({.name = "direction",
-                 .help = "How a turn to the left runs in the picture: clockwise where the camera "
-                         "looks up into the "
-                         "mirror, counter-clockwise where it looks down"},
-                directions, options.direction);
-  visitor.visit({.name = "forward_angle_deg",
-                 .help = "Where the robot's forward direction lies in the picture: 0 right, 90 up",
-                 .low = -360,
-                 .high = 360},
-                options.forward_angle_deg);
+  using T = MirrorOptions;
+  constexpr OptionTable table{
+      choice<&T::profile>("Shape of the mirror", "equiangular", "hyperboloidal", "unified"),
+      option<&T::inner_elevation_deg>("Elevation seen at the inner radius (equiangular)", -90, 90),
+      option<&T::rim_elevation_deg>("Elevation seen at the mirror's rim", -90, 90),
+      option<&T::mirror_a_mm>("a of the hyperboloid [Y03 eq. 1]", above(0)),
+      option<&T::mirror_b_mm>("b of the hyperboloid [Y03 eq. 1]", above(0)),
+      option<&T::xi>("Mirror parameter of the unified model", 0, 10),
+      choice<&T::direction>(
+          "How a turn to the left runs in the picture: clockwise where the camera looks up into "
+          "the mirror, counter-clockwise where it looks down",
+          "clockwise", "counter-clockwise"),
+      option<&T::forward_angle_deg>(
+          "Where the robot's forward direction lies in the picture: 0 right, 90 up", -360, 360),
+  };
+  table.visit(options, visitor);
 }
 
 struct CalibrateArguments {

@@ -1,7 +1,6 @@
 #include "verbs/simulated_recording.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 
 #include "panonav/core/error.hpp"
@@ -85,40 +84,28 @@ void discard(const Dataset& dataset, bool with_folder) {
 }  // namespace
 
 void visit_options(SceneOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "seed", .help = "of poses, noise, tilt and odometry", .low = 0},
-                options.seed);
-  visitor.visit(
-      {.name = "scene_seed", .help = "varies textures and furniture of built-in scenes", .low = 0},
-      options.scene_seed);
-  visitor.visit({.name = "moved_objects",
-                 .help = "share of the movable objects that stand elsewhere",
-                 .low = 0,
-                 .high = 1},
-                options.moved_objects);
-  visitor.visit({.name = "moved_seed", .help = "which objects moved, and where to", .low = 0},
-                options.moved_seed);
-  visitor.visit({.name = "light",
-                 .help = "all lamps and the sky times this",
-                 .low = 0,
-                 .high = 100,
-                 .low_open = true},
-                options.light);
+  using T = SceneOptions;
+  constexpr OptionTable table{
+      option<&T::seed>("of poses, noise, tilt and odometry", 0),
+      option<&T::scene_seed>("varies textures and furniture of built-in scenes", 0),
+      option<&T::moved_objects>("share of the movable objects that stand elsewhere", 0, 1),
+      option<&T::moved_seed>("which objects moved, and where to", 0),
+      option<&T::light>("all lamps and the sky times this", above(0), 100),
+  };
+  table.visit(options, visitor);
 }
 
 void visit_options(SimulationOptions& options, OptionVisitor& visitor) {
-  static constexpr std::array<std::string_view, 2> kinds{"mirror", "panorama"};
-  visitor.visit({.name = "kind", .help = "what the camera writes"}, kinds, options.kind);
-  visitor.visit({.name = "rows", .help = "rows of panoramas", .low = 1, .high = 4096},
-                options.rows);
-  visitor.visit({.name = "columns", .help = "columns of panoramas", .low = 4, .high = 16384},
-                options.columns);
-  visitor.visit(
-      {.name = "elevation_low_deg", .help = "lower edge of panoramas", .low = -90, .high = 90},
-      options.elevation_low_deg);
-  visitor.visit(
-      {.name = "elevation_high_deg", .help = "upper edge of panoramas", .low = -90, .high = 90},
-      options.elevation_high_deg);
-  visit_options(options.scene, visitor);
+  using T = SimulationOptions;
+  constexpr OptionTable table{
+      choice<&T::kind>("what the camera writes", "mirror", "panorama"),
+      option<&T::rows>("rows of panoramas", 1, 4096),
+      option<&T::columns>("columns of panoramas", 4, 16384),
+      option<&T::elevation_low_deg>("lower edge of panoramas", -90, 90),
+      option<&T::elevation_high_deg>("upper edge of panoramas", -90, 90),
+      options_of<&T::scene>(),
+  };
+  table.visit(options, visitor);
 }
 
 void declare_simulation(Arguments& arguments, SimulationArguments& wanted) {

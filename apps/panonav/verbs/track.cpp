@@ -32,16 +32,12 @@ struct StartOptions {
 };
 
 void visit_options(StartOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "deviation_m",
-                 .help = "standard deviation of x and of y of the start pose",
-                 .low = 0.0,
-                 .high = 1e6},
-                options.deviation_m);
-  visitor.visit({.name = "heading_deviation_deg",
-                 .help = "standard deviation of its heading",
-                 .low = 0.0,
-                 .high = 360.0},
-                options.heading_deviation_deg);
+  using T = StartOptions;
+  constexpr OptionTable table{
+      option<&T::deviation_m>("standard deviation of x and of y of the start pose", 0, 1e6),
+      option<&T::heading_deviation_deg>("standard deviation of its heading", 0, 360),
+  };
+  table.visit(options, visitor);
 }
 
 /// Of positions that are taken for metres; what lies farther is a mistake.

@@ -277,30 +277,18 @@ std::optional<Search> search(const Evidence& seen, std::span<const SmoothPlanes>
 }  // namespace
 
 void visit_options(MirrorSearchOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "smallest_rim",
-                 .help = "smallest radius of the mirror's rim, in shorter sides of the image",
-                 .low = 0.0,
-                 .high = 2.0,
-                 .low_open = true},
-                options.smallest_rim);
-  visitor.visit({.name = "largest_rim",
-                 .help = "largest radius of the mirror's rim, in longer sides of the image",
-                 .low = 0.0,
-                 .high = 2.0,
-                 .low_open = true},
-                options.largest_rim);
-  visitor.visit({.name = "visible_part",
-                 .help = "least part of the rim that lies inside the frame",
-                 .low = 0.25,
-                 .high = 1.0},
-                options.visible_part);
-  visitor.visit(
-      {.name = "least_quality",
-       .help = "least quality of a rim, from 0 (any circle) to 1 (a sharp edge all around)",
-       .low = 0.0,
-       .high = 1.0,
-       .low_open = true},
-      options.least_quality);
+  using T = MirrorSearchOptions;
+  constexpr OptionTable table{
+      option<&T::smallest_rim>("smallest radius of the mirror's rim, in shorter sides of the image",
+                               above(0), 2),
+      option<&T::largest_rim>("largest radius of the mirror's rim, in longer sides of the image",
+                              above(0), 2),
+      option<&T::visible_part>("least part of the rim that lies inside the frame", 0.25, 1),
+      option<&T::least_quality>(
+          "least quality of a rim, from 0 (any circle) to 1 (a sharp edge all around)", above(0),
+          1),
+  };
+  table.visit(options, visitor);
 }
 
 std::optional<MirrorCircle> find_mirror(std::span<const ImageView> images,

@@ -19,31 +19,19 @@ double length(const Pose2& step) {
 }  // namespace
 
 void visit_options(ChainFollowerOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "switch_length",
-                 .help = "the next snapshot is homed to where the vector is shorter, in units of R",
-                 .low = 0,
-                 .high = 1},
-                options.switch_length);
-  visitor.visit({.name = "mistrust_rad",
-                 .help = "vectors farther from what odometry expects are not followed",
-                 .low = 0,
-                 .high = std::numbers::pi},
-                options.mistrust_rad);
-  visitor.visit({.name = "mistrust_heading_rad",
-                 .help = "headings farther from what odometry expects are not believed",
-                 .low = 0,
-                 .high = std::numbers::pi},
-                options.mistrust_heading_rad);
-  visitor.visit({.name = "near_m",
-                 .help = "nearer to the expected place vectors are always followed",
-                 .low = 0,
-                 .high = 1000},
-                options.near_m);
-  visitor.visit({.name = "longest_unseen_m",
-                 .help = "the robot is lost after so long a way without reaching a snapshot",
-                 .low = 0,
-                 .high = 1e6},
-                options.longest_unseen_m);
+  using T = ChainFollowerOptions;
+  constexpr OptionTable table{
+      option<&T::switch_length>(
+          "the next snapshot is homed to where the vector is shorter, in units of R", 0, 1),
+      option<&T::mistrust_rad>("vectors farther from what odometry expects are not followed", 0,
+                               std::numbers::pi),
+      option<&T::mistrust_heading_rad>(
+          "headings farther from what odometry expects are not believed", 0, std::numbers::pi),
+      option<&T::near_m>("nearer to the expected place vectors are always followed", 0, 1000),
+      option<&T::longest_unseen_m>(
+          "the robot is lost after so long a way without reaching a snapshot", 0, 1e6),
+  };
+  table.visit(options, visitor);
 }
 
 ChainFollower::ChainFollower(SnapshotChain chain, ChainDirection direction,

@@ -10,40 +10,18 @@
 namespace panonav {
 
 void visit_options(ChainRecorderOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "direction_tolerance_rad",
-                 .help = "vectors between snapshots may be off by this much",
-                 .low = 0,
-                 .high = std::numbers::pi / 2,
-                 .low_open = true},
-                options.direction_tolerance_rad);
-  visitor.visit({.name = "margin",
-                 .help = "a snapshot is taken at this share of the way on which homing works",
-                 .low = 0,
-                 .high = 1,
-                 .low_open = true},
-                options.margin);
-  visitor.visit({.name = "shortest_spacing_m",
-                 .help = "least way between two snapshots",
-                 .low = 0,
-                 .high = 1000,
-                 .low_open = true},
-                options.shortest_spacing_m);
-  visitor.visit({.name = "longest_spacing_m",
-                 .help = "longest way between two snapshots",
-                 .low = 0,
-                 .high = 1000,
-                 .low_open = true},
-                options.longest_spacing_m);
-  visitor.visit({.name = "near_m",
-                 .help = "nearer views are not asked for the direction",
-                 .low = 0,
-                 .high = 1000},
-                options.near_m);
-  visitor.visit({.name = "view_spacing_m",
-                 .help = "way between the views that are compared",
-                 .low = 0.001,
-                 .high = 1000},
-                options.view_spacing_m);
+  using T = ChainRecorderOptions;
+  constexpr OptionTable table{
+      option<&T::direction_tolerance_rad>("vectors between snapshots may be off by this much",
+                                          above(0), std::numbers::pi / 2),
+      option<&T::margin>("a snapshot is taken at this share of the way on which homing works",
+                         above(0), 1),
+      option<&T::shortest_spacing_m>("least way between two snapshots", above(0), 1000),
+      option<&T::longest_spacing_m>("longest way between two snapshots", above(0), 1000),
+      option<&T::near_m>("nearer views are not asked for the direction", 0, 1000),
+      option<&T::view_spacing_m>("way between the views that are compared", 0.001, 1000),
+  };
+  table.visit(options, visitor);
 }
 
 ChainRecorder::ChainRecorder(const ChainRecorderOptions& options,

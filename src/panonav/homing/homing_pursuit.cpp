@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <string_view>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -21,56 +20,23 @@ constexpr double gain_agreeing = 1.25;
 }  // namespace
 
 void visit_options(HomingPursuitOptions& options, OptionVisitor& visitor) {
-  constexpr std::array<std::string_view, 3> strategies{"steady", "coarse_to_fine", "recovering"};
-  int strategy = static_cast<int>(options.strategy);
-  visitor.visit({.name = "strategy", .help = "which frequencies count at which stage"}, strategies,
-                strategy);
-  options.strategy = static_cast<PursuitStrategy>(strategy);
-  visitor.visit(
-      {.name = "coarse", .help = "highest frequency of the first stage", .low = 1, .high = 62},
-      options.coarse);
-  visitor.visit(
-      {.name = "middle", .help = "highest frequency of the second stage", .low = 1, .high = 62},
-      options.middle);
-  visitor.visit(
-      {.name = "fine", .help = "highest frequency of the third stage", .low = 1, .high = 62},
-      options.fine);
-  visitor.visit({.name = "typical_distance_m",
-                 .help = "typical distance of the things around",
-                 .low = 0,
-                 .high = 1000,
-                 .low_open = true},
-                options.typical_distance_m);
-  visitor.visit({.name = "longest_step_m",
-                 .help = "longest way between two views",
-                 .low = 0,
-                 .high = 100,
-                 .low_open = true},
-                options.longest_step_m);
-  visitor.visit({.name = "stop_length",
-                 .help = "homing stops when the vector is shorter, in units of R",
-                 .low = 0,
-                 .high = 1},
-                options.stop_length);
-  visitor.visit({.name = "shortest_step_m",
-                 .help = "homing stops when the step is shorter",
-                 .low = 0,
-                 .high = 100,
-                 .low_open = true},
-                options.shortest_step_m);
-  visitor.visit({.name = "patience",
-                 .help = "homing stops when the views became no more alike for so many steps",
-                 .low = 1,
-                 .high = 1e6},
-                options.patience);
-  visitor.visit(
-      {.name = "most_steps", .help = "steps after which a run ends", .low = 1, .high = 1e6},
-      options.most_steps);
-  visitor.visit({.name = "arrived_difference",
-                 .help = "largest difference of the views at home",
-                 .low = 0,
-                 .high = 2},
-                options.arrived_difference);
+  using T = HomingPursuitOptions;
+  constexpr OptionTable table{
+      choice<&T::strategy>("which frequencies count at which stage", "steady", "coarse_to_fine",
+                           "recovering"),
+      option<&T::coarse>("highest frequency of the first stage", 1, 62),
+      option<&T::middle>("highest frequency of the second stage", 1, 62),
+      option<&T::fine>("highest frequency of the third stage", 1, 62),
+      option<&T::typical_distance_m>("typical distance of the things around", above(0), 1000),
+      option<&T::longest_step_m>("longest way between two views", above(0), 100),
+      option<&T::stop_length>("homing stops when the vector is shorter, in units of R", 0, 1),
+      option<&T::shortest_step_m>("homing stops when the step is shorter", above(0), 100),
+      option<&T::patience>("homing stops when the views became no more alike for so many steps", 1,
+                           1e6),
+      option<&T::most_steps>("steps after which a run ends", 1, 1e6),
+      option<&T::arrived_difference>("largest difference of the views at home", 0, 2),
+  };
+  table.visit(options, visitor);
 }
 
 HomingPursuit::HomingPursuit(HomingView home, const HomingPursuitOptions& options,

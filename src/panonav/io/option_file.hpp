@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "panonav/core/options.hpp"
 #include "panonav/io/toml_fields.hpp"
@@ -12,7 +13,7 @@
 namespace panonav {
 
 /// A TOML file of options (docs/formats.md): one section for each options struct, in it one field
-/// for each member that the struct's `visit_options` shows.
+/// for each member that the struct's `visit_options` shows, or for its former name.
 class OptionFile {
  public:
   /// Throws FileError: missing, not TOML, a field outside all sections.
@@ -21,11 +22,12 @@ class OptionFile {
   /// Writes the fields of [section] into the members that `visit` shows; members without a field
   /// stay as they are, and so does everything when the file has no such section. Throws FileError
   /// with one line that names file, section, field, value and what is allowed: an unknown field, a
-  /// wrong type, a value out of range.
-  void apply(std::string_view section, const std::function<void(OptionVisitor&)>& visit) const;
+  /// wrong type, a value out of range, an option under its name and its former name. Where the file
+  /// says a former name, the file is as if it said the new one, and `warnings` says so.
+  void apply(std::string_view section, const std::function<void(OptionVisitor&)>& visit);
   template <class Options>
   requires requires(Options& options, OptionVisitor& visitor) { visit_options(options, visitor); }
-  void apply(std::string_view section, Options& options) const {
+  void apply(std::string_view section, Options& options) {
     apply(section, [&options](OptionVisitor& visitor) { visit_options(options, visitor); });
   }
 
@@ -34,10 +36,13 @@ class OptionFile {
   /// Throws FileError when the file has a section that is not among `known`: a misspelt one would
   /// otherwise do nothing.
   void require_sections(std::span<const std::string_view> known) const;
+  /// One line for each former name that was met in the sections applied.
+  [[nodiscard]] const std::vector<std::string>& warnings() const noexcept { return warnings_; }
 
  private:
   std::filesystem::path path_;
   TomlTable table_;
+  std::vector<std::string> warnings_;
 };
 
 }  // namespace panonav

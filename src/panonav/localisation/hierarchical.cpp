@@ -75,17 +75,14 @@ std::optional<Circle> ReferenceAreas::enclosing_circle(std::span<const Match> vi
 }
 
 void visit_options(WantedAccuracy& accuracy, OptionVisitor& visitor) {
-  visitor.visit(
-      {.name = "components", .help = "Fourier components compared at most, 0 for all", .low = 0},
-      accuracy.components);
-  visitor.visit({.name = "radius_m",
-                 .help = "stop as soon as the place is known to this radius, 0 for never",
-                 .low = 0},
-                accuracy.radius_m);
-  visitor.visit({.name = "tolerance",
-                 .help = "candidates are kept up to 1 + tolerance times the best dissimilarity",
-                 .low = 0},
-                accuracy.tolerance);
+  using T = WantedAccuracy;
+  constexpr OptionTable table{
+      option<&T::components>("Fourier components compared at most, 0 for all", 0),
+      option<&T::radius_m>("stop as soon as the place is known to this radius, 0 for never", 0),
+      option<&T::tolerance>("candidates are kept up to 1 + tolerance times the best dissimilarity",
+                            0),
+  };
+  table.visit(accuracy, visitor);
 }
 
 std::vector<LocalisationLevel> localise_hierarchically(const VisualMemory& memory,

@@ -165,9 +165,12 @@ bool add_margins(const VisualMemory& memory, std::span<const PosedView> posed, d
 }  // namespace
 
 void visit_options(WeightLearningOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "sampled_views", .help = "views used for learning", .low = least_anchors},
-                options.sampled_views);
-  visitor.visit({.name = "seed", .help = "seed of the draw of views", .low = 0}, options.seed);
+  using T = WeightLearningOptions;
+  constexpr OptionTable table{
+      option<&T::sampled_views>("views used for learning", least_anchors),
+      option<&T::seed>("seed of the draw of views", 0),
+  };
+  table.visit(options, visitor);
 }
 
 std::optional<ComponentWeights> learn_component_weights(const VisualMemory& memory,

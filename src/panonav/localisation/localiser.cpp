@@ -80,15 +80,15 @@ void put_nearest_first(const VisualMemory& memory, Point2 position,
 }  // namespace
 
 void visit_options(LocaliserOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "top", .help = "matches listed", .low = 1, .high = 1e6}, options.top);
-  visitor.visit({.name = "components", .help = "Fourier components compared, 0 for all", .low = 0},
-                options.components);
-  visitor.visit({.name = "compared_views",
-                 .help = "views compared column by column when the nearest ones do not explain "
-                         "the picture; 0 keeps the order of dissimilarity",
-                 .low = 0,
-                 .high = 1e6},
-                options.compared_views);
+  using T = LocaliserOptions;
+  constexpr OptionTable table{
+      option<&T::top>("matches listed", 1, 1e6),
+      option<&T::components>("Fourier components compared, 0 for all", 0),
+      option<&T::compared_views>("views compared column by column when the nearest ones do not "
+                                 "explain the picture; 0 keeps the order of dissimilarity",
+                                 0, 1e6),
+  };
+  table.visit(options, visitor);
 }
 
 Localiser::Localiser(const VisualMemory& memory, const LocaliserOptions& options)

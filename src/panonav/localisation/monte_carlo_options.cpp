@@ -1,4 +1,3 @@
-#include <array>
 #include <string_view>
 
 #include "panonav/localisation/monte_carlo.hpp"
@@ -6,41 +5,24 @@
 namespace panonav {
 
 void visit_options(MonteCarloOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "least_particles", .help = "fewest particles", .low = 1, .high = 1e7},
-                options.least_particles);
-  visitor.visit({.name = "most_particles", .help = "most particles", .low = 1, .high = 1e7},
-                options.most_particles);
-  visitor.visit(
-      {.name = "kld_error",
-       .help = "allowed error of the particles' distribution; smaller needs more particles",
-       .low = 1e-4,
-       .high = 1.0},
-      options.kld_error);
-  visitor.visit({.name = "resample_below",
-                 .help = "effective sample size below which particles are resampled, as a share",
-                 .low = 0.0,
-                 .high = 1.0},
-                options.resample_below);
-  visitor.visit({.name = "compass", .help = "weigh headings by the visual compass"},
-                options.compass);
-  constexpr std::array<std::string_view, 4> kinds{"none", "uniform", "topological", "explained"};
-  int kind = static_cast<int>(options.redraw);
-  visitor.visit({.name = "redraw", .help = "where new particles are drawn"}, kinds, kind);
-  options.redraw = static_cast<Redraw>(kind);
-  visitor.visit({.name = "redraw_share",
-                 .help = "share of particles redrawn by 'topological'",
-                 .low = 0.0,
-                 .high = 1.0},
-                options.redraw_share);
-  visitor.visit(
-      {.name = "redraw_number", .help = "particles redrawn by 'uniform'", .low = 0, .high = 1e7},
-      options.redraw_number);
-  visitor.visit({.name = "compared_views",
-                 .help = "views compared column by column when no near one explains the picture",
-                 .low = 0,
-                 .high = 1e6},
-                options.compared_views);
-  visitor.visit({.name = "seed", .help = "seed of all random choices", .low = 0}, options.seed);
+  using T = MonteCarloOptions;
+  constexpr OptionTable table{
+      option<&T::least_particles>("fewest particles", 1, 1e7),
+      option<&T::most_particles>("most particles", 1, 1e7),
+      option<&T::kld_error>(
+          "allowed error of the particles' distribution; smaller needs more particles", 1e-4, 1),
+      option<&T::resample_below>(
+          "effective sample size below which particles are resampled, as a share", 0, 1),
+      option<&T::compass>("weigh headings by the visual compass"),
+      choice<&T::redraw>("where new particles are drawn", "none", "uniform", "topological",
+                         "explained"),
+      option<&T::redraw_share>("share of particles redrawn by 'topological'", 0, 1),
+      option<&T::redraw_number>("particles redrawn by 'uniform'", 0, 1e7),
+      option<&T::compared_views>(
+          "views compared column by column when no near one explains the picture", 0, 1e6),
+      option<&T::seed>("seed of all random choices", 0),
+  };
+  table.visit(options, visitor);
 }
 
 std::string_view name_of(LocalisationState state) {

@@ -157,17 +157,14 @@ double fit_sharpness(std::span<const Explained> views) {
 }  // namespace
 
 void visit_options(ObservationModelOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "sampled_views",
-                 .help = "views left out in turn to learn how views change with distance",
-                 .low = 8,
-                 .high = 1e6},
-                options.sampled_views);
-  visitor.visit({.name = "compared_views",
-                 .help = "views with which each of them is compared",
-                 .low = 8,
-                 .high = 1e6},
-                options.compared_views);
-  visitor.visit({.name = "seed", .help = "seed of the draws", .low = 0}, options.seed);
+  using T = ObservationModelOptions;
+  constexpr OptionTable table{
+      option<&T::sampled_views>("views left out in turn to learn how views change with distance", 8,
+                                1e6),
+      option<&T::compared_views>("views with which each of them is compared", 8, 1e6),
+      option<&T::seed>("seed of the draws", 0),
+  };
+  table.visit(options, visitor);
 }
 
 ObservationModel learn_observation_model(const ColumnRanking& ranking,

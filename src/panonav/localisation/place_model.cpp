@@ -39,17 +39,13 @@ std::optional<ViewId> nearest_in_space(const VisualMemory& memory, ViewId view) 
 }  // namespace
 
 void visit_options(PlaceModelOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "sampled_views",
-                 .help = "views used for learning when a place is known",
-                 .low = 8,
-                 .high = 1e6},
-                options.sampled_views);
-  visitor.visit({.name = "compared_views",
-                 .help = "views with which each of them is compared",
-                 .low = 8,
-                 .high = 1e6},
-                options.compared_views);
-  visitor.visit({.name = "seed", .help = "seed of the draws", .low = 0}, options.seed);
+  using T = PlaceModelOptions;
+  constexpr OptionTable table{
+      option<&T::sampled_views>("views used for learning when a place is known", 8, 1e6),
+      option<&T::compared_views>("views with which each of them is compared", 8, 1e6),
+      option<&T::seed>("seed of the draws", 0),
+  };
+  table.visit(options, visitor);
 }
 
 PlaceModel learn_place_model(const ColumnRanking& ranking, const PlaceModelOptions& options) {

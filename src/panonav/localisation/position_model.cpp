@@ -120,9 +120,12 @@ Kriged krige(const Neighbours& n, double neighbourhood_m, double exponent, doubl
 }  // namespace
 
 void visit_options(PositionModelOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "sampled_views", .help = "views used for learning", .low = 8, .high = 1e6},
-                options.sampled_views);
-  visitor.visit({.name = "seed", .help = "seed of the draw", .low = 0}, options.seed);
+  using T = PositionModelOptions;
+  constexpr OptionTable table{
+      option<&T::sampled_views>("views used for learning", 8, 1e6),
+      option<&T::seed>("seed of the draw", 0),
+  };
+  table.visit(options, visitor);
 }
 
 PositionModel learn_position_model(const ColumnRanking& ranking,

@@ -446,46 +446,28 @@ class Arranger {
 }  // namespace
 
 void visit_options(LatticeOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "neighbours",
-                 .help = "springs that each view asks for, to the views most alike",
-                 .low = 1,
-                 .high = 1000},
-                options.neighbours);
-  visitor.visit({.name = "components", .help = "Fourier components compared, 0 for all", .low = 0},
-                options.components);
-  visitor.visit({.name = "phases", .help = "take directions and headings from phases"},
-                options.phases);
-  visitor.visit({.name = "landmarks",
-                 .help = "views from which the start is laid out",
-                 .low = 3,
-                 .high = 2000},
-                options.landmarks);
-  visitor.visit({.name = "rounds",
-                 .help = "how often curve and springs are made anew from the arrangement",
-                 .low = 1,
-                 .high = 20},
-                options.rounds);
+  using T = LatticeOptions;
+  constexpr OptionTable table{
+      option<&T::neighbours>("springs that each view asks for, to the views most alike", 1, 1000),
+      option<&T::components>("Fourier components compared, 0 for all", 0),
+      option<&T::phases>("take directions and headings from phases"),
+      option<&T::landmarks>("views from which the start is laid out", 3, 2000),
+      option<&T::rounds>("how often curve and springs are made anew from the arrangement", 1, 20),
+  };
+  table.visit(options, visitor);
 }
 
 void visit_options(CoarseMotionOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "distance_deviation",
-                 .help = "standard deviation of a step's length, as a share of it",
-                 .low = 0.0,
-                 .high = 10.0,
-                 .low_open = true},
-                options.distance_deviation);
-  visitor.visit({.name = "direction_deviation_rad",
-                 .help = "standard deviation of the direction of travel",
-                 .low = 0.0,
-                 .high = std::numbers::pi,
-                 .low_open = true},
-                options.direction_deviation_rad);
-  visitor.visit({.name = "turn_deviation_rad",
-                 .help = "standard deviation of a step's turn",
-                 .low = 0.0,
-                 .high = std::numbers::pi,
-                 .low_open = true},
-                options.turn_deviation_rad);
+  using T = CoarseMotionOptions;
+  constexpr OptionTable table{
+      option<&T::distance_deviation>("standard deviation of a step's length, as a share of it",
+                                     above(0), 10),
+      option<&T::direction_deviation_rad>("standard deviation of the direction of travel", above(0),
+                                          std::numbers::pi),
+      option<&T::turn_deviation_rad>("standard deviation of a step's turn", above(0),
+                                     std::numbers::pi),
+  };
+  table.visit(options, visitor);
 }
 
 CoarseMotion coarse_motion(ViewId from, ViewId to, const Pose2& step,

@@ -21,58 +21,26 @@ double gap(const Pose2& a, const Pose2& b) {
 }  // namespace
 
 void visit_options(LoopClosureOptions& options, OptionVisitor& visitor) {
-  visitor.visit(
-      {.name = "candidates", .help = "places looked at for each view", .low = 1, .high = 1000},
-      options.candidates);
-  visitor.visit({.name = "shortest_loop_m",
-                 .help = "views nearer along the way are no candidates",
-                 .low = 0.0,
-                 .high = 1e6,
-                 .low_open = true},
-                options.shortest_loop_m);
-  visitor.visit({.name = "most_residual",
-                 .help = "share of the views' energy that a closure may leave unexplained",
-                 .low = 0.0,
-                 .high = 1.0},
-                options.most_residual);
-  visitor.visit({.name = "most_length",
-                 .help = "distance between the views of a closure in units of R, at most",
-                 .low = 0.0,
-                 .high = 2.0},
-                options.most_length);
-  visitor.visit({.name = "heading_tolerance_rad",
-                 .help = "by which compass, way there and way back may differ",
-                 .low = 0.0,
-                 .high = 3.2},
-                options.heading_tolerance_rad);
-  visitor.visit({.name = "return_tolerance",
-                 .help = "how far from the start there and back may lead, in units of R",
-                 .low = 0.0,
-                 .high = 2.0},
-                options.return_tolerance);
-  visitor.visit({.name = "distinctness",
-                 .help = "by how much other places must explain the view worse",
-                 .low = 1.0,
-                 .high = 1000.0},
-                options.distinctness);
-  visitor.visit({.name = "reciprocal_rank",
-                 .help = "the search from the candidate leads back among so many views",
-                 .low = 1,
-                 .high = 1000},
-                options.reciprocal_rank);
-  visitor.visit({.name = "sequence",
-                 .help = "successive views whose closures must agree",
-                 .low = 1,
-                 .high = 1000},
-                options.sequence);
-  visitor.visit(
-      {.name = "spacing_m", .help = "way between closures that are told", .low = 0.0, .high = 1e6},
-      options.spacing_m);
-  visitor.visit({.name = "most_drift",
-                 .help = "drift of the odometry for each metre since the last closure",
-                 .low = 0.0,
-                 .high = 100.0},
-                options.most_drift);
+  using T = LoopClosureOptions;
+  constexpr OptionTable table{
+      option<&T::candidates>("places looked at for each view", 1, 1000),
+      option<&T::shortest_loop_m>("views nearer along the way are no candidates", above(0), 1e6),
+      option<&T::most_residual>("share of the views' energy that a closure may leave unexplained",
+                                0, 1),
+      option<&T::most_length>("distance between the views of a closure in units of R, at most", 0,
+                              2),
+      option<&T::heading_tolerance_rad>("by which compass, way there and way back may differ", 0,
+                                        3.2),
+      option<&T::return_tolerance>("how far from the start there and back may lead, in units of R",
+                                   0, 2),
+      option<&T::distinctness>("by how much other places must explain the view worse", 1, 1000),
+      option<&T::reciprocal_rank>("the search from the candidate leads back among so many views", 1,
+                                  1000),
+      option<&T::sequence>("successive views whose closures must agree", 1, 1000),
+      option<&T::spacing_m>("way between closures that are told", 0, 1e6),
+      option<&T::most_drift>("drift of the odometry for each metre since the last closure", 0, 100),
+  };
+  table.visit(options, visitor);
 }
 
 LoopClosureFinder::LoopClosureFinder(const VisualMemory& memory, const LoopClosureOptions& options,

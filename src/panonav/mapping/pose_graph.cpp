@@ -191,20 +191,14 @@ class Problem {
 }  // namespace
 
 void visit_options(PoseGraphOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "most_iterations", .help = "steps of the solver", .low = 1, .high = 1000},
-                options.most_iterations);
-  visitor.visit({.name = "settled_m",
-                 .help = "solved when no position changes by more",
-                 .low = 0.0,
-                 .high = 1e6,
-                 .low_open = true},
-                options.settled_m);
-  visitor.visit({.name = "doubt_deviations",
-                 .help = "error at which a loop closure loses its weight, in standard deviations",
-                 .low = 0.0,
-                 .high = 1e6,
-                 .low_open = true},
-                options.doubt_deviations);
+  using T = PoseGraphOptions;
+  constexpr OptionTable table{
+      option<&T::most_iterations>("steps of the solver", 1, 1000),
+      option<&T::settled_m>("solved when no position changes by more", above(0), 1e6),
+      option<&T::doubt_deviations>(
+          "error at which a loop closure loses its weight, in standard deviations", above(0), 1e6),
+  };
+  table.visit(options, visitor);
 }
 
 PoseGraphReport optimise_pose_graph(std::span<Pose2> nodes, std::span<const PoseEdge> edges,

@@ -97,27 +97,17 @@ class Pairs {
 }  // namespace
 
 void visit_options(SparseMemoryOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "most_difference",
-                 .help = "a view is redundant when one that is kept differs by no more",
-                 .low = 0.0,
-                 .high = 1.0},
-                options.most_difference);
-  visitor.visit({.name = "reach_m",
-                 .help = "only a view so near stands for another, where positions are known",
-                 .low = 0.0,
-                 .high = 1e6,
-                 .low_open = true},
-                options.reach_m);
-  visitor.visit({.name = "reach_links",
-                 .help = "only a view so many links away, where they are not",
-                 .low = 0,
-                 .high = 1000},
-                options.reach_links);
-  visitor.visit({.name = "outdated_within_m",
-                 .help = "a view is outdated when a newer one was taken so near; 0: never",
-                 .low = 0.0,
-                 .high = 1e6},
-                options.outdated_within_m);
+  using T = SparseMemoryOptions;
+  constexpr OptionTable table{
+      option<&T::most_difference>("a view is redundant when one that is kept differs by no more", 0,
+                                  1),
+      option<&T::reach_m>("only a view so near stands for another, where positions are known",
+                          above(0), 1e6),
+      option<&T::reach_links>("only a view so many links away, where they are not", 0, 1000),
+      option<&T::outdated_within_m>(
+          "a view is outdated when a newer one was taken so near; 0: never", 0, 1e6),
+  };
+  table.visit(options, visitor);
 }
 
 SparseSelection select_references(const VisualMemory& memory, const SparseMemoryOptions& options) {

@@ -75,39 +75,22 @@ std::size_t number_of_parts(const TopologicalMap& map) {
 }
 
 void visit_options(MappingOptions& options, OptionVisitor& visitor) {
-  visitor.visit(
-      {.name = "capture_difference",
-       .help = "a view becomes a node when it differs from the last by more; 0: every view",
-       .low = 0.0,
-       .high = 1.0},
-      options.capture_difference);
-  visitor.visit({.name = "close_loops", .help = "look for places passed before"},
-                options.close_loops);
-  visitor.visit({.name = "bridge_m",
-                 .help = "length of steps that neither views nor wheels show; 0: a new part begins",
-                 .low = 0.0,
-                 .high = 1e6},
-                options.bridge_m);
-  visitor.visit({.name = "wheel_lengths", .help = "take the length of steps from the wheels"},
-                options.wheel_lengths);
-  visitor.visit({.name = "step_deviation",
-                 .help = "deviation of positions read from views, for each metre",
-                 .low = 0.0,
-                 .high = 10.0,
-                 .low_open = true},
-                options.step_deviation);
-  visitor.visit({.name = "turn_deviation",
-                 .help = "deviation of headings read from views (rad), for each metre",
-                 .low = 0.0,
-                 .high = 10.0,
-                 .low_open = true},
-                options.turn_deviation);
-  visitor.visit({.name = "wheel_deviation",
-                 .help = "deviation of positions where wheels tell the length, for each metre",
-                 .low = 0.0,
-                 .high = 10.0,
-                 .low_open = true},
-                options.wheel_deviation);
+  using T = MappingOptions;
+  constexpr OptionTable table{
+      option<&T::capture_difference>(
+          "a view becomes a node when it differs from the last by more; 0: every view", 0, 1),
+      option<&T::close_loops>("look for places passed before"),
+      option<&T::bridge_m>(
+          "length of steps that neither views nor wheels show; 0: a new part begins", 0, 1e6),
+      option<&T::wheel_lengths>("take the length of steps from the wheels"),
+      option<&T::step_deviation>("deviation of positions read from views, for each metre", above(0),
+                                 10),
+      option<&T::turn_deviation>("deviation of headings read from views (rad), for each metre",
+                                 above(0), 10),
+      option<&T::wheel_deviation>(
+          "deviation of positions where wheels tell the length, for each metre", above(0), 10),
+  };
+  table.visit(options, visitor);
 }
 
 TopologicalMapper::TopologicalMapper(const VisualMemory& memory, const MappingOptions& options,

@@ -1,9 +1,7 @@
 #include "panonav/mapping/visual_odometry.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <string_view>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -72,42 +70,23 @@ std::optional<VisualStep> home_vector_step(const OdometryView& before, const Odo
 }  // namespace
 
 void visit_options(VisualOdometryOptions& options, OptionVisitor& visitor) {
-  constexpr std::array<std::string_view, 2> rules{"published", "home_vector"};
-  int rule = static_cast<int>(options.rule);
-  visitor.visit({.name = "rule", .help = "how the motion between two views is read"}, rules, rule);
-  options.rule = static_cast<StepRule>(rule);
-  visitor.visit({.name = "scale_m",
-                 .help = "metres for each unit of length that the views give",
-                 .low = 0.0,
-                 .high = 1e6,
-                 .low_open = true},
-                options.scale_m);
-  visitor.visit({.name = "camera_height_m",
-                 .help = "of the camera above level ground, which then tells lengths; 0: not known",
-                 .low = 0.0,
-                 .high = 100.0},
-                options.camera_height_m);
-  visitor.visit({.name = "distance_components",
-                 .help = "components compared for the distance of the published rule (k1); 0: all",
-                 .low = 0,
-                 .high = 4096},
-                options.distance_components);
-  visitor.visit({.name = "turn_components",
-                 .help = "components compared for the turn of the published rule (k2); 0: all",
-                 .low = 0,
-                 .high = 4096},
-                options.turn_components);
-  visitor.visit(
-      {.name = "iterations", .help = "times that the home vector is refined", .low = 0, .high = 20},
-      options.iterations);
-  visitor.visit({.name = "nearer_side",
-                 .help = "take out of turns what things nearer on one side of the way do to them"},
-                options.nearer_side);
-  visitor.visit({.name = "most_residual",
-                 .help = "share of the views' energy that a step may leave unexplained",
-                 .low = 0.0,
-                 .high = 1.0},
-                options.most_residual);
+  using T = VisualOdometryOptions;
+  constexpr OptionTable table{
+      choice<&T::rule>("how the motion between two views is read", "published", "home_vector"),
+      option<&T::scale_m>("metres for each unit of length that the views give", above(0), 1e6),
+      option<&T::camera_height_m>(
+          "of the camera above level ground, which then tells lengths; 0: not known", 0, 100),
+      option<&T::distance_components>(
+          "components compared for the distance of the published rule (k1); 0: all", 0, 4096),
+      option<&T::turn_components>(
+          "components compared for the turn of the published rule (k2); 0: all", 0, 4096),
+      option<&T::iterations>("times that the home vector is refined", 0, 20),
+      option<&T::nearer_side>(
+          "take out of turns what things nearer on one side of the way do to them"),
+      option<&T::most_residual>("share of the views' energy that a step may leave unexplained", 0,
+                                1),
+  };
+  table.visit(options, visitor);
 }
 
 OdometryView::OdometryView(FourierSignature view)

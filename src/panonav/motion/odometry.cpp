@@ -1,7 +1,6 @@
 #include "panonav/motion/odometry.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace panonav {
@@ -22,27 +21,23 @@ std::vector<Pose2> accumulate_steps(const Pose2& start, std::span<const Pose2> s
 }
 
 void visit_options(OdometryNoise& options, OptionVisitor& visitor) {
-  constexpr std::array<std::string_view, 2> drives{"differential", "holonomic"};
-  int drive = static_cast<int>(options.drive);
-  visitor.visit({.name = "drive", .help = "how the robot moves"}, drives, drive);
-  options.drive = static_cast<DriveKind>(drive);
-  const auto deviation = [&visitor](std::string_view name, std::string_view help, double& value) {
-    visitor.visit({.name = name, .help = help, .low = 0.0, .high = 10.0}, value);
+  using T = OdometryNoise;
+  constexpr OptionTable table{
+      choice<&T::drive>("how the robot moves", "differential", "holonomic"),
+      option<&T::translation_from_translation>("standard deviation of travel after 1 m, in m", 0,
+                                               10),
+      option<&T::translation_from_rotation>(
+          "standard deviation of travel after a turn by 1 rad, in m", 0, 10),
+      option<&T::rotation_from_translation>("standard deviation of the heading after 1 m, in rad",
+                                            0, 10),
+      option<&T::rotation_from_rotation>(
+          "standard deviation of the heading after a turn by 1 rad, in rad", 0, 10),
+      option<&T::translation_scale_error>(
+          "standard deviation of the relative error of travel in a run", 0, 10),
+      option<&T::rotation_scale_error>("standard deviation of the relative error of turns in a run",
+                                       0, 10),
   };
-  deviation("translation_from_translation", "standard deviation of travel after 1 m, in m",
-            options.translation_from_translation);
-  deviation("translation_from_rotation", "standard deviation of travel after a turn by 1 rad, in m",
-            options.translation_from_rotation);
-  deviation("rotation_from_translation", "standard deviation of the heading after 1 m, in rad",
-            options.rotation_from_translation);
-  deviation("rotation_from_rotation",
-            "standard deviation of the heading after a turn by 1 rad, in rad",
-            options.rotation_from_rotation);
-  deviation("translation_scale_error",
-            "standard deviation of the relative error of travel in a run",
-            options.translation_scale_error);
-  deviation("rotation_scale_error", "standard deviation of the relative error of turns in a run",
-            options.rotation_scale_error);
+  table.visit(options, visitor);
 }
 
 StepSampler::StepSampler(const Pose2& step, const OdometryNoise& noise)

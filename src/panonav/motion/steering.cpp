@@ -10,45 +10,28 @@
 namespace panonav {
 
 void visit_options(SteeringOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "turn_gain",
-                 .help = "share of the error of direction turned in one step",
-                 .low = 0.01,
-                 .high = 1},
-                options.turn_gain);
-  visitor.visit(
-      {.name = "most_turn_rad", .help = "turned in one step at most", .low = 0.01, .high = 3.2},
-      options.most_turn_rad);
-  visitor.visit({.name = "travel_gain",
-                 .help = "share of the way that is left driven in one step",
-                 .low = 0.01,
-                 .high = 1},
-                options.travel_gain);
-  visitor.visit({.name = "step_m", .help = "driven in one step at most", .low = 1e-3, .high = 10},
-                options.step_m);
-  visitor.visit({.name = "on_spot_rad",
-                 .help = "the robot turns on the spot for larger errors of direction",
-                 .low = 0.05,
-                 .high = 1.5},
-                options.on_spot_rad);
+  using T = SteeringOptions;
+  constexpr OptionTable table{
+      option<&T::turn_gain>("share of the error of direction turned in one step", 0.01, 1),
+      option<&T::most_turn_rad>("turned in one step at most", 0.01, 3.2),
+      option<&T::travel_gain>("share of the way that is left driven in one step", 0.01, 1),
+      option<&T::step_m>("driven in one step at most", 1e-3, 10),
+      option<&T::on_spot_rad>("the robot turns on the spot for larger errors of direction", 0.05,
+                              1.5),
+  };
+  table.visit(options, visitor);
 }
 
 void visit_options(PathFollowerOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "look_ahead_m",
-                 .help = "the robot steers to the place of the path so far ahead",
-                 .low = 0.01,
-                 .high = 100},
-                options.look_ahead_m);
-  visitor.visit({.name = "most_cut_m",
-                 .help = "by which the straight way to that place may leave the path",
-                 .low = 1e-3,
-                 .high = 10},
-                options.most_cut_m);
-  visitor.visit({.name = "arrived_m",
-                 .help = "so near to the end of the path the robot has arrived",
-                 .low = 1e-3,
-                 .high = 10},
-                options.arrived_m);
-  visit_options(options.steering, visitor);
+  using T = PathFollowerOptions;
+  constexpr OptionTable table{
+      option<&T::look_ahead_m>("the robot steers to the place of the path so far ahead", 0.01, 100),
+      option<&T::most_cut_m>("by which the straight way to that place may leave the path", 1e-3,
+                             10),
+      option<&T::arrived_m>("so near to the end of the path the robot has arrived", 1e-3, 10),
+      options_of<&T::steering>(),
+  };
+  table.visit(options, visitor);
 }
 
 Pose2 steer_to(const Pose2& robot, Point2 goal, const SteeringOptions& options) {

@@ -54,22 +54,16 @@ void relative_errors(const std::vector<Pair>& pairs, double distance_m, Trajecto
 }  // namespace
 
 void visit_options(TrajectoryErrorOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "longest_gap_s",
-                 .help = "longest gap of the truth over which it is interpolated",
-                 .low = 0.0,
-                 .low_open = true},
-                options.longest_gap_s);
-  visitor.visit({.name = "relative_distance_m",
-                 .help = "distance along the true path over which the relative error is taken",
-                 .low = 0.0,
-                 .low_open = true},
-                options.relative_distance_m);
-  visitor.visit({.name = "align", .help = "align the estimate with the truth first"},
-                options.align);
-  visitor.visit({.name = "align_scale", .help = "the alignment may change the scale"},
-                options.align_scale);
-  visitor.visit({.name = "align_reflection", .help = "the alignment may be a mirror image"},
-                options.align_reflection);
+  using T = TrajectoryErrorOptions;
+  constexpr OptionTable table{
+      option<&T::longest_gap_s>("longest gap of the truth over which it is interpolated", above(0)),
+      option<&T::relative_distance_m>(
+          "distance along the true path over which the relative error is taken", above(0)),
+      option<&T::align>("align the estimate with the truth first"),
+      option<&T::align_scale>("the alignment may change the scale"),
+      option<&T::align_reflection>("the alignment may be a mirror image"),
+  };
+  table.visit(options, visitor);
 }
 
 std::optional<TrajectoryError> trajectory_error(const Trajectory& estimate, const Trajectory& truth,

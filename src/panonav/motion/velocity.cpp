@@ -1,10 +1,8 @@
 #include "panonav/motion/velocity.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
-#include <string_view>
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
@@ -12,31 +10,16 @@
 namespace panonav {
 
 void visit_options(BaseOptions& options, OptionVisitor& visitor) {
-  constexpr std::array<std::string_view, 2> drives{"differential", "holonomic"};
-  int drive = static_cast<int>(options.drive);
-  visitor.visit({.name = "drive", .help = "how the robot moves"}, drives, drive);
-  options.drive = static_cast<DriveKind>(drive);
-  visitor.visit(
-      {.name = "speed_m_s", .help = "highest speed", .low = 0, .high = 100, .low_open = true},
-      options.speed_m_s);
-  visitor.visit({.name = "turn_rad_s",
-                 .help = "highest speed of turning",
-                 .low = 0,
-                 .high = 100,
-                 .low_open = true},
-                options.turn_rad_s);
-  visitor.visit({.name = "period_s",
-                 .help = "time for which a command holds",
-                 .low = 0,
-                 .high = 10,
-                 .low_open = true},
-                options.period_s);
-  visitor.visit({.name = "on_spot_rad",
-                 .help = "a differential drive turns on the spot for larger angles",
-                 .low = 0,
-                 .high = std::numbers::pi / 2,
-                 .low_open = true},
-                options.on_spot_rad);
+  using T = BaseOptions;
+  constexpr OptionTable table{
+      choice<&T::drive>("how the robot moves", "differential", "holonomic"),
+      option<&T::speed_m_s>("highest speed", above(0), 100),
+      option<&T::turn_rad_s>("highest speed of turning", above(0), 100),
+      option<&T::period_s>("time for which a command holds", above(0), 10),
+      option<&T::on_spot_rad>("a differential drive turns on the spot for larger angles", above(0),
+                              std::numbers::pi / 2),
+  };
+  table.visit(options, visitor);
 }
 
 Velocity command_towards(double direction_rad, double distance_m, const BaseOptions& options) {

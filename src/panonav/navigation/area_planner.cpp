@@ -19,13 +19,13 @@ constexpr double unreachable = std::numeric_limits<double>::infinity();
 }  // namespace
 
 void visit_options(PlannerOptions& options, OptionVisitor& visitor) {
-  visit_options(options.field, visitor);
-  visit_options(options.areas, visitor);
-  visitor.visit({.name = "gates_per_border",
-                 .help = "gates that count between two areas, 0 for all",
-                 .low = 0,
-                 .high = 1e6},
-                options.gates_per_border);
+  using T = PlannerOptions;
+  constexpr OptionTable table{
+      options_of<&T::field>(),
+      options_of<&T::areas>(),
+      option<&T::gates_per_border>("gates that count between two areas, 0 for all", 0, 1e6),
+  };
+  table.visit(options, visitor);
 }
 
 AreaPlanner::AreaPlanner(NavigationGraph graph, const PlannerOptions& options)

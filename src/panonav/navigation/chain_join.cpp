@@ -17,12 +17,12 @@
 namespace panonav {
 
 void visit_options(ChainJoinOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "candidates",
-                 .help = "references that are tried for a link with a snapshot",
-                 .low = 1,
-                 .high = 100},
-                options.candidates);
-  visit_options(options.odometry, visitor);
+  using T = ChainJoinOptions;
+  constexpr OptionTable table{
+      option<&T::candidates>("references that are tried for a link with a snapshot", 1, 100),
+      options_of<&T::odometry>(),
+  };
+  table.visit(options, visitor);
 }
 
 namespace {

@@ -11,16 +11,13 @@
 namespace panonav {
 
 void visit_options(FieldOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "links_ahead",
-                 .help = "passages ahead that count for a direction",
-                 .low = 1,
-                 .high = 100},
-                options.links_ahead);
-  visitor.visit({.name = "most_bend_rad",
-                 .help = "a way that has bent by more is not looked along any further",
-                 .low = 0,
-                 .high = std::numbers::pi},
-                options.most_bend_rad);
+  using T = FieldOptions;
+  constexpr OptionTable table{
+      option<&T::links_ahead>("passages ahead that count for a direction", 1, 100),
+      option<&T::most_bend_rad>("a way that has bent by more is not looked along any further", 0,
+                                std::numbers::pi),
+  };
+  table.visit(options, visitor);
 }
 
 std::vector<Guide> search_tree(const NavigationGraph& graph, const SubAreas& areas,

@@ -39,14 +39,13 @@ std::optional<RouteStretch> follow_way(const KnownRoute& route, double start_m, 
 }  // namespace
 
 void visit_options(KnownRouteOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "beside_m",
-                 .help = "references and robots lie no farther beside a route",
-                 .low = 0,
-                 .high = 100,
-                 .low_open = true},
-                options.beside_m);
-  visit_options(options.tracker, visitor);
-  visit_options(options.fit, visitor);
+  using T = KnownRouteOptions;
+  constexpr OptionTable table{
+      option<&T::beside_m>("references and robots lie no farther beside a route", above(0), 100),
+      options_of<&T::tracker>(),
+      options_of<&T::fit>(),
+  };
+  table.visit(options, visitor);
 }
 
 std::span<const double> KnownRoute::along_m(ViewId view) const {

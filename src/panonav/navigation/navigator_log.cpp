@@ -44,57 +44,26 @@ std::string describe(const NavigationDecision& decision) {
 }
 
 void visit_options(NavigatorOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "step_m",
-                 .help = "longest way between two looks",
-                 .low = 0,
-                 .high = 100,
-                 .low_open = true},
-                options.step_m);
-  visitor.visit({.name = "near_links",
-                 .help = "the next place is looked for within so many passages of the last one",
-                 .low = 1,
-                 .high = 10},
-                options.near_links);
-  visitor.visit({.name = "coarse_components",
-                 .help = "components compared in the open, 0 for all",
-                 .low = 0,
-                 .high = 1000},
-                options.coarse_components);
-  visitor.visit({.name = "views_ahead",
-                 .help = "views of the next area that a look loads",
-                 .low = 0,
-                 .high = 1e6},
-                options.views_ahead);
-  visit_options(options.homing, visitor);
-  visitor.visit({.name = "agreeing_looks",
-                 .help = "looks that must agree before another place or a block is believed",
-                 .low = 1,
-                 .high = 1000},
-                options.agreeing_looks);
-  visitor.visit({.name = "lost_patience",
-                 .help = "looks without a known place after which the robot is lost",
-                 .low = 1,
-                 .high = 1e6},
-                options.lost_patience);
-  visitor.visit({.name = "passage_patience",
-                 .help = "looks without coming nearer after which a passage counts as blocked",
-                 .low = 1,
-                 .high = 1e6},
-                options.passage_patience);
-  visitor.visit({.name = "shortest_leg_m",
-                 .help = "shortest way along a recorded route that is worth a leg",
-                 .low = 0,
-                 .high = 1000,
-                 .low_open = true},
-                options.shortest_leg_m);
-  visitor.visit({.name = "attempts",
-                 .help = "times that closed passages, or the last stretch, are tried",
-                 .low = 1,
-                 .high = 1000},
-                options.attempts);
-  visitor.visit(
-      {.name = "most_looks", .help = "looks after which a run ends", .low = 1, .high = 1e9},
-      options.most_looks);
+  using T = NavigatorOptions;
+  constexpr OptionTable table{
+      option<&T::step_m>("longest way between two looks", above(0), 100),
+      option<&T::near_links>("the next place is looked for within so many passages of the last one",
+                             1, 10),
+      option<&T::coarse_components>("components compared in the open, 0 for all", 0, 1000),
+      option<&T::views_ahead>("views of the next area that a look loads", 0, 1e6),
+      options_of<&T::homing>(),
+      option<&T::agreeing_looks>(
+          "looks that must agree before another place or a block is believed", 1, 1000),
+      option<&T::lost_patience>("looks without a known place after which the robot is lost", 1,
+                                1e6),
+      option<&T::passage_patience>(
+          "looks without coming nearer after which a passage counts as blocked", 1, 1e6),
+      option<&T::shortest_leg_m>("shortest way along a recorded route that is worth a leg",
+                                 above(0), 1000),
+      option<&T::attempts>("times that closed passages, or the last stretch, are tried", 1, 1000),
+      option<&T::most_looks>("looks after which a run ends", 1, 1e9),
+  };
+  table.visit(options, visitor);
 }
 
 }  // namespace panonav

@@ -12,14 +12,12 @@
 namespace panonav {
 
 void visit_options(SubAreaOptions& options, OptionVisitor& visitor) {
-  visitor.visit(
-      {.name = "views_per_area", .help = "size of an area aimed at", .low = 2, .high = 1e6},
-      options.views_per_area);
-  visitor.visit({.name = "iterations",
-                 .help = "steps of relaxation by which each cut is sought",
-                 .low = 0,
-                 .high = 1e5},
-                options.iterations);
+  using T = SubAreaOptions;
+  constexpr OptionTable table{
+      option<&T::views_per_area>("size of an area aimed at", 2, 1e6),
+      option<&T::iterations>("steps of relaxation by which each cut is sought", 0, 1e5),
+  };
+  table.visit(options, visitor);
 }
 
 namespace {

@@ -50,22 +50,15 @@ void replace_by_gradients(Panorama& panorama, int first_row, int end_row) {
 }  // namespace
 
 void visit_options(PreprocessingOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "masked_rows_top",
-                 .help = "rows at the upper edge that count for nothing",
-                 .low = 0},
-                options.masked_rows_top);
-  visitor.visit({.name = "masked_rows_bottom",
-                 .help = "rows at the lower edge that count for nothing",
-                 .low = 0},
-                options.masked_rows_bottom);
-  visitor.visit(
-      {.name = "edge_channel", .help = "take the length of the grey gradient instead of grey"},
-      options.edge_channel);
-  visitor.visit({.name = "remove_mean", .help = "subtract the mean of the view"},
-                options.remove_mean);
-  visitor.visit({.name = "normalise_gain",
-                 .help = "scale the contrast of every view to the same standard deviation"},
-                options.normalise_gain);
+  using T = PreprocessingOptions;
+  constexpr OptionTable table{
+      option<&T::masked_rows_top>("rows at the upper edge that count for nothing", 0),
+      option<&T::masked_rows_bottom>("rows at the lower edge that count for nothing", 0),
+      option<&T::edge_channel>("take the length of the grey gradient instead of grey"),
+      option<&T::remove_mean>("subtract the mean of the view"),
+      option<&T::normalise_gain>("scale the contrast of every view to the same standard deviation"),
+  };
+  table.visit(options, visitor);
 }
 
 double normalising_gain(double standard_deviation) noexcept {

@@ -1,7 +1,6 @@
 #include "panonav/panorama/unwarper.hpp"
 
 #include <algorithm>
-#include <array>
 #include <numbers>
 #include <string>
 #include <utility>
@@ -46,11 +45,13 @@ Panorama unwrap_picture(const Camera& camera, ImageView image, const ElevationBa
 }  // namespace
 
 void visit_options(UnwarperOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "rows", .help = "rows of the panoramic cylinder", .low = 1, .high = 4096},
-                options.rows);
-  visitor.visit(
-      {.name = "columns", .help = "columns of the panoramic cylinder", .low = 4, .high = 16384},
-      options.columns);
+  using T = UnwarperOptions;
+  constexpr OptionTable table{
+      option<&T::rows>("rows of the panoramic cylinder", 1, 4096),
+      option<&T::columns>("columns of the panoramic cylinder", 4, 16384),
+      no_option<&T::elevations>("a band, which dataset.toml and verbs give in degrees"),
+  };
+  table.visit(options, visitor);
 }
 
 Unwarper::Unwarper(const Camera& camera, const UnwarperOptions& options)

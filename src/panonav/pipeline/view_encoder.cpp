@@ -213,22 +213,16 @@ PanoramaShape wanted_shape(const PictureSource& source, const SignatureOptions& 
 }
 
 void visit_options(SignatureOptions& options, OptionVisitor& visitor) {
-  visitor.visit(
-      {.name = "rows",
-       .help = "Rows of the panoramic cylinder; pictures are resampled; 0: 80, or a panorama's own",
-       .low = 0,
-       .high = 4096},
-      options.rows);
-  visitor.visit({.name = "columns",
-                 .help = "Columns of the panoramic cylinder, likewise; 0: 512, or a panorama's own",
-                 .low = 0,
-                 .high = 16384},
-                options.columns);
-  visitor.visit({.name = "components",
-                 .help = "Fourier components of a signature, k = 0 included",
-                 .low = 1,
-                 .high = 1024},
-                options.components);
+  using T = SignatureOptions;
+  constexpr OptionTable table{
+      option<&T::rows>(
+          "Rows of the panoramic cylinder; pictures are resampled; 0: 80, or a panorama's own", 0,
+          4096),
+      option<&T::columns>(
+          "Columns of the panoramic cylinder, likewise; 0: 512, or a panorama's own", 0, 16384),
+      option<&T::components>("Fourier components of a signature, k = 0 included", 1, 1024),
+  };
+  table.visit(options, visitor);
 }
 
 float largest_structure(const FourierSignature& signature) {

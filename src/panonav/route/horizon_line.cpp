@@ -47,13 +47,12 @@ std::vector<float> mean_row(const Panorama& panorama, double half_band_rad) {
 }  // namespace
 
 void visit_options(HorizonLineOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "columns", .help = "values of a line", .low = 16, .high = 16384},
-                options.columns);
-  visitor.visit({.name = "half_band_rad",
-                 .help = "rows so near to the horizon are averaged",
-                 .low = 0,
-                 .high = 0.5},
-                options.half_band_rad);
+  using T = HorizonLineOptions;
+  constexpr OptionTable table{
+      option<&T::columns>("values of a line", 16, 16384),
+      option<&T::half_band_rad>("rows so near to the horizon are averaged", 0, 0.5),
+  };
+  table.visit(options, visitor);
 }
 
 std::vector<float> horizon_line(const Panorama& panorama, const HorizonLineOptions& options) {

@@ -58,26 +58,19 @@ double wrap_columns(double columns, double size) {
 }  // namespace
 
 void visit_options(RouteContourOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "margin_m",
-                 .help = "both contours start so far from the prediction",
-                 .low = 0.001,
-                 .high = 10},
-                options.margin_m);
-  visitor.visit({.name = "tension", .help = "w_alpha", .low = 0, .high = 1000}, options.tension);
-  visitor.visit({.name = "rigidity", .help = "w_beta", .low = 0, .high = 1000}, options.rigidity);
-  visitor.visit({.name = "image", .help = "w_diff", .low = 0, .high = 1000}, options.image);
-  visitor.visit({.name = "pull", .help = "w_pull", .low = 0, .high = 1000}, options.pull);
-  visitor.visit({.name = "constant", .help = "w_const", .low = 0, .high = 1000}, options.constant);
-  visitor.visit({.name = "smoothing_deg",
-                 .help = "of the lines before they are differentiated",
-                 .low = 0,
-                 .high = 45},
-                options.smoothing_deg);
-  visitor.visit({.name = "most_points", .help = "control points", .low = 8, .high = 10000},
-                options.most_points);
-  visitor.visit(
-      {.name = "most_iterations", .help = "until the contours stop", .low = 1, .high = 100000},
-      options.most_iterations);
+  using T = RouteContourOptions;
+  constexpr OptionTable table{
+      option<&T::margin_m>("both contours start so far from the prediction", 0.001, 10),
+      option<&T::tension>("w_alpha", 0, 1000),
+      option<&T::rigidity>("w_beta", 0, 1000),
+      option<&T::image>("w_diff", 0, 1000),
+      option<&T::pull>("w_pull", 0, 1000),
+      option<&T::constant>("w_const", 0, 1000),
+      option<&T::smoothing_deg>("of the lines before they are differentiated", 0, 45),
+      option<&T::most_points>("control points", 8, 10000),
+      option<&T::most_iterations>("until the contours stop", 1, 100000),
+  };
+  table.visit(options, visitor);
 }
 
 RouteContours::RouteContours(const RoutePanorama& route, const RouteContourOptions& options)

@@ -63,22 +63,15 @@ struct RouteLines::Workspace {
 };
 
 void visit_options(RouteFitOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "coarse_deg",
-                 .help = "smoothing of the lines where a fit starts",
-                 .low = 0,
-                 .high = 45},
-                options.coarse_deg);
-  visitor.visit({.name = "levels", .help = "from coarse to fine", .low = 1, .high = 8},
-                options.levels);
-  visitor.visit({.name = "most_steps", .help = "steps at each level", .low = 1, .high = 100},
-                options.most_steps);
-  visitor.visit({.name = "reach_m",
-                 .help = "lines farther from the prediction are not looked at",
-                 .low = 0.1,
-                 .high = 1000},
-                options.reach_m);
-  visitor.visit({.name = "robust", .help = "changed parts of the scene count less"},
-                options.robust);
+  using T = RouteFitOptions;
+  constexpr OptionTable table{
+      option<&T::coarse_deg>("smoothing of the lines where a fit starts", 0, 45),
+      option<&T::levels>("from coarse to fine", 1, 8),
+      option<&T::most_steps>("steps at each level", 1, 100),
+      option<&T::reach_m>("lines farther from the prediction are not looked at", 0.1, 1000),
+      option<&T::robust>("changed parts of the scene count less"),
+  };
+  table.visit(options, visitor);
 }
 
 RouteLines::RouteLines(const RoutePanorama& route, const RouteFitOptions& options)

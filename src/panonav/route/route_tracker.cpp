@@ -20,32 +20,20 @@ constexpr double pi = std::numbers::pi;
 }  // namespace
 
 void visit_options(RouteTrackerOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "search_step_m",
-                 .help = "between the places along the path that a search tries",
-                 .low = 0.01,
-                 .high = 100},
-                options.search_step_m);
-  visitor.visit({.name = "search_lateral_m",
-                 .help = "between the places beside the path that a search tries",
-                 .low = 0.01,
-                 .high = 100},
-                options.search_lateral_m);
-  visitor.visit({.name = "search_sides",
-                 .help = "places that a search tries to either side of the path",
-                 .low = 0,
-                 .high = 100},
-                options.search_sides);
-  visitor.visit(
-      {.name = "most_candidates", .help = "places that a search fits", .low = 1, .high = 1000},
-      options.most_candidates);
-  visitor.visit(
-      {.name = "recovery_m", .help = "by which a prediction may be off", .low = 0, .high = 100},
-      options.recovery_m);
-  visitor.visit({.name = "least_correlation",
-                 .help = "from which on a fit is believed; 0: learnt from the route",
-                 .low = 0,
-                 .high = 1},
-                options.least_correlation);
+  using T = RouteTrackerOptions;
+  constexpr OptionTable table{
+      option<&T::search_step_m>("between the places along the path that a search tries", 0.01, 100),
+      option<&T::search_lateral_m>("between the places beside the path that a search tries", 0.01,
+                                   100),
+      option<&T::search_sides>("places that a search tries to either side of the path", 0, 100),
+      option<&T::most_candidates>("places that a search fits", 1, 1000),
+      option<&T::recovery_m>("by which a prediction may be off", 0, 100),
+      option<&T::surprise_m>(
+          "a place farther from where odometry expects it waits for the next line", 0, 100),
+      option<&T::least_correlation>("from which on a fit is believed; 0: learnt from the route", 0,
+                                    1),
+  };
+  table.visit(options, visitor);
 }
 
 RouteTracker::RouteTracker(const RoutePanorama& route, const RouteTrackerOptions& options,

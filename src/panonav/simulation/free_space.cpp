@@ -56,26 +56,15 @@ FreeSpaceOptions free_space_options(const Scene& scene) {
 }
 
 void visit_options(FreeSpaceOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "robot_radius_m", .help = "radius of the robot", .low = 0.0, .high = 10.0},
-                options.robot_radius_m);
-  visitor.visit({.name = "robot_height_m",
-                 .help = "things lower than this are in the robot's way",
-                 .low = 0.0,
-                 .high = 100.0,
-                 .low_open = true},
-                options.robot_height_m);
-  visitor.visit({.name = "step_height_m",
-                 .help = "things lower than this are driven over",
-                 .low = 0.0,
-                 .high = 10.0},
-                options.step_height_m);
-  visitor.visit({.name = "floor_height_m", .help = "height of the floor in the scene"},
-                options.floor_height_m);
-  visitor.visit({.name = "cell_m",
-                 .help = "side of the cells of the map of free space",
-                 .low = 0.001,
-                 .high = 1.0},
-                options.cell_m);
+  using T = FreeSpaceOptions;
+  constexpr OptionTable table{
+      option<&T::robot_radius_m>("radius of the robot", 0, 10),
+      option<&T::robot_height_m>("things lower than this are in the robot's way", above(0), 100),
+      option<&T::step_height_m>("things lower than this are driven over", 0, 10),
+      option<&T::floor_height_m>("height of the floor in the scene"),
+      option<&T::cell_m>("side of the cells of the map of free space", 0.001, 1),
+  };
+  table.visit(options, visitor);
 }
 
 FreeSpace::FreeSpace(const Scene& scene, const FreeSpaceOptions& options,

@@ -1,6 +1,5 @@
 #include "panonav/simulation/recording.hpp"
 
-#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -116,51 +115,27 @@ Viewpoint viewpoint(const Pose2& pose, const FrameOptions& options, std::uint64_
 }  // namespace
 
 void visit_options(RecordingOptions& options, OptionVisitor& visitor) {
-  constexpr std::array<std::string_view, 5> paths{"grid", "zigzag", "tour", "walk", "random"};
-  constexpr std::array<std::string_view, 3> headings{"fixed", "path", "random"};
-  int path = static_cast<int>(options.path);
-  visitor.visit({.name = "path", .help = "where the robot takes its pictures"}, paths, path);
-  options.path = static_cast<RecordingPath>(path);
-  int heading = static_cast<int>(options.heading);
-  visitor.visit({.name = "heading", .help = "which way the robot faces"}, headings, heading);
-  options.heading = static_cast<RecordingHeading>(heading);
-  visitor.visit({.name = "heading_rad", .help = "heading where it is fixed"}, options.heading_rad);
-  visitor.visit({.name = "spacing_m",
-                 .help = "spacing of the grid, or along the path",
-                 .low = 0.0,
-                 .high = 1000.0,
-                 .low_open = true},
-                options.spacing_m);
-  visitor.visit({.name = "poses",
-                 .help = "number of poses of a walk, or of random ones",
-                 .low = 1.0,
-                 .high = 1e7},
-                options.poses);
-  visitor.visit({.name = "speed_m_s",
-                 .help = "speed of the robot, which gives the time stamps",
-                 .low = 0.0,
-                 .high = 100.0,
-                 .low_open = true},
-                options.speed_m_s);
+  using T = RecordingOptions;
+  constexpr OptionTable table{
+      choice<&T::path>("where the robot takes its pictures", "grid", "zigzag", "tour", "walk",
+                       "random"),
+      choice<&T::heading>("which way the robot faces", "fixed", "path", "random"),
+      option<&T::heading_rad>("heading where it is fixed"),
+      option<&T::spacing_m>("spacing of the grid, or along the path", above(0), 1000),
+      option<&T::poses>("number of poses of a walk, or of random ones", 1, 1e7),
+      option<&T::speed_m_s>("speed of the robot, which gives the time stamps", above(0), 100),
+  };
+  table.visit(options, visitor);
 }
 
 void visit_options(FrameOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "camera_height_m",
-                 .help = "height of the camera above the floor",
-                 .low = 0.0,
-                 .high = 100.0,
-                 .low_open = true},
-                options.camera_height_m);
-  visitor.visit({.name = "tilt_rad",
-                 .help = "how far the robot leans, in a random direction at each place",
-                 .low = 0.0,
-                 .high = 0.5},
-                options.tilt_rad);
-  visitor.visit({.name = "rays_per_axis",
-                 .help = "rays per pixel and axis through a camera",
-                 .low = 1.0,
-                 .high = 8.0},
-                options.rays_per_axis);
+  using T = FrameOptions;
+  constexpr OptionTable table{
+      option<&T::camera_height_m>("height of the camera above the floor", above(0), 100),
+      option<&T::tilt_rad>("how far the robot leans, in a random direction at each place", 0, 0.5),
+      option<&T::rays_per_axis>("rays per pixel and axis through a camera", 1, 8),
+  };
+  table.visit(options, visitor);
 }
 
 std::vector<RecordedPose> plan_recording(const Scene& scene, const FreeSpace& space,

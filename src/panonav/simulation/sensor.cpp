@@ -88,52 +88,22 @@ double light_factor(const SensorOptions& options, double azimuth_rad) {
 }  // namespace
 
 void visit_options(SensorOptions& options, OptionVisitor& visitor) {
-  visitor.visit({.name = "exposure",
-                 .help = "light that the camera collects, times a full exposure",
-                 .low = 0.0,
-                 .high = 1000.0,
-                 .low_open = true},
-                options.exposure);
-  visitor.visit({.name = "gain",
-                 .help = "electronic amplification of signal and noise",
-                 .low = 0.0,
-                 .high = 1000.0,
-                 .low_open = true},
-                options.gain);
-  visitor.visit({.name = "read_noise",
-                 .help = "standard deviation of a dark pixel, share of full scale",
-                 .low = 0.0,
-                 .high = 1.0},
-                options.read_noise);
-  visitor.visit({.name = "full_well",
-                 .help = "electrons of a full pixel; fewer make more shot noise",
-                 .low = 1.0,
-                 .high = 1e12},
-                options.full_well);
-  visitor.visit({.name = "vignetting",
-                 .help = "share of light lost at the mirror's rim",
-                 .low = 0.0,
-                 .high = 1.0},
-                options.vignetting);
-  visitor.visit({.name = "directional_light",
-                 .help = "by which share things on the light's side are brighter",
-                 .low = 0.0,
-                 .high = 1.0},
-                options.directional_light);
-  visitor.visit({.name = "light_azimuth_rad",
-                 .help = "where that light comes from, counter-clockwise from the heading",
-                 .low = -kFullTurn,
-                 .high = kFullTurn},
-                options.light_azimuth_rad);
-  visitor.visit({.name = "occluded_fraction",
-                 .help = "share of all azimuths that people or things stand before",
-                 .low = 0.0,
-                 .high = 1.0},
-                options.occluded_fraction);
-  visitor.visit(
-      {.name = "occluders", .help = "how many stand there, equally wide", .low = 1, .high = 1000},
-      options.occluders);
-  visitor.visit({.name = "eight_bit", .help = "values are multiples of 1/255"}, options.eight_bit);
+  using T = SensorOptions;
+  constexpr OptionTable table{
+      option<&T::exposure>("light that the camera collects, times a full exposure", above(0), 1000),
+      option<&T::gain>("electronic amplification of signal and noise", above(0), 1000),
+      option<&T::read_noise>("standard deviation of a dark pixel, share of full scale", 0, 1),
+      option<&T::full_well>("electrons of a full pixel; fewer make more shot noise", 1, 1e12),
+      option<&T::vignetting>("share of light lost at the mirror's rim", 0, 1),
+      option<&T::directional_light>("by which share things on the light's side are brighter", 0, 1),
+      option<&T::light_azimuth_rad>(
+          "where that light comes from, counter-clockwise from the heading", -kFullTurn, kFullTurn),
+      option<&T::occluded_fraction>("share of all azimuths that people or things stand before", 0,
+                                    1),
+      option<&T::occluders>("how many stand there, equally wide", 1, 1000),
+      option<&T::eight_bit>("values are multiples of 1/255"),
+  };
+  table.visit(options, visitor);
 }
 
 Panorama apply_sensor(Panorama view, const SensorOptions& options, std::uint64_t seed) {

@@ -141,6 +141,7 @@ class SettingsReader {
     if (bottom == nullptr || top == nullptr) throw ContractError(prefix, "half", "both or neither");
     return ElevationBand{*bottom, *top};
   }
+  bool has(const std::string& key) const { return settings_.contains(key); }
   void require_all_used() const {
     for (const auto& [key, value] : settings_) {
       if (!key.starts_with("parameter.") && !used_.contains(key)) {
@@ -171,7 +172,10 @@ class OptionReader final : public OptionVisitor {
   }
 
  private:
-  static std::string key(const OptionInfo& info) { return joined(preprocessing_prefix, info.name); }
+  std::string key(const OptionInfo& info) const {
+    const std::string former = joined(preprocessing_prefix, info.former);
+    return reader_.has(former) ? former : joined(preprocessing_prefix, info.name);
+  }
   SettingsReader& reader_;
 };
 
