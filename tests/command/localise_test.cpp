@@ -79,7 +79,7 @@ TEST_F(Localise, JsonLinesHaveExactlyTheDocumentedFields) {
       EXPECT_EQ(match.size(), 4U);
       EXPECT_TRUE(match.at("file").is_string());
       EXPECT_TRUE(match.at("dissimilarity").is_number());
-      EXPECT_TRUE(match.at("difference").is_number());
+      EXPECT_TRUE(match.at("column_difference").is_number());
       EXPECT_TRUE(match.at("heading_rad").is_number() || match.at("heading_rad").is_null());
     }
     if (!answer["position"].is_null()) {
@@ -87,6 +87,19 @@ TEST_F(Localise, JsonLinesHaveExactlyTheDocumentedFields) {
       EXPECT_GT(answer["position"].at("radius_m").get<double>(), 0.0);
     }
   }
+}
+
+TEST_F(Localise, FormerKeysAreThoseOfTheLastVersion) {
+  auto expected = run_panonav({"localise", memory(), asked(), "--json"});
+  const auto former = run_panonav({"localise", memory(), asked(), "--json", "--former-keys"});
+  const std::string key = "\"column_difference\"";
+  ASSERT_NE(expected.out.find(key), std::string::npos);
+  for (auto at = expected.out.find(key); at != std::string::npos; at = expected.out.find(key)) {
+    expected.out.replace(at, key.size(), "\"difference\"");
+  }
+  EXPECT_EQ(former.out, expected.out);
+  EXPECT_NE(former.err.find("--former-keys: "), std::string::npos);
+  EXPECT_EQ(expected.err.find("--former-keys"), std::string::npos);
 }
 
 TEST_F(Localise, FindsPlaceAndHeadingOfPosesBetweenTheReferences) {

@@ -73,9 +73,9 @@ TEST_F(Map, ViewsThatHardlyDifferAreSkipped) {
 TEST_F(Map, PruneShrinksTheMemoryAndKeepsTheMapWhole) {
   const json said = map();
   const auto dry =
-      run_panonav({"prune", memory(), "--dry-run", "--most-difference", "0.05", "--json"});
+      run_panonav({"prune", memory(), "--dry-run", "--max-difference", "0.05", "--json"});
   ASSERT_EQ(dry.exit_code, 0) << dry.err;
-  const auto pruned = run_panonav({"prune", memory(), "--most-difference", "0.05", "--json"});
+  const auto pruned = run_panonav({"prune", memory(), "--max-difference", "0.05", "--json"});
   ASSERT_EQ(pruned.exit_code, 0) << pruned.err;
   const json result = json::parse(pruned.out);
   EXPECT_EQ(result["views_before"], 100);

@@ -84,5 +84,25 @@ TEST(Usage, ExamplesAreUnderstood) {
   EXPECT_GE(tried, 10);
 }
 
+TEST(Usage, FormerNamesOfFlagsAreTakenWithAWarningAndNotShown) {
+  const std::string warning = "--most-difference is now --max-difference\n";
+  for (const auto& flag : {"--most-difference=0.2", "--most-difference=2"}) {
+    const auto former = run_panonav({"prune", "no.panonav", flag});
+    EXPECT_EQ(former.exit_code, 2);
+    EXPECT_EQ(former.err.find(warning), 0U) << former.err;
+  }
+  const auto apart = run_panonav({"prune", "no.panonav", "--most-difference", "2"});
+  EXPECT_EQ(apart.err.find(warning), 0U) << apart.err;
+  EXPECT_NE(apart.err.find("max_difference is 2; allowed: >= 0 and <= 1"), std::string::npos);
+  EXPECT_EQ(run_panonav({"prune", "no.panonav", "--max-difference", "0.2"}).err.find("is now"),
+            std::string::npos);
+  EXPECT_NE(refusal({"prune", "a", "--most-difference", "0.1", "--max-difference", "0.2"})
+                .find("--most-difference is the former name of --max-difference"),
+            std::string::npos);
+  const auto help = run_panonav({"prune", "--help"});
+  EXPECT_NE(help.out.find("--max-difference"), std::string::npos);
+  EXPECT_EQ(help.out.find("--most-difference"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace panonav::testing

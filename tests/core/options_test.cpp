@@ -4,6 +4,8 @@
 
 #include <array>
 #include <limits>
+#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -20,6 +22,13 @@ struct SampleOptions {
   double tolerance = 0.0;
   bool packed = true;
   int norm = 0;
+  friend bool operator==(const SampleOptions&, const SampleOptions&) = default;
+};
+
+struct ElevationBounds {
+  double low;
+  double high;
+  friend bool operator==(const ElevationBounds&, const ElevationBounds&) = default;
 };
 
 void visit_options(SampleOptions& options, OptionVisitor& visitor) {
@@ -30,6 +39,66 @@ void visit_options(SampleOptions& options, OptionVisitor& visitor) {
       option<&T::norm>("which", norms),
   };
   table.visit(options, visitor);
+}
+
+enum class Side { left, right };
+
+struct NestedOptions {
+  SampleOptions sample;
+  std::optional<ElevationBounds> bounds = std::nullopt;
+  Side side = Side::left;
+  friend bool operator==(const NestedOptions&, const NestedOptions&) = default;
+};
+
+void visit_options(NestedOptions& options, OptionVisitor& visitor) {
+  using T = NestedOptions;
+  constexpr OptionTable table{
+      options_of<&T::sample>(),
+      no_option<&T::bounds>("a pair that no text gives"),
+      choice<&T::side>("which", "left", "right").formerly("hand").formerly("port", "left"),
+  };
+  table.visit(options, visitor);
+}
+
+// What the table's own check rests on: a member more or less does not compile.
+static_assert(detail::member_count<SampleOptions>() == 5);
+static_assert(detail::member_count<NestedOptions>() == 3);
+static_assert(detail::member_count<ElevationBounds>() == 2);
+static_assert(detail::member_name<&SampleOptions::radius_m>() == "radius_m");
+
+/// What a table says, one line an option; sets choices to the last one.
+class Listing final : public OptionVisitor {
+ public:
+  void visit(const OptionInfo& info, int& /*value*/) override { add(info, "int"); }
+  void visit(const OptionInfo& info, double& /*value*/) override { add(info, "double"); }
+  void visit(const OptionInfo& info, bool& /*value*/) override { add(info, "bool"); }
+  void visit(const OptionInfo& info, std::span<const std::string_view> choices,
+             int& value) override {
+    std::string all;
+    for (std::size_t i = 0; i < choices.size(); ++i) {
+      all.append(i == 0 ? "" : "|").append(choices[i]);
+      if (!info.former_choices[i].empty()) all.append("<").append(info.former_choices[i]);
+    }
+    add(info, all);
+    value = static_cast<int>(choices.size()) - 1;
+  }
+  std::string text;
+
+ private:
+  void add(const OptionInfo& info, std::string_view kind) {
+    text.append(info.name).append(" ").append(kind).append(" ").append(info.former).append(";");
+  }
+};
+
+TEST(Options, TablesShowMembersInOrderWithNestedStructsChoicesAndFormerNames) {
+  NestedOptions options;
+  Listing listing;
+  visit_options(options, listing);
+  EXPECT_EQ(listing.text,
+            "views int ;radius_m double ;tolerance double ;packed bool ;norm l1|l2 ;"
+            "side left<port|right hand;");
+  EXPECT_EQ(options.side, Side::right);
+  EXPECT_EQ(options.sample, (SampleOptions{.norm = 1}));
 }
 
 std::string fault_of(const SampleOptions& options) {

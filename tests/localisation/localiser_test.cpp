@@ -121,7 +121,7 @@ TEST(Localiser, LeavesOutExcludedViewsAndRowsThatDoNotCount) {
       localiser.localise(spoilt, {.excluded_views = {}, .allowed_rows = allowed});
   EXPECT_EQ(found.matches[0].view, view);
   EXPECT_EQ(found.matches[0].dissimilarity, 0U);
-  EXPECT_EQ(found.matches[0].difference, 0.0);
+  EXPECT_EQ(found.matches[0].column_difference, 0.0);
   EXPECT_TRUE(found.known);
 }
 
@@ -146,7 +146,7 @@ TEST(Localiser, GivesTheSameAnswerWithModelsLearntBefore) {
            place.memory.full_scale());
   const Localisation a = one.localise(query);
   const Localisation b = two.localise(query);
-  EXPECT_EQ(a.matches[0].difference, b.matches[0].difference);
+  EXPECT_EQ(a.matches[0].column_difference, b.matches[0].column_difference);
   EXPECT_EQ(a.heading_rad, b.heading_rad);
   ASSERT_EQ(a.position.has_value(), b.position.has_value());
   if (a.position) {

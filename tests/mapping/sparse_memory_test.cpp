@@ -46,7 +46,7 @@ TEST(SparseMemory, EveryDroppedViewHasOneThatStandsForIt) {
   const ToyWorld room = round_room(radius_m, 1);
   for (const Known known : {Known::positions, Known::links}) {
     const auto memory = along_a_line(room, 100, known);
-    const SparseMemoryOptions options{.most_difference = 0.05};
+    const SparseMemoryOptions options{.max_difference = 0.05};
     const auto selection = select_references(memory, options);
     EXPECT_EQ(selection.kept.size() + selection.redundant.size(), memory.size());
     EXPECT_GE(selection.kept.size(), 3U);
@@ -55,7 +55,7 @@ TEST(SparseMemory, EveryDroppedViewHasOneThatStandsForIt) {
     for (const RedundantView& redundant : selection.redundant) {
       EXPECT_FALSE(kept.contains(redundant.view));
       EXPECT_TRUE(kept.contains(redundant.kept));
-      EXPECT_LE(difference_of(memory, redundant.kept, redundant.view), options.most_difference);
+      EXPECT_LE(difference_of(memory, redundant.kept, redundant.view), options.max_difference);
       EXPECT_FALSE(redundant.outdated);
     }
     EXPECT_EQ(select_references(memory, options), selection);
@@ -67,7 +67,7 @@ TEST(SparseMemory, MoreLossKeepsLess) {
   std::size_t before = memory.size() + 1;
   double loss_before = -1.0;
   for (const double difference : {0.0, 0.02, 0.08, 0.3}) {
-    const auto selection = select_references(memory, {.most_difference = difference});
+    const auto selection = select_references(memory, {.max_difference = difference});
     const auto loss = measure_loss(memory, selection);
     EXPECT_LT(selection.kept.size(), before);
     EXPECT_GE(loss.median_difference, loss_before);
@@ -107,9 +107,9 @@ TEST(SparseMemory, NewerViewsReplaceOutdatedOnes) {
     memory.append(round_room_signature(after, pose),
                   {.name = "new " + std::to_string(i), .pose = ReferencePose{pose.x_m, 0.0, {}}});
   }
-  EXPECT_EQ(select_references(memory, {.most_difference = 0.01}).kept.size(), 8U);
+  EXPECT_EQ(select_references(memory, {.max_difference = 0.01}).kept.size(), 8U);
   const auto selection =
-      select_references(memory, {.most_difference = 0.01, .outdated_within_m = 0.1});
+      select_references(memory, {.max_difference = 0.01, .outdated_within_m = 0.1});
   ASSERT_EQ(selection.redundant.size(), 3U);
   for (const RedundantView& redundant : selection.redundant) {
     EXPECT_TRUE(redundant.outdated);
@@ -120,7 +120,7 @@ TEST(SparseMemory, NewerViewsReplaceOutdatedOnes) {
 
 TEST(SparseMemory, WhatWasConnectedStaysConnected) {
   const auto memory = along_a_line(round_room(radius_m, 7), 60, Known::links);
-  const auto selection = select_references(memory, {.most_difference = 0.1});
+  const auto selection = select_references(memory, {.max_difference = 0.1});
   ASSERT_GT(selection.redundant.size(), 20U);
   TopologicalMap map;
   for (const ViewId view : memory.views()) {
@@ -160,7 +160,7 @@ TEST(SparseMemory, DegenerateMemories) {
   const auto selection = select_references(memory);
   EXPECT_EQ(selection.kept.size(), 1U);
   EXPECT_FALSE(measure_loss(memory, selection).positions.has_value());
-  EXPECT_THROW((void)select_references(memory, {.most_difference = -1.0}), OptionError);
+  EXPECT_THROW((void)select_references(memory, {.max_difference = -1.0}), OptionError);
   EXPECT_THROW((void)select_references(memory, {.reach_m = 0.0}), OptionError);
   EXPECT_THROW((void)measure_loss(memory, selection, 0), ContractError);
 }

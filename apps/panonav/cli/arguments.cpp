@@ -444,6 +444,9 @@ std::optional<ParsedCommand> parse(std::span<const Verb> verbs, int argc, const 
     entry.arguments = std::make_shared<Arguments>(parser);
     entry.run = verb.declare(*entry.arguments);
     sub->add_flag("--json", entry.common.json, "Results as JSON on standard output");
+    sub->add_flag("--former-keys", entry.common.former_keys,
+                  "With --json: keys that have a new name have their former one, for programs that "
+                  "were written for the last version");
     entry.arguments->option("--threads", entry.common.threads, 0,
                             "Threads to use; 0 takes one per core (default 0)");
     sub->add_option("--config", entry.common.config,

@@ -25,7 +25,8 @@ class UsageError : public std::runtime_error {
 /// What every verb takes.
 struct CommonArguments {
   bool json = false;
-  int threads = 0;  ///< 0: one per core
+  bool former_keys = false;  ///< of JSON
+  int threads = 0;           ///< 0: one per core
   std::optional<std::string> config;
 };
 

@@ -25,7 +25,8 @@ ExitCode run(std::string_view& verb, int argc, char** argv) {
   verb = panonav::command::verb_in(verbs, argc, argv);
   const auto command = panonav::command::parse(verbs, argc, argv);
   if (!command) return ExitCode::done;
-  panonav::command::Session session(command->common.json, command->common.threads);
+  panonav::command::Session session(command->common.json, command->common.threads,
+                                    command->common.former_keys);
   const ExitCode code = command->run(session);
   session.finish_output();
   return code;

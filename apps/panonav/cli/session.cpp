@@ -9,6 +9,7 @@
 #include <sstream>
 #include <utility>
 
+#include "cli/json.hpp"
 #include "panonav/core/error.hpp"
 
 namespace panonav::command {
@@ -23,11 +24,20 @@ bool wants_colours(int descriptor) {
 
 }  // namespace
 
-Session::Session(bool json, int threads)
-    : json_(json), colours_(!json && wants_colours(STDOUT_FILENO)), executor_(threads) {}
+Session::Session(bool json, int threads, bool former_keys)
+    : json_(json),
+      former_keys_(json && former_keys),
+      colours_(!json && wants_colours(STDOUT_FILENO)),
+      executor_(threads) {
+  if (former_keys_) note("--former-keys: the next version will no longer know these keys");
+}
 
 void Session::print(std::string_view line) {
-  std::cout << line << '\n';
+  if (former_keys_) {
+    std::cout << with_former_keys(line) << '\n';
+  } else {
+    std::cout << line << '\n';
+  }
 }
 
 void Session::note(std::string_view line) {

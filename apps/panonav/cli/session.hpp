@@ -13,7 +13,8 @@ namespace panonav::command {
 /// What a verb needs of its surroundings: threads, and how to speak to people and to machines.
 class Session {
  public:
-  Session(bool json, int threads);
+  /// `former_keys`: keys of JSON are printed with their names of the last version.
+  Session(bool json, int threads, bool former_keys = false);
 
   /// The caller is a machine: results as JSON, nothing else on standard output.
   [[nodiscard]] bool json() const noexcept { return json_; }
@@ -34,6 +35,7 @@ class Session {
  private:
   [[nodiscard]] std::string styled(std::string_view text, std::string_view code) const;
   bool json_;
+  bool former_keys_;
   bool colours_;
   Executor executor_;
 };

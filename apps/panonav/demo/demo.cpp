@@ -3,11 +3,11 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string_view>
 #include <vector>
 
 #include "cli/arguments.hpp"
+#include "cli/json.hpp"
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "demo/homing.hpp"
@@ -241,16 +241,11 @@ struct DemoResults {
   double seconds = 0.0;
 };
 
-nlohmann::ordered_json median_or_null(const std::vector<double>& values) {
-  return values.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(median(values));
+ordered_json median_or_null(const std::vector<double>& values) {
+  return values.empty() ? ordered_json() : ordered_json(median(values));
 }
 
-template <typename Value>
-nlohmann::ordered_json value_or_null(const std::optional<Value>& value) {
-  return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json();
-}
-
-nlohmann::ordered_json as_json(const MissionRun& run) {
+ordered_json as_json(const MissionRun& run) {
   return {{"end", name_of(run.end)},
           {"goal_distance_m", run.end_distance_m},
           {"looks", run.decisions.size()},
@@ -258,7 +253,7 @@ nlohmann::ordered_json as_json(const MissionRun& run) {
           {"shortest_m", run.shortest_m}};
 }
 
-nlohmann::ordered_json as_json(const DemoResults& done, const fs::path& out) {
+ordered_json as_json(const DemoResults& done, const fs::path& out) {
   const DemoNavigation& navigation = done.navigation;
   return {{"report", (out / "index.html").string()},
           {"views", done.views},
@@ -269,14 +264,13 @@ nlohmann::ordered_json as_json(const DemoResults& done, const fs::path& out) {
           {"known_elsewhere", done.foreign.known},
           {"bytes_share", done.own.bytes_share},
           {"track_images", done.track.images},
-          {"track_until_localised", value_or_null(done.track.until_localised)},
-          {"track_until_found_again", value_or_null(done.track.until_found_again)},
+          {"track_until_localised", or_null(done.track.until_localised)},
+          {"track_until_found_again", or_null(done.track.until_found_again)},
           {"track_localised", done.track.localised},
           {"track_wrong", done.track.wrong},
           {"track_error_m", median_or_null(done.track.errors_m)},
           {"arranged_shape_difference",
-           done.maps.lattice ? nlohmann::ordered_json(done.maps.lattice->shape_difference)
-                             : nlohmann::ordered_json()},
+           done.maps.lattice ? ordered_json(done.maps.lattice->shape_difference) : ordered_json()},
           {"drive_shape_difference", done.maps.map_error},
           {"wheels_shape_difference", done.maps.wheels_error},
           {"runs_home", done.homing.runs.size()},
@@ -290,8 +284,7 @@ nlohmann::ordered_json as_json(const DemoResults& done, const fs::path& out) {
           {"mission_detour", median_or_null(navigation.detours)},
           {"mission_looks", median_or_null(navigation.looks)},
           {"mission_carried", as_json(navigation.carried)},
-          {"mission_screen",
-           navigation.screened ? as_json(*navigation.screened) : nlohmann::ordered_json()},
+          {"mission_screen", navigation.screened ? as_json(*navigation.screened) : ordered_json()},
           {"seconds", done.seconds}};
 }
 

@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "cli/arguments.hpp"
+#include "cli/json.hpp"
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
@@ -20,8 +20,6 @@
 namespace panonav::command {
 
 namespace {
-
-using nlohmann::ordered_json;
 
 struct ArrangeArguments {
   std::string memory;
@@ -90,10 +88,8 @@ ordered_json as_json(const LatticeComparison& comparison) {
           {"shape_difference_with_reflection", comparison.with_reflection},
           {"rms_m", comparison.rms_m},
           {"scale", comparison.scale},
-          {"trustworthiness",
-           comparison.trustworthiness ? ordered_json(*comparison.trustworthiness) : ordered_json()},
-          {"continuity",
-           comparison.continuity ? ordered_json(*comparison.continuity) : ordered_json()}};
+          {"trustworthiness", or_null(comparison.trustworthiness)},
+          {"continuity", or_null(comparison.continuity)}};
 }
 #endif
 

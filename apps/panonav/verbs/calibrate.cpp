@@ -1,7 +1,7 @@
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "cli/arguments.hpp"
+#include "cli/json.hpp"
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/camera/find_mirror.hpp"
@@ -15,8 +15,6 @@
 namespace panonav::command {
 
 namespace {
-
-using nlohmann::ordered_json;
 
 /// What no picture shows of a mirror: its profile, and where the robot's forward direction lies.
 struct MirrorOptions {

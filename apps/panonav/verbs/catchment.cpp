@@ -3,8 +3,8 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 
+#include "cli/json.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
@@ -16,7 +16,6 @@ namespace panonav::command {
 
 namespace {
 
-using nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
 struct CatchmentArguments {
@@ -32,30 +31,25 @@ struct CatchmentArguments {
   std::optional<std::string> report;
 };
 
-ordered_json number(double value) {
-  return std::isfinite(value) ? ordered_json(value) : ordered_json();
-}
-
 ordered_json as_json(const CatchmentArguments& wanted, const RecordedViews& goals,
                      const CatchmentResult& result) {
   ordered_json json{{"dataset", wanted.dataset},
-                    {"current", wanted.current ? ordered_json(*wanted.current) : ordered_json()},
+                    {"current", or_null(wanted.current)},
                     {"goals", result.survey.goals.size()},
                     {"places", result.survey.places.size()},
                     {"spacing_m", result.spacing_m},
                     {"typical_distance_m", result.typical_distance_m},
-                    {"up_to_m", wanted.settings.up_to_m ? ordered_json(*wanted.settings.up_to_m)
-                                                        : ordered_json()},
+                    {"up_to_m", or_null(wanted.settings.up_to_m)},
                     {"pairs", result.pairs},
-                    {"stages", wanted.stages ? ordered_json(*wanted.stages) : ordered_json()},
-                    {"homeward_component", number(result.component)},
-                    {"orientation_error_rad", number(result.orientation_error_rad)}};
+                    {"stages", or_null(wanted.stages)},
+                    {"homeward_component", or_null(result.component)},
+                    {"orientation_error_rad", or_null(result.orientation_error_rad)}};
   auto bins = ordered_json::array();
   for (const CatchmentBin& bin : result.bins) {
     bins.push_back({{"distance_m", bin.homeward.distance_m},
                     {"pairs", bin.homeward.pairs},
-                    {"homeward_component", number(bin.homeward.component)},
-                    {"orientation_error_rad", number(bin.orientation_error_rad)}});
+                    {"homeward_component", or_null(bin.homeward.component)},
+                    {"orientation_error_rad", or_null(bin.orientation_error_rad)}});
   }
   json["bins"] = std::move(bins);
   auto areas = ordered_json::array();

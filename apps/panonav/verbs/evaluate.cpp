@@ -2,11 +2,11 @@
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <vector>
 
 #include "cli/arguments.hpp"
+#include "cli/json.hpp"
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
@@ -20,8 +20,6 @@
 namespace panonav::command {
 
 namespace {
-
-using nlohmann::ordered_json;
 
 struct EvaluateArguments {
   std::string estimate;

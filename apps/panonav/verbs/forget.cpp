@@ -1,8 +1,8 @@
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <set>
 
 #include "cli/arguments.hpp"
+#include "cli/json.hpp"
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
@@ -32,9 +32,9 @@ ExitCode forget(const ForgetArguments& wanted, Session& session) {
   memory.remove(std::vector<ViewId>(views.begin(), views.end()));
   const auto left = memory.info().views;
   if (session.json()) {
-    session.print(nlohmann::ordered_json{
-        {"memory", wanted.memory}, {"forgotten", views.size()}, {"views", left}}
-                      .dump());
+    session.print(
+        ordered_json{{"memory", wanted.memory}, {"forgotten", views.size()}, {"views", left}}
+            .dump());
   } else {
     session.print(std::to_string(views.size()) + " views forgotten; " + wanted.memory + " holds " +
                   std::to_string(left));

@@ -1,8 +1,8 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 
+#include "cli/json.hpp"
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
@@ -20,7 +20,6 @@ namespace panonav::command {
 
 namespace {
 
-using nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
 struct HomeArguments {

@@ -1,7 +1,7 @@
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "cli/arguments.hpp"
+#include "cli/json.hpp"
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
@@ -11,8 +11,6 @@
 namespace panonav::command {
 
 namespace {
-
-using nlohmann::ordered_json;
 
 std::string_view kind_name(PictureKind kind) {
   switch (kind) {

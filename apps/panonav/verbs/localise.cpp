@@ -50,7 +50,7 @@ ordered_json as_json(const Answer& answer, const VisualMemory& memory, bool area
     matches.push_back(
         {{"file", memory.info(match.view).name},
          {"dissimilarity", match.dissimilarity},
-         {"difference", match.difference},
+         {"column_difference", match.column_difference},
          {"heading_rad", compass ? ordered_json(compass->heading_rad) : ordered_json()}});
   }
   ordered_json json{{"file", answer.file},

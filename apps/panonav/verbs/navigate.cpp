@@ -1,10 +1,10 @@
 #include <array>
 #include <cmath>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "cli/json.hpp"
 #include "cli/option_values.hpp"
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
@@ -19,8 +19,6 @@
 namespace panonav::command {
 
 namespace {
-
-using nlohmann::ordered_json;
 
 struct NavigateArguments {
   std::string memory;
@@ -63,14 +61,6 @@ Pose2 free_pose(const std::string& flag, const std::string& text, const FreeSpac
 }
 
 /// null where nobody knows.
-ordered_json number_or_null(double value) {
-  return std::isfinite(value) ? ordered_json(value) : ordered_json();
-}
-
-ordered_json as_json(const Pose2& pose) {
-  return {{"x_m", pose.x_m}, {"y_m", pose.y_m}, {"heading_rad", pose.heading_rad}};
-}
-
 std::string file_of(ViewId view, const VisualMemory& memory) {
   return memory.info(view).name;
 }
@@ -92,12 +82,12 @@ ordered_json as_json(const NavigationDecision& decision, const Pose2& pose,
           {"nearest", file_or_null(decision.nearest, memory)},
           {"next", file_or_null(decision.next, memory)},
           {"area", decision.area},
-          {"difference", decision.difference},
-          {"way", number_or_null(decision.way)},
+          {"image_difference", decision.difference},
+          {"way", or_null(decision.way)},
           {"components", decision.components},
           {"bytes_read", decision.bytes_read},
           {"events", std::move(events)},
-          {"pose", as_json(pose)}};
+          {"pose", pose_json(pose)}};
 }
 
 std::string in_words(NavigationEvent event) {
@@ -165,7 +155,7 @@ ordered_json summary_json(const NavigateArguments& wanted, const Remembered& rem
       {"goal", goal},
       {"scene", wanted.scene},
       {"passages_from", name_of(remembered.origin)},
-      {"route", wanted.route ? ordered_json(*wanted.route) : ordered_json()},
+      {"route", or_null(wanted.route)},
       {"views", graph.size()},
       {"passages", graph.passages().size()},
       {"areas", planner.areas().nodes.size()},
@@ -173,11 +163,11 @@ ordered_json summary_json(const NavigateArguments& wanted, const Remembered& rem
       {"reason", reason_of(run.end)},
       {"looks", run.decisions.size()},
       {"closed_passages", planner.closed()},
-      {"start", as_json(start)},
-      {"pose", as_json(run.path.back())},
-      {"goal_distance_m", number_or_null(run.end_distance_m)},
+      {"start", pose_json(start)},
+      {"pose", pose_json(run.path.back())},
+      {"goal_distance_m", or_null(run.end_distance_m)},
       {"travelled_m", run.travelled_m},
-      {"shortest_m", number_or_null(run.shortest_m)},
+      {"shortest_m", or_null(run.shortest_m)},
       {"carried_after_look", run.carried_at ? ordered_json(*run.carried_at + 1) : ordered_json()}};
 }
 

@@ -1,8 +1,8 @@
 #include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "cli/arguments.hpp"
+#include "cli/json.hpp"
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
@@ -13,8 +13,6 @@
 namespace panonav::command {
 
 namespace {
-
-using nlohmann::ordered_json;
 
 struct PruneArguments {
   std::string memory;
@@ -98,11 +96,11 @@ Run declare(Arguments& arguments) {
 Verb prune_verb() {
   return {"prune", "Keep one view of places where views hardly change",
           "A view is dropped when a newer one that is kept differs from it by no more than\n"
-          "--most-difference and was taken near it. Says by how much the memory shrinks and how "
+          "--max-difference and was taken near it. Says by how much the memory shrinks and how "
           "far the\n"
           "reference that is found for a dropped view is from it, before and after.",
           "  panonav prune office.panonav --dry-run\n"
-          "  panonav prune office.panonav --most-difference 0.02\n"
+          "  panonav prune office.panonav --max-difference 0.02\n"
           "  panonav prune office.panonav --outdated-within-m 0.3",
           declare};
 }

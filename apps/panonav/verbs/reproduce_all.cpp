@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <nlohmann/json.hpp>
 #include <system_error>
 
+#include "cli/json.hpp"
 #include "cli/session.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/io/atomic_file.hpp"
@@ -16,7 +16,6 @@ namespace panonav::command {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::ordered_json;
 
 constexpr const char* results_file = "results.json";
 constexpr const char* run_file = "run.json";
@@ -26,11 +25,6 @@ constexpr std::size_t largest_file_bytes = 64 << 20;
 std::string text_of(const fs::path& path) {
   const auto bytes = read_file(path, largest_file_bytes);
   return {bytes.begin(), bytes.end()};
-}
-
-template <typename Value>
-ordered_json or_null(const std::optional<Value>& value) {
-  return value ? ordered_json(*value) : ordered_json(nullptr);
 }
 
 // What results depend on.

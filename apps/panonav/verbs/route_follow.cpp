@@ -1,7 +1,7 @@
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 
+#include "cli/json.hpp"
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
@@ -20,8 +20,6 @@ namespace panonav::command {
 
 namespace {
 
-using nlohmann::ordered_json;
-
 struct FollowArguments {
   std::string memory;
   std::string dataset;
@@ -34,13 +32,9 @@ struct FollowArguments {
   RouteFitOptions fit;
 };
 
-ordered_json as_json(const Pose2& pose) {
-  return {{"x_m", pose.x_m}, {"y_m", pose.y_m}, {"heading_rad", pose.heading_rad}};
-}
-
 ordered_json as_json(const FollowedImage& image, bool headings_known) {
   ordered_json json{{"file", image.file},
-                    {"stamp_s", image.stamp_s ? ordered_json(*image.stamp_s) : ordered_json()},
+                    {"stamp_s", or_null(image.stamp_s)},
                     {"on_route", image.fix.has_value()},
                     {"pose", nullptr},
                     {"origin", nullptr},
@@ -54,7 +48,7 @@ ordered_json as_json(const FollowedImage& image, bool headings_known) {
                     {"truth", nullptr}};
   if (image.fix) {
     const RouteFix& fix = image.fix->fix;
-    json["pose"] = as_json(fix.pose);
+    json["pose"] = pose_json(fix.pose);
     json["origin"] = name_of(image.fix->origin);
     json["along_m"] = image.fix->along_m;
     json["lateral_m"] = image.fix->lateral_m;

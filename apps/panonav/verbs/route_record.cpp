@@ -2,8 +2,8 @@
 #include <charconv>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 
+#include "cli/json.hpp"
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
@@ -179,15 +179,15 @@ ExitCode record(const Arguments& arguments, const RecordArguments& wanted, Sessi
   if (wanted.report) write_record_report(*wanted.report, wanted.name, recorded.route, bytes_per_km);
 #endif
   if (session.json()) {
-    session.print(nlohmann::ordered_json{{"memory", wanted.memory},
-                                         {"route", wanted.name},
-                                         {"appended", recorded.appended},
-                                         {"lines", recorded.route.size()},
-                                         {"columns", recorded.route.columns()},
-                                         {"length_m", length_m},
-                                         {"bytes", bytes},
-                                         {"bytes_per_km", bytes_per_km},
-                                         {"file_bytes", memory->info().file_bytes}}
+    session.print(ordered_json{{"memory", wanted.memory},
+                               {"route", wanted.name},
+                               {"appended", recorded.appended},
+                               {"lines", recorded.route.size()},
+                               {"columns", recorded.route.columns()},
+                               {"length_m", length_m},
+                               {"bytes", bytes},
+                               {"bytes_per_km", bytes_per_km},
+                               {"file_bytes", memory->info().file_bytes}}
                       .dump());
     return ExitCode::done;
   }

@@ -1,7 +1,7 @@
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 
+#include "cli/json.hpp"
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
@@ -108,10 +108,10 @@ ExitCode simulate(const Arguments& arguments, SimulateArguments wanted, Session&
                                       [&] { progress.advance(); });
   progress.clear();
   if (session.json()) {
-    session.print(nlohmann::ordered_json{{"dataset", wanted.out},
-                                         {"scene", world.scene().name},
-                                         {"views", dataset.entries.size()},
-                                         {"free_area_m2", world.free_space().area_m2()}}
+    session.print(ordered_json{{"dataset", wanted.out},
+                               {"scene", world.scene().name},
+                               {"views", dataset.entries.size()},
+                               {"free_area_m2", world.free_space().area_m2()}}
                       .dump());
   } else {
     session.print(session.strong(std::to_string(dataset.entries.size())) + " views of " +

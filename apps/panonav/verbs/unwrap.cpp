@@ -1,6 +1,6 @@
 #include <memory>
-#include <nlohmann/json.hpp>
 
+#include "cli/json.hpp"
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
@@ -34,9 +34,9 @@ ExitCode unwrap(const UnwrapArguments& wanted, Session& session) {
   const auto& band = panorama.elevations();
   const auto horizon = panorama.horizon_row();
   if (session.json()) {
-    nlohmann::ordered_json json{{"image", wanted.image},     {"out", wanted.out},
-                                {"rows", panorama.rows()},   {"columns", panorama.columns()},
-                                {"elevations_rad", nullptr}, {"horizon_row", nullptr}};
+    ordered_json json{{"image", wanted.image},     {"out", wanted.out},
+                      {"rows", panorama.rows()},   {"columns", panorama.columns()},
+                      {"elevations_rad", nullptr}, {"horizon_row", nullptr}};
     if (band) json["elevations_rad"] = {band->bottom_rad, band->top_rad};
     if (horizon) json["horizon_row"] = *horizon;
     session.print(json.dump());

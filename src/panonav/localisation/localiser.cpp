@@ -45,7 +45,7 @@ std::optional<double> absolute_heading(const VisualMemory& memory,
     if (!centre_rad) centre_rad = heading_rad;
     const double offset = angle_difference(heading_rad, *centre_rad);
     if (std::abs(offset) > agreement_rad) continue;
-    const double weight = std::pow(std::max(least_difference, match.difference), -4.0);
+    const double weight = std::pow(std::max(least_difference, match.column_difference), -4.0);
     sum += weight * offset;
     weights += weight;
   }

@@ -19,7 +19,7 @@ namespace panonav {
 struct LocalisedMatch {
   ViewId view;
   std::uint32_t dissimilarity = 0;  ///< integer L1 over packed magnitudes, as the search gives it
-  double difference = 0.0;          ///< column by column, after turning (`ColumnMatch`)
+  double column_difference = 0.0;   ///< column by column, after turning (`ColumnMatch`)
   /// Heading of the query relative to this view; empty when one of them has no structure.
   std::optional<CompassReading> compass;
 };

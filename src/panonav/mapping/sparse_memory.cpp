@@ -99,8 +99,9 @@ class Pairs {
 void visit_options(SparseMemoryOptions& options, OptionVisitor& visitor) {
   using T = SparseMemoryOptions;
   constexpr OptionTable table{
-      option<&T::most_difference>("a view is redundant when one that is kept differs by no more", 0,
-                                  1),
+      option<&T::max_difference>("a view is redundant when one that is kept differs by no more", 0,
+                                 1)
+          .formerly("most_difference"),
       option<&T::reach_m>("only a view so near stands for another, where positions are known",
                           above(0), 1e6),
       option<&T::reach_links>("only a view so many links away, where they are not", 0, 1000),
@@ -127,7 +128,7 @@ SparseSelection select_references(const VisualMemory& memory, const SparseMemory
       const double difference = image_difference(found->second, seen);
       const bool outdated = distance_m && *distance_m < options.outdated_within_m;
       const bool alike =
-          difference <= options.most_difference && (!distance_m || *distance_m <= options.reach_m);
+          difference <= options.max_difference && (!distance_m || *distance_m <= options.reach_m);
       if (!outdated && !alike) return;
       if (best && best->difference <= difference) return;
       best = RedundantView{view, other, difference, !alike};

@@ -15,7 +15,7 @@ namespace panonav {
 struct SparseMemoryOptions {
   /// A view is redundant when one that is kept differs from it by no more (`image_difference`,
   /// 0 .. 1).
-  double most_difference = 0.1;
+  double max_difference = 0.1;
   /// Only a view so near stands for another, where positions are known: far places may look alike.
   double reach_m = 1.0;
   /// Where they are not known: only a view so many links away.
@@ -43,7 +43,7 @@ struct SparseSelection {
 
 /// Places where views hardly change keep one reference. Views are looked at from the newest to the
 /// oldest; each is kept unless a view kept before stands for it. So every dropped view is within
-/// `most_difference` of one that is kept, or outdated. Throws OptionError. Cost: one comparison,
+/// `max_difference` of one that is kept, or outdated. Throws OptionError. Cost: one comparison,
 /// about 5 microseconds, for each pair of a view and a kept one in reach.
 [[nodiscard]] SparseSelection select_references(const VisualMemory& memory,
                                                 const SparseMemoryOptions& options = {});

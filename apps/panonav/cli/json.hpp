@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "panonav/geometry/pose2.hpp"
+
+namespace panonav::command {
+
+using nlohmann::ordered_json;
+
+/// null where there is no value.
+template <class Value>
+[[nodiscard]] ordered_json or_null(const std::optional<Value>& value) {
+  return value ? ordered_json(*value) : ordered_json();
+}
+/// null where the number is not finite.
+[[nodiscard]] inline ordered_json or_null(double value) {
+  return std::isfinite(value) ? ordered_json(value) : ordered_json();
+}
+
+[[nodiscard]] inline ordered_json pose_json(const Pose2& pose) {
+  return {{"x_m", pose.x_m}, {"y_m", pose.y_m}, {"heading_rad", pose.heading_rad}};
+}
+
+/// A line of JSON with the names of keys that the last version gave them (`--former-keys`).
+[[nodiscard]] std::string with_former_keys(std::string_view line);
+
+}  // namespace panonav::command
