@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "assets.hpp"
 #include "cli/session.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/io/atomic_file.hpp"
@@ -9,31 +10,6 @@
 namespace panonav::command {
 
 namespace {
-
-constexpr std::string_view style = R"(
-:root { color-scheme: light dark; --line: #8884; --soft: #8881; --accent: #1f6fb4; }
-@media (prefers-color-scheme: dark) { :root { --accent: #6db3f2; } }
-body { font: 16px/1.5 system-ui, sans-serif; margin: 0 auto; max-width: 68rem; padding: 1rem 1.5rem 4rem; }
-h1 { font-size: 1.9rem; margin: 1.5rem 0 .3rem; }
-h2 { font-size: 1.3rem; margin: 2.5rem 0 .5rem; padding-top: .8rem; border-top: 1px solid var(--line); }
-p { max-width: 48rem; }
-.lead { font-size: 1.1rem; }
-.link { font-size: 1.1rem; font-weight: 600; }
-.figures { display: flex; flex-wrap: wrap; gap: 1rem; margin: 1.2rem 0; }
-.figures div { background: var(--soft); border-radius: .5rem; padding: .7rem 1.1rem; min-width: 8rem; }
-.figures b { display: block; font-size: 1.5rem; color: var(--accent); }
-.figures a { background: var(--soft); border-radius: .5rem; padding: .7rem 1.1rem; flex: 1 1 11rem; color: inherit; text-decoration: none; }
-.figures a:hover { outline: 2px solid var(--accent); }
-.figures small { display: block; font-weight: 600; }
-.pictures { display: flex; flex-wrap: wrap; gap: 1.2rem; }
-figure { margin: .8rem 0; flex: 1 1 22rem; max-width: 100%; }
-figure img { width: 100%; max-width: 60rem; border: 1px solid var(--line); border-radius: .3rem; background: #fff; }
-figcaption { font-size: .92rem; opacity: .85; }
-table { border-collapse: collapse; margin: 1rem 0; display: block; overflow-x: auto; }
-th, td { text-align: left; padding: .3rem .8rem; border-bottom: 1px solid var(--line); }
-td:not(:first-child) { white-space: nowrap; }
-pre { background: var(--soft); border-radius: .5rem; padding: .8rem 1rem; overflow-x: auto; }
-)";
 
 std::string escaped(std::string_view text) {
   std::string result;
@@ -152,8 +128,8 @@ void ReportPage::commands(const std::vector<std::string>& command_lines) {
 void ReportPage::write(const std::filesystem::path& folder) const {
   std::string page = "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
   page += "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n";
-  page += element("title", title_) + "\n<style>";
-  page.append(style)
+  page += element("title", title_) + "\n<style>\n";
+  page.append(assets::report_css)
       .append("</style>\n</head>\n<body>\n")
       .append(element("h1", title_))
       .append("\n<p class=\"lead\">" + escaped(lead_) + "</p>\n");

@@ -5,8 +5,8 @@
 #include <string>
 #include <string_view>
 
+#include "assets.hpp"
 #include "panonav/io/atomic_file.hpp"
-#include "reports/track_player.hpp"
 
 namespace panonav::command {
 
@@ -63,6 +63,10 @@ std::string script_text(const ordered_json& json) {
   return safe;
 }
 
+void fill(std::string& page, std::string_view place, std::string_view text) {
+  page.replace(page.find(place), place.size(), text);
+}
+
 }  // namespace
 
 void write_track_animation(const std::filesystem::path& path, const VisualMemory& memory,
@@ -78,9 +82,10 @@ void write_track_animation(const std::filesystem::path& path, const VisualMemory
   const ordered_json run{{"spacing", rounded(spacing_m)},
                          {"references", std::move(references)},
                          {"images", std::move(played)}};
-  std::string page(track_player_head);
-  page.append("<script>\nconst run = ").append(script_text(run)).append(";\n");
-  page.append(track_player_script).append("</script>\n</body>\n</html>\n");
+  std::string page(assets::track_player_html);
+  fill(page, "{{style}}", assets::track_player_css);
+  fill(page, "{{script}}", assets::track_player_js);
+  fill(page, "{{run}}", script_text(run));
   write_file(path, std::string_view(page));
 }
 

@@ -1,50 +1,3 @@
-#pragma once
-
-#include <string_view>
-
-namespace panonav::command {
-
-/// The page that plays a run, up to its script element. The script draws what `run` holds.
-inline constexpr std::string_view track_player_head = R"(<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>panonav track: the run, image by image</title>
-<style>
-:root { color-scheme: light dark; }
-body { font: 16px/1.5 system-ui, sans-serif; margin: 0 auto; max-width: 62rem; padding: 1rem 1.5rem 3rem; }
-h1 { font-size: 1.5rem; margin: .5rem 0; }
-canvas { width: 100%; background: #fff; border: 1px solid #8884; border-radius: .3rem; display: block; }
-.controls { display: flex; gap: .8rem; align-items: center; margin: .8rem 0; flex-wrap: wrap; }
-.controls input[type=range] { flex: 1 1 16rem; }
-button, select { font: inherit; padding: .2rem .8rem; }
-#state { font-weight: 700; padding: .1rem .6rem; border-radius: .3rem; color: #fff; }
-#said { margin: .3rem 0; min-height: 1.6em; font-variant-numeric: tabular-nums; }
-.legend { display: flex; flex-wrap: wrap; gap: .3rem 1.4rem; font-size: .92rem; margin-top: .6rem; }
-.legend svg { vertical-align: -2px; margin-right: .35rem; background: #fff; }
-</style>
-</head>
-<body>
-<h1>The run, image by image</h1>
-<p id="said"><span id="state"></span> <span id="text"></span></p>
-<canvas id="map"></canvas>
-<div class="controls">
-<button id="play">Play</button>
-<input id="slider" type="range" min="0" value="0" aria-label="image">
-<label>speed <select id="speed"><option value="1000">1 image/s</option>
-<option value="400" selected>2.5 images/s</option><option value="100">10 images/s</option></select></label>
-</div>
-<div class="legend">
-<span><svg width="14" height="14"><circle cx="7" cy="7" r="4" fill="none" stroke="#999"/></svg>remembered views</span>
-<span><svg width="14" height="14"><circle cx="7" cy="7" r="2.5" fill="#e0201b"/></svg>particles: where the robot may be</span>
-<span><svg width="14" height="14"><rect x="2" y="2" width="10" height="10"/></svg>estimate, with its heading (hollow: a guess among several)</span>
-<span><svg width="20" height="14"><path d="M0 7H20" stroke="#000" stroke-width="2"/></svg>estimated path</span>
-<span id="truth-legend"><svg width="20" height="14"><path d="M0 7H20" stroke="#1f5fd0" stroke-width="2"/></svg>true path; ring: true place</span>
-</div>
-)";
-
-inline constexpr std::string_view track_player_script = R"JS(
 const canvas = document.getElementById('map'), context = canvas.getContext('2d');
 const slider = document.getElementById('slider'), button = document.getElementById('play');
 const images = run.images;
@@ -163,6 +116,3 @@ window.onresize = () => { fit(); draw(); };
 if (!images.some(image => image.truth)) document.getElementById('truth-legend').remove();
 fit();
 draw();
-)JS";
-
-}  // namespace panonav::command
