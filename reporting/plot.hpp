@@ -19,6 +19,16 @@ struct Series {
   SeriesStyle style = SeriesStyle::lines_and_points;
   std::vector<double> y_low;  ///< with y_high: error bars; empty for none
   std::vector<double> y_high;
+
+  void add(double at, double value) {
+    x.push_back(at);
+    y.push_back(value);
+  }
+  void add(double at, double value, double low, double high) {
+    add(at, value);
+    y_low.push_back(low);
+    y_high.push_back(high);
+  }
 };
 
 /// Curves over one axis. Labels carry their units: "distance [m]".

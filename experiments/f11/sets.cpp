@@ -89,8 +89,7 @@ void plot_grid(const Grid& grid, const std::string& title, const std::filesystem
   for (const int k2 : k2_values) {
     Series series{.label = "k2 = " + std::to_string(k2), .x = {}, .y = {}};
     for (const int k1 : k1_values) {
-      series.x.push_back(k1);
-      series.y.push_back(median(grid.at({k1, k2})));
+      series.add(k1, median(grid.at({k1, k2})));
     }
     plot.series.push_back(std::move(series));
   }

@@ -260,8 +260,7 @@ void measure_step_time(const MappingReproductionOptions& options, Executor& exec
       static_cast<void>(steps.add(OdometryView(std::move(signature))));
       taken_us.push_back(microseconds_since(start));
     }
-    times.x.push_back(count);
-    times.y.push_back(1e-3 * median(taken_us));
+    times.add(count, 1e-3 * median(taken_us));
     report(result, "f11.time.components_" + std::to_string(count),
            "from signature to pose with " + std::to_string(count) + " components", times.y.back(),
            "ms");

@@ -83,10 +83,7 @@ SingleImages sum_of(std::span<const RunSet> sets) {
 
 void add_point(Series& series, double x, std::size_t successes, std::size_t trials) {
   const Proportion rate = success_rate(successes, trials);
-  series.x.push_back(x);
-  series.y.push_back(rate.value);
-  series.y_low.push_back(rate.low);
-  series.y_high.push_back(rate.high);
+  series.add(x, rate.value, rate.low, rate.high);
 }
 
 }  // namespace
@@ -126,10 +123,7 @@ void reproduce_garden(const TrackingReproductionOptions& options, Executor& exec
     add_point(first, lights[l], localised_within(runs, garden_spacing_m, 1), runs.size());
     const auto counts = capped_images(runs, garden_spacing_m);
     const auto interval = mean_interval(counts, 1);
-    needed.x.push_back(lights[l]);
-    needed.y.push_back(mean(counts));
-    needed.y_low.push_back(interval.first);
-    needed.y_high.push_back(interval.second);
+    needed.add(lights[l], mean(counts), interval.first, interval.second);
   }
   (void)rows("light_changing", "light that changes at each image between 0.50 and 2.00",
              gardens.changing);

@@ -236,10 +236,8 @@ Series error_over_images(const std::string& label, std::span<const TrackedRun> r
   for (std::size_t n = 1; n <= images; ++n) {
     const auto errors = errors_after(runs, n, first_step);
     if (errors.empty()) break;
-    series.x.push_back(static_cast<double>(n));
-    series.y.push_back(median(errors));
-    series.y_low.push_back(quantile(errors, 0.05));
-    series.y_high.push_back(quantile(errors, 0.95));
+    series.add(static_cast<double>(n), median(errors), quantile(errors, 0.05),
+               quantile(errors, 0.95));
   }
   return series;
 }

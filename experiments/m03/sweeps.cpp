@@ -20,16 +20,10 @@ struct Curve {
 
 void add_point(Curve& curve, double x, std::span<const TrackedRun> runs) {
   const Proportion rate = success_rate(localised_within(runs, m03_spacing_m, 10), runs.size());
-  curve.success.x.push_back(x);
-  curve.success.y.push_back(rate.value);
-  curve.success.y_low.push_back(rate.low);
-  curve.success.y_high.push_back(rate.high);
+  curve.success.add(x, rate.value, rate.low, rate.high);
   const auto images = capped_images(runs, m03_spacing_m);
   const auto interval = mean_interval(images, 1);
-  curve.images.x.push_back(x);
-  curve.images.y.push_back(mean(images));
-  curve.images.y_low.push_back(interval.first);
-  curve.images.y_high.push_back(interval.second);
+  curve.images.add(x, mean(images), interval.first, interval.second);
 }
 
 void add_rows(Reproduction& result, const std::string& id, const std::string& what,

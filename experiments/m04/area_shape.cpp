@@ -339,10 +339,7 @@ class AreaShape final : public Experiment {
       }
       if (values.empty()) continue;
       const auto interval = mean_interval(values, 1);
-      series.x.push_back(static_cast<double>(t + 1));
-      series.y.push_back(mean(values));
-      series.y_low.push_back(interval.first);
-      series.y_high.push_back(interval.second);
+      series.add(static_cast<double>(t + 1), mean(values), interval.first, interval.second);
     }
     return series;
   }

@@ -250,8 +250,7 @@ class Discrimination final : public Experiment {
       Series line{.label = text(c) + " components"};
       for (std::size_t i = 0; i < place.references.size(); ++i) {
         if (std::abs(place.references[i].pose.y_m - row_y_m) < 1e-6) {
-          line.x.push_back(place.references[i].pose.x_m);
-          line.y.push_back(scaled[i]);
+          line.add(place.references[i].pose.x_m, scaled[i]);
         }
       }
       profile_.push_back(std::move(line));
@@ -284,10 +283,8 @@ class Discrimination final : public Experiment {
       for (std::size_t c = 0; c < kCounts; ++c) {
         const Proportion found = success_rate(found_[condition][c], trials_);
         // Moved a little apart, so that error bars do not hide each other.
-        line.x.push_back(kComponents[c] * (1.0 + 0.03 * static_cast<double>(condition)));
-        line.y.push_back(found.value);
-        line.y_low.push_back(found.low);
-        line.y_high.push_back(found.high);
+        line.add(kComponents[c] * (1.0 + 0.03 * static_cast<double>(condition)), found.value,
+                 found.low, found.high);
       }
       rates.series.push_back(std::move(line));
     }

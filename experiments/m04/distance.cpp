@@ -130,8 +130,7 @@ class DistanceCurve final : public Experiment {
         Series one{.label = "pair " + std::to_string(single_.size() + 1),
                    .style = SeriesStyle::lines};
         for (std::size_t j = 0; j < views.size(); ++j) {
-          one.x.push_back(distance_of(j));
-          one.y.push_back(dissimilarity_l1(views[0], j == 0 ? again[0] : views[j]));
+          one.add(distance_of(j), dissimilarity_l1(views[0], j == 0 ? again[0] : views[j]));
         }
         single_.push_back(std::move(one));
       }
@@ -172,10 +171,7 @@ class DistanceCurve final : public Experiment {
       std::vector<double> here;
       for (const Curve& curve : curves_) here.push_back(curve[bin]);
       const auto interval = mean_interval(here, 1);
-      average.x.push_back(distance_of(bin));
-      average.y.push_back(mean(here));
-      average.y_low.push_back(interval.first);
-      average.y_high.push_back(interval.second);
+      average.add(distance_of(bin), mean(here), interval.first, interval.second);
     }
     LinePlot plot{.title = "Dissimilarity against distance ([M04] figure 7)",
                   .x_label = "distance between the views [m]",

@@ -98,10 +98,8 @@ class HierarchicalAreas final : public Experiment {
                    .series = {Series{.label = "median of all queries"}}};
     for (std::size_t m = 0; m < kLevels; ++m) {
       const auto interval = median_interval(areas_m2_[m], 1);
-      curve.series[0].x.push_back(static_cast<double>(m + 1));
-      curve.series[0].y.push_back(median(areas_m2_[m]));
-      curve.series[0].y_low.push_back(interval.first);
-      curve.series[0].y_high.push_back(interval.second);
+      curve.series[0].add(static_cast<double>(m + 1), median(areas_m2_[m]), interval.first,
+                          interval.second);
     }
     write_plot(folder / "fig09_area_curve.png", curve);
     result.pictures.push_back(

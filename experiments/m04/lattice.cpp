@@ -250,10 +250,8 @@ class LatticeExperiment {
     Series error{.label = "error E(x)", .style = SeriesStyle::lines_and_points};
     Series stiffness{.label = "stiffness K(x) (eq. 5)", .style = SeriesStyle::lines_and_points};
     for (const auto& knot : curve.knots()) {
-      error.x.push_back(knot.distance);
-      error.y.push_back(knot.error);
-      stiffness.x.push_back(knot.distance);
-      stiffness.y.push_back(curve.stiffness(knot.distance));
+      error.add(knot.distance, knot.error);
+      stiffness.add(knot.distance, curve.stiffness(knot.distance));
     }
     write_plot(options_.out / "fig12_error_stiffness.png",
                LinePlot{.title = "Error of the distance read from dissimilarity, and what it makes "

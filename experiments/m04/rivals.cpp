@@ -112,10 +112,8 @@ class Rivals final : public Experiment {
       for (std::size_t r = 0; r < kRivals; ++r) {
         const Proportion exact = success_rate(found_[condition][r], trials_);
         const Proportion near = success_rate(near_[condition][r], trials_);
-        marks.x.push_back(static_cast<double>(r) + 0.12 * (static_cast<double>(condition) - 1.5));
-        marks.y.push_back(exact.value);
-        marks.y_low.push_back(exact.low);
-        marks.y_high.push_back(exact.high);
+        marks.add(static_cast<double>(r) + 0.12 * (static_cast<double>(condition) - 1.5),
+                  exact.value, exact.low, exact.high);
         const std::string& name = conditions[condition].name;
         add_row(r, conditions[condition].id + ".found", "nearest reference found, " + name,
                 exact.value, "", interval_of(exact), result);

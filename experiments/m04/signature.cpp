@@ -156,11 +156,8 @@ class PowerSpectrum final : public Experiment {
     Series single{.label = "one view", .style = SeriesStyle::lines_and_points};
     Series average{.label = "mean of " + std::to_string(shares_.size()) + " views"};
     for (int k = 1; k <= kShown; ++k) {
-      single.x.push_back(k);
-      single.y.push_back(one_[static_cast<std::size_t>(k)]);
-      average.x.push_back(k);
-      average.y.push_back(total_[static_cast<std::size_t>(k)] /
-                          static_cast<double>(shares_.size()));
+      single.add(k, one_[static_cast<std::size_t>(k)]);
+      average.add(k, total_[static_cast<std::size_t>(k)] / static_cast<double>(shares_.size()));
     }
     plot.series = {single, average};
     write_plot(folder / "fig05_power_spectrum.png", plot);

@@ -39,10 +39,7 @@ class WeightsOfComponents final : public Experiment {
     Series line{.label = "mean of " + std::to_string(margins_[equal].size()) + " scenes"};
     for (std::size_t k = 0; k < weights_.size(); ++k) {
       const auto interval = mean_interval(weights_[k], 1);
-      line.x.push_back(static_cast<double>(k));
-      line.y.push_back(mean(weights_[k]));
-      line.y_low.push_back(interval.first);
-      line.y_high.push_back(interval.second);
+      line.add(static_cast<double>(k), mean(weights_[k]), interval.first, interval.second);
     }
     const Series ones{.label = "equal weights",
                       .x = {0.0, static_cast<double>(weights_.size() - 1)},

@@ -158,8 +158,7 @@ Series transect(const Arena& arena, Point2 goal, const std::vector<double>& diff
   std::ranges::sort(points);
   Series series{.label = label};
   for (const auto& [x, y] : points) {
-    series.x.push_back(x);
-    series.y.push_back(y);
+    series.add(x, y);
   }
   return series;
 }

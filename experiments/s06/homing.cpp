@@ -15,8 +15,7 @@ Series homeward_series(const std::string& label, const HomingSurvey& survey, dou
   Series series{.label = label};
   for (const HomewardBin& bin : homeward_by_distance(survey, spacing_m)) {
     if (bin.pairs < 20 || bin.distance_m > 0.8) continue;
-    series.x.push_back(bin.distance_m);
-    series.y.push_back(bin.component);
+    series.add(bin.distance_m, bin.component);
   }
   return series;
 }
@@ -110,8 +109,7 @@ Series no_run(const HomingSurvey& survey) {
         places += distance(goal.position(), place.position()) <= accepted + 1e-9 ? 1.0 : 0.0;
       }
     }
-    series.x.push_back(accepted);
-    series.y.push_back(places / static_cast<double>(survey.goals.size()));
+    series.add(accepted, places / static_cast<double>(survey.goals.size()));
   }
   return series;
 }
@@ -156,10 +154,10 @@ void draw_iterations(ArenaSurveys& surveys, const std::filesystem::path& folder,
           survey_arena(surveys.arena(), published_homing(highest, solutions - 1), executor,
                        4 * surveys.goals_every());
       const HomingSurvey* const stage = &survey;
-      series.x.push_back(solutions);
-      series.y.push_back(mean_catchment_areas(
-          final_distances({&stage, 1}, survey_options(surveys.arena()), executor),
-          survey.goals.size(), accepted)[0]);
+      series.add(solutions,
+                 mean_catchment_areas(
+                     final_distances({&stage, 1}, survey_options(surveys.arena()), executor),
+                     survey.goals.size(), accepted)[0]);
     }
     plot.series.push_back(std::move(series));
   }

@@ -76,8 +76,7 @@ void draw_correlation(const Arena& arena, const std::filesystem::path& folder,
       for (int other = 1; k > 0 && other <= top; ++other) {
         if (other != k) one.real[other] = one.imaginary[other] = 0.0F;
       }
-      series.x.push_back(step);
-      series.y.push_back(static_cast<double>(one.at(static_cast<float>(turn_rad))) / most);
+      series.add(step, static_cast<double>(one.at(static_cast<float>(turn_rad))) / most);
     }
     terms.series.push_back(std::move(series));
   }
@@ -94,8 +93,7 @@ void draw_correlation(const Arena& arena, const std::filesystem::path& folder,
   for (int highest = 1; highest <= 20; ++highest) {
     std::array<float, 1> turn{};
     if (highest_turns(correlation_of(home, current, highest), turn) == 0) continue;
-    series.x.push_back(highest);
-    series.y.push_back(degrees(angle_difference(static_cast<double>(turn[0]), truth)));
+    series.add(highest, degrees(angle_difference(static_cast<double>(turn[0]), truth)));
   }
   maxima.series.push_back(std::move(series));
   write_plot(folder / "figure_03_maximum.png", maxima);
@@ -123,8 +121,7 @@ void draw_spectrum(const Arena& arena, const std::filesystem::path& folder, Repr
     double square = 0.0;
     for (const double power : powers) square += (power - mean_power) * (power - mean_power);
     const double deviation = std::sqrt(square / static_cast<double>(powers.size()));
-    series.x.push_back(k);
-    series.y.push_back(mean_power);
+    series.add(k, mean_power);
     // On an axis of logarithms a bar cannot reach 0.
     series.y_low.push_back(std::max(mean_power - deviation, 0.1 * mean_power));
     series.y_high.push_back(mean_power + deviation);
@@ -149,8 +146,7 @@ void draw_spectrum(const Arena& arena, const std::filesystem::path& folder, Repr
   Series line{.label = "slope " + std::to_string(std::round(100.0 * slope) / 100.0).substr(0, 4),
               .style = SeriesStyle::lines};
   for (int k = 1; k <= top; ++k) {
-    line.x.push_back(k);
-    line.y.push_back(std::exp(mean_log - slope * (std::log(k) - mean_k)));
+    line.add(k, std::exp(mean_log - slope * (std::log(k) - mean_k)));
   }
   series.label = "mean and standard deviation";
   write_plot(folder / "figure_06_spectrum.png",
@@ -266,10 +262,8 @@ void draw_changes(const Arena& arena, const std::filesystem::path& folder, Execu
       if (pairs[i] < 100.0) continue;
       const double x = static_cast<double>(i) * arena.options.spacing_m;
       if (x > 1.0) break;
-      change.x.push_back(x);
-      change.y.push_back(sums[s].first[i] / pairs[i]);
-      phase.x.push_back(x);
-      phase.y.push_back(sums[s].second[i] / pairs[i]);
+      change.add(x, sums[s].first[i] / pairs[i]);
+      phase.add(x, sums[s].second[i] / pairs[i]);
     }
     changes.series.push_back(std::move(change));
     if (s < shown.size()) phases.series.push_back(std::move(phase));
@@ -352,8 +346,7 @@ void draw_headings(const Arena& arena, const std::filesystem::path& folder, Exec
       if (pairs[i] < 100.0) continue;
       const double x = static_cast<double>(i) * arena.options.spacing_m;
       if (x > 0.6) break;
-      series.x.push_back(x);
-      series.y.push_back(deviation(s < shown.size() ? sums[s] : whole[0], i));
+      series.add(x, deviation(s < shown.size() ? sums[s] : whole[0], i));
     }
     plot.series.push_back(std::move(series));
   }

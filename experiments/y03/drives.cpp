@@ -173,10 +173,7 @@ Series error_series(const std::string& label, const std::vector<double>& x,
   Series series{.label = label};
   for (std::size_t i = 0; i < x.size(); ++i) {
     const auto interval = mean_interval(means_cm[i], seed);
-    series.x.push_back(x[i]);
-    series.y.push_back(mean(means_cm[i]));
-    series.y_low.push_back(interval.first);
-    series.y_high.push_back(interval.second);
+    series.add(x[i], mean(means_cm[i]), interval.first, interval.second);
   }
   return series;
 }

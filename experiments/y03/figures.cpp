@@ -112,11 +112,9 @@ void draw_virtual_view(const LabRoute& lab, const LineDrive& beside,
   for (std::size_t i = 0; i < columns; ++i) {
     const std::size_t c = shown_column(i, columns);
     const double azimuth = 180.0 - 360.0 * static_cast<double>(i) / static_cast<double>(columns);
-    truth.x.push_back(azimuth);
-    truth.y.push_back(static_cast<double>(beside.lines[middle][c]));
+    truth.add(azimuth, static_cast<double>(beside.lines[middle][c]));
     if (!std::isfinite(shown[c])) continue;
-    made.x.push_back(azimuth);
-    made.y.push_back(static_cast<double>(shown[c]));
+    made.add(azimuth, static_cast<double>(shown[c]));
   }
   write_plot(folder / "figure_05_lines.png",
              LinePlot{.title = "The horizon " + where,
@@ -153,8 +151,7 @@ void draw_drives(const LabRoute& lab, const LocalisedDrives& drives,
   const auto series = [](const std::string& label, const DriveErrors& errors) {
     Series line{.label = label, .style = SeriesStyle::lines};
     for (std::size_t i = 0; i < errors.position_m.size(); ++i) {
-      line.x.push_back(static_cast<double>(i));
-      line.y.push_back(100.0 * errors.position_m[i]);
+      line.add(static_cast<double>(i), 100.0 * errors.position_m[i]);
     }
     return line;
   };

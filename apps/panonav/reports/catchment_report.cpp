@@ -54,10 +54,8 @@ void draw_curves(const CatchmentResult& result, const fs::path& folder) {
   Series orientation{.label = "", .style = SeriesStyle::lines_and_points};
   for (const CatchmentBin& bin : result.bins) {
     if (bin.homeward.distance_m <= 0.0) continue;
-    homeward.x.push_back(bin.homeward.distance_m);
-    homeward.y.push_back(bin.homeward.component);
-    orientation.x.push_back(bin.homeward.distance_m);
-    orientation.y.push_back(degrees(bin.orientation_error_rad));
+    homeward.add(bin.homeward.distance_m, bin.homeward.component);
+    orientation.add(bin.homeward.distance_m, degrees(bin.orientation_error_rad));
   }
   write_plot(folder / homeward_file, LinePlot{.title = "Average homeward component",
                                               .x_label = "distance from home [m]",
@@ -72,8 +70,7 @@ void draw_curves(const CatchmentResult& result, const fs::path& folder) {
   Series areas{.label = "", .style = SeriesStyle::lines_and_points};
   const auto places = static_cast<double>(result.survey.places.size());
   for (std::size_t i = 0; i < result.areas.size(); ++i) {
-    areas.x.push_back(result.accepted_m[i]);
-    areas.y.push_back(100.0 * result.areas[i] / places);
+    areas.add(result.accepted_m[i], 100.0 * result.areas[i] / places);
   }
   write_plot(folder / "areas.png", LinePlot{.title = "Mean catchment area",
                                             .x_label = "accepted distance from home [m]",

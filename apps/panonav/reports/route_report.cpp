@@ -144,14 +144,11 @@ void draw_errors(const fs::path& path, const std::vector<FollowedImage>& images)
     const FollowedImage& image = images[i];
     const auto number = static_cast<double>(i + 1);
     if (!image.fix) {
-      lost.x.push_back(number);
-      lost.y.push_back(0.0);
+      lost.add(number, 0.0);
     } else if (image.truth) {
-      position.x.push_back(number);
-      position.y.push_back(100.0 *
-                           distance(image.fix->fix.pose.position(), image.truth->position()));
-      along.x.push_back(number);
-      along.y.push_back(100.0 * std::abs(image.fix->along_m - image.true_place->along_m));
+      position.add(number,
+                   100.0 * distance(image.fix->fix.pose.position(), image.truth->position()));
+      along.add(number, 100.0 * std::abs(image.fix->along_m - image.true_place->along_m));
     }
   }
   write_plot(path, LinePlot{.title = "How far off",
@@ -164,8 +161,7 @@ void draw_correlations(const fs::path& path, const std::vector<FollowedImage>& i
   Series correlation{.label = "of seen and shown line", .style = SeriesStyle::lines_and_points};
   for (std::size_t i = 0; i < images.size(); ++i) {
     if (!images[i].fix) continue;
-    correlation.x.push_back(static_cast<double>(i + 1));
-    correlation.y.push_back(images[i].fix->fix.correlation);
+    correlation.add(static_cast<double>(i + 1), images[i].fix->fix.correlation);
   }
   write_plot(path, LinePlot{.title = "How well the route explains the pictures",
                             .x_label = "picture",

@@ -54,15 +54,12 @@ void draw_errors(const std::vector<TrackedImage>& images, double spacing_m, cons
   for (std::size_t i = 0; i < images.size(); ++i) {
     const TrackedImage& image = images[i];
     const auto x = static_cast<double>(i + 1);
-    spread.x.push_back(x);
-    spread.y.push_back(image.estimate.spread_m);
+    spread.add(x, image.estimate.spread_m);
     if (image.estimate.state == LocalisationState::lost) {
-      lost.x.push_back(x);
-      lost.y.push_back(image.estimate.spread_m);
+      lost.add(x, image.estimate.spread_m);
     } else if (const auto error = position_error_m(image)) {
       Series& series = is_localised(image) ? localised : guessed;
-      series.x.push_back(x);
-      series.y.push_back(*error);
+      series.add(x, *error);
     }
   }
   spacing.x = {1.0, static_cast<double>(images.size())};
@@ -81,8 +78,7 @@ void draw_particles(const std::vector<TrackedImage>& images, const fs::path& pat
   for (std::size_t i = 0; i < images.size(); ++i) {
     const MonteCarloEstimate& estimate = images[i].estimate;
     const auto add = [&](Series& series, double value) {
-      series.x.push_back(static_cast<double>(i + 1));
-      series.y.push_back(value);
+      series.add(static_cast<double>(i + 1), value);
     };
     add(all, estimate.particles);
     add(effective, estimate.effective_particles);
