@@ -1,6 +1,7 @@
 #include "panonav/kernels/column_match.hpp"
 
 #include "panonav/core/error.hpp"
+#include "panonav/kernels/internal/bodies.hpp"
 
 namespace panonav::kernels {
 
@@ -15,22 +16,9 @@ void match_columns(std::span<const std::uint8_t> query, std::span<const std::uin
           static_cast<double>(reference.size()), "2048");
   require(costs.size() == static_cast<std::size_t>(matched_reference_columns), "turns",
           static_cast<double>(costs.size()), "128");
-  switch (instructions) {
-#ifdef PANONAV_HAS_AVX2
-    case Instructions::avx2:
-      return avx2::match_columns(query.data(), reference.data(), costs.data());
-#endif
-#ifdef PANONAV_HAS_AVX512
-    case Instructions::avx512:
-      return avx512::match_columns(query.data(), reference.data(), costs.data());
-#endif
-#ifdef PANONAV_HAS_NEON
-    case Instructions::neon:
-      return neon::match_columns(query.data(), reference.data(), costs.data());
-#endif
-    default:
-      return scalar::match_columns(query.data(), reference.data(), costs.data());
-  }
+  with_body<ColumnMatchBody>(instructions, [&](auto body) {
+    body.match_columns(query.data(), reference.data(), costs.data());
+  });
 }
 
 }  // namespace panonav::kernels

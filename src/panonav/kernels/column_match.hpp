@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <span>
 
-#include "panonav/kernels/column_match_targets.hpp"
 #include "panonav/kernels/dispatch.hpp"
 
 namespace panonav::kernels {

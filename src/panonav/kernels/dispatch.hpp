@@ -3,11 +3,9 @@
 #include <span>
 #include <string_view>
 
-namespace panonav::kernels {
+#include "panonav/kernels/types.hpp"
 
-/// Instruction sets for which kernels have bodies. `avx2` means AVX2 and FMA; `avx512` means F, BW,
-/// DQ and VL.
-enum class Instructions { scalar, avx2, avx512, neon };
+namespace panonav::kernels {
 
 /// "scalar", "avx2", "avx512" or "neon".
 [[nodiscard]] std::string_view name(Instructions instructions) noexcept;

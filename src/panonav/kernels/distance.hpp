@@ -1,7 +1,6 @@
 #pragma once
 
 #include "panonav/kernels/dispatch.hpp"
-#include "panonav/kernels/distance_targets.hpp"
 
 namespace panonav::kernels {
 

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "panonav/core/error.hpp"
-#include "panonav/kernels/row_transform_targets.hpp"
+#include "panonav/kernels/internal/bodies.hpp"
 
 namespace panonav::kernels {
 
@@ -61,22 +61,7 @@ void RowTransform::operator()(std::span<const float> values, std::span<float> re
   const RowTransformJob job{values.data(), static_cast<int>(rows), columns_,      components_,
                             folded_,       cosines_.data(),        sines_.data(), scratch.data(),
                             real.data(),   imaginary.data(),       stride};
-  switch (instructions) {
-#ifdef PANONAV_HAS_AVX2
-    case Instructions::avx2:
-      return avx2::row_transform(job);
-#endif
-#ifdef PANONAV_HAS_AVX512
-    case Instructions::avx512:
-      return avx512::row_transform(job);
-#endif
-#ifdef PANONAV_HAS_NEON
-    case Instructions::neon:
-      return neon::row_transform(job);
-#endif
-    default:
-      return scalar::row_transform(job);
-  }
+  with_body<RowTransformBody>(instructions, [&](auto body) { body.row_transform(job); });
 }
 
 }  // namespace panonav::kernels

@@ -1,7 +1,7 @@
 #include "panonav/kernels/turn_products.hpp"
 
 #include "panonav/core/error.hpp"
-#include "panonav/kernels/turn_products_targets.hpp"
+#include "panonav/kernels/internal/bodies.hpp"
 
 namespace panonav::kernels {
 
@@ -23,26 +23,10 @@ void turn_products(std::span<const float> rows, std::size_t columns,
   check(rows.size(), count * columns, "values of the rows");
   check(periodic.size(), columns + stride, "values of the periodic row");
   check(products.size(), count * stride, "products");
-  const auto run = [&](auto body) {
-    body(rows.data(), static_cast<int>(count), static_cast<int>(columns), periodic.data(),
-         products.data(), largest.data());
-  };
-  switch (instructions) {
-#ifdef PANONAV_HAS_AVX2
-    case Instructions::avx2:
-      return run(avx2::turn_products);
-#endif
-#ifdef PANONAV_HAS_AVX512
-    case Instructions::avx512:
-      return run(avx512::turn_products);
-#endif
-#ifdef PANONAV_HAS_NEON
-    case Instructions::neon:
-      return run(neon::turn_products);
-#endif
-    default:
-      return run(scalar::turn_products);
-  }
+  with_body<TurnProductsBody>(instructions, [&](auto body) {
+    body.turn_products(rows.data(), static_cast<int>(count), static_cast<int>(columns),
+                       periodic.data(), products.data(), largest.data());
+  });
 }
 
 }  // namespace panonav::kernels

@@ -10,7 +10,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/kernels/likeness.hpp"
+#include "panonav/kernels/similarity.hpp"
 #include "panonav/localisation/hierarchical.hpp"
 #include "panonav/localisation/internal/particle_motion.hpp"
 #include "panonav/localisation/internal/resampling.hpp"

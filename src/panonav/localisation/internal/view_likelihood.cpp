@@ -19,7 +19,7 @@ constexpr double near_spacings = 2.0;  // beyond the border of the references to
 constexpr double nearest_spacings = 0.3826;
 
 constexpr std::size_t most_near = 12;  // a grid's square and the ring around it
-constexpr auto lanes_of_all = static_cast<std::size_t>(kernels::likeness_lanes);
+constexpr auto lanes_of_all = static_cast<std::size_t>(kernels::similarity_lanes);
 static_assert(most_near <= lanes_of_all);
 
 }  // namespace
@@ -149,16 +149,17 @@ std::optional<double> ViewLikelihood::least_difference(std::span<const std::uint
   return least;
 }
 
-const kernels::LikenessLanes& ViewLikelihood::lanes_of(Cell& cell) {
+const kernels::SimilarityLanes& ViewLikelihood::lanes_of(Cell& cell) {
   if (cell.lanes_revision == revision_) return lanes_[cell.lanes];
   cell.lanes_revision = revision_;
   cell.lanes = static_cast<std::uint32_t>(lanes_.size());
-  kernels::LikenessLanes& lanes = lanes_.emplace_back();
+  kernels::SimilarityLanes& lanes = lanes_.emplace_back();
   for (std::size_t i = 0; i < lanes_of_all; ++i) {
     lanes.x_m[i] = 1e6F / fall_.per_metre;
     lanes.y_m[i] = lanes.heading_rad[i] = lanes.per_square_turn[i] = 0.0F;
     lanes.other_heading_rad[i] = 0.0F;
-    lanes.log_likeness[i] = lanes.other_log_likeness[i] = -std::numeric_limits<float>::infinity();
+    lanes.log_similarity[i] = lanes.other_log_similarity[i] =
+        -std::numeric_limits<float>::infinity();
   }
   // Small numbers, wherever on Earth the origin is.
   const Point2 centre = centre_of(cell.place);
@@ -169,11 +170,11 @@ const kernels::LikenessLanes& ViewLikelihood::lanes_of(Cell& cell) {
     lanes.x_m[i] = static_cast<float>(s.position.x_m - centre.x_m);
     lanes.y_m[i] = static_cast<float>(s.position.y_m - centre.y_m);
     if (s.compared_at != number_) continue;
-    lanes.log_likeness[i] = s.log_likeness;
+    lanes.log_similarity[i] = s.log_likeness;
     if (!compass_ || std::isnan(s.heading_rad)) continue;
     lanes.heading_rad[i] = s.heading_rad;
     lanes.other_heading_rad[i] = s.other_heading_rad;
-    lanes.other_log_likeness[i] = s.other_log_likeness;
+    lanes.other_log_similarity[i] = s.other_log_likeness;
     lanes.per_square_turn[i] = per_square_turn;
   }
   return lanes;
@@ -199,9 +200,10 @@ void ViewLikelihood::log_ratios(const Particles& particles, std::span<double> ra
       next = cell_of(particles.position(begin + count));
     } while (count < most && next == place);
     if (const auto cell = table_.find(place)) {
-      kernels::explain_likeness(lanes_of(cells_[*cell]), fall_, std::span(x_m).first(count),
-                                std::span(y_m).first(count), std::span(heading_rad).first(count),
-                                std::span(explained).first(count), kernels::chosen_instructions());
+      kernels::explain_similarity(lanes_of(cells_[*cell]), fall_, std::span(x_m).first(count),
+                                  std::span(y_m).first(count), std::span(heading_rad).first(count),
+                                  std::span(explained).first(count),
+                                  kernels::chosen_instructions());
     } else {
       explained.fill(0.0F);
     }

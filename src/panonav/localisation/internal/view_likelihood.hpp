@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "panonav/kernels/likeness.hpp"
+#include "panonav/kernels/similarity.hpp"
 #include "panonav/localisation/column_ranking.hpp"
 #include "panonav/localisation/internal/cell_table.hpp"
 #include "panonav/localisation/observation_model.hpp"
@@ -89,7 +89,7 @@ class ViewLikelihood {
   void group(const Particles& particles);
   [[nodiscard]] GridCell cell_of(Point2 position) const noexcept;
   [[nodiscard]] Point2 centre_of(GridCell cell) const noexcept;
-  [[nodiscard]] const kernels::LikenessLanes& lanes_of(Cell& cell);
+  [[nodiscard]] const kernels::SimilarityLanes& lanes_of(Cell& cell);
 
   const ColumnRanking* ranking_;
   ObservationModel model_;
@@ -101,7 +101,7 @@ class ViewLikelihood {
   CellTable table_;            ///< of the cells with references near
   std::vector<Cell> cells_;    ///< as `table_` numbers them
   std::vector<std::uint32_t> near_;
-  std::vector<kernels::LikenessLanes> lanes_;  ///< of cells asked for since the last comparison
+  std::vector<kernels::SimilarityLanes> lanes_;  ///< of cells asked for since the last comparison
   std::vector<Group> groups_;
   std::vector<std::uint32_t> group_of_;       ///< each particle
   std::vector<std::uint32_t> group_of_cell_;  ///< right only where the group is of the cell
@@ -110,7 +110,7 @@ class ViewLikelihood {
   std::vector<std::uint32_t> compared_sites_;
   std::optional<ColumnProfiles> asked_;
   double most_likeness_ = 0.0;
-  kernels::LikenessFall fall_{1.0F, 0.0F};
+  kernels::SimilarityFall fall_{1.0F, 0.0F};
   std::uint32_t number_ = 0;
   double cell_m_ = 1.0;
   double cells_per_metre_ = 1.0;

@@ -1,9 +1,6 @@
-#pragma once
+#include "panonav/kernels/internal/bodies.hpp"
 
-// The bodies of normal_pairs and move_poses: loops without branches, which the compiler vectorises
-// for each instruction set. In an unnamed namespace, so that each has a copy of its own.
-
-#include "panonav/kernels/motion_targets.hpp"
+// Loops without branches, which the compiler vectorises for each instruction set.
 
 namespace panonav::kernels {
 namespace {
@@ -25,9 +22,12 @@ inline float logarithm_of(float x) {
   return static_cast<float>(exponent) * 0.693147180559945F + t * series;
 }
 
+}  // namespace
+
 // Box-Muller, as Random::normal_pair.
-inline void normal_pairs_loop(const uint64_t* __restrict bits, float* __restrict first,
-                              float* __restrict second, int count) {
+template <Instructions set>
+void MotionBody<set>::normal_pairs(const uint64_t* __restrict bits, float* __restrict first,
+                                   float* __restrict second, int count) {
   constexpr float rounder = 12582912.0F;  // adding it rounds to whole numbers: 1.5 * 2^23
   for (int i = 0; i < count; ++i) {
     const auto radius_bits = static_cast<unsigned int>(bits[i] >> 32U);
@@ -54,11 +54,12 @@ inline void normal_pairs_loop(const uint64_t* __restrict bits, float* __restrict
   }
 }
 
-inline void move_poses_loop(double* __restrict x_m, double* __restrict y_m,
-                            double* __restrict heading_rad, const double* __restrict forward_m,
-                            const double* __restrict left_m,
-                            const double* __restrict turn_error_rad, double turn_rad,
-                            double share_before, int count) {
+template <Instructions set>
+void MotionBody<set>::move_poses(double* __restrict x_m, double* __restrict y_m,
+                                 double* __restrict heading_rad, const double* __restrict forward_m,
+                                 const double* __restrict left_m,
+                                 const double* __restrict turn_error_rad, double turn_rad,
+                                 double share_before, int count) {
   constexpr double rounder = 6755399441055744.0;  // 1.5 * 2^52
   for (int i = 0; i < count; ++i) {
     const double direction = heading_rad[i] + share_before * turn_error_rad[i];
@@ -92,5 +93,6 @@ inline void move_poses_loop(double* __restrict x_m, double* __restrict y_m,
   }
 }
 
-}  // namespace
+template struct MotionBody<Instructions::PANONAV_TARGET>;
+
 }  // namespace panonav::kernels

@@ -1,4 +1,4 @@
-#include "panonav/kernels/likeness.hpp"
+#include "panonav/kernels/similarity.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,14 +13,14 @@
 namespace panonav::kernels {
 namespace {
 
-LikenessLanes random_lanes(Random& random) {
-  LikenessLanes lanes{};
-  for (int i = 0; i < likeness_lanes; ++i) {
+SimilarityLanes random_lanes(Random& random) {
+  SimilarityLanes lanes{};
+  for (int i = 0; i < similarity_lanes; ++i) {
     const bool used = i < 10;
     lanes.x_m[i] = used ? static_cast<float>(random.uniform(-1.0, 1.0)) : 1e6F;
     lanes.y_m[i] = static_cast<float>(random.uniform(-1.0, 1.0));
-    lanes.log_likeness[i] = std::log(used ? static_cast<float>(random.uniform(0.0, 0.5)) : 0.0F);
-    lanes.other_log_likeness[i] =
+    lanes.log_similarity[i] = std::log(used ? static_cast<float>(random.uniform(0.0, 0.5)) : 0.0F);
+    lanes.other_log_similarity[i] =
         std::log(used ? static_cast<float>(random.uniform(0.0, 0.3)) : 0.0F);
     lanes.heading_rad[i] = static_cast<float>(random.uniform(-6.0, 6.0));
     lanes.other_heading_rad[i] = static_cast<float>(random.uniform(-6.0, 6.0));
@@ -29,11 +29,11 @@ LikenessLanes random_lanes(Random& random) {
   return lanes;
 }
 
-double explained(const LikenessLanes& lanes, const LikenessFall& fall, double x, double y,
+double explained(const SimilarityLanes& lanes, const SimilarityFall& fall, double x, double y,
                  double heading) {
   double product = 0.0;
   double square = 0.0;
-  for (int i = 0; i < likeness_lanes; ++i) {
+  for (int i = 0; i < similarity_lanes; ++i) {
     const double apart = std::sqrt(std::pow(lanes.x_m[i] - x, 2) + std::pow(lanes.y_m[i] - y, 2) +
                                    static_cast<double>(fall.blur_square_m2));
     const double expected = std::exp(-apart * static_cast<double>(fall.per_metre));
@@ -41,23 +41,24 @@ double explained(const LikenessLanes& lanes, const LikenessFall& fall, double x,
       const double turn = std::remainder(heading - told, 2.0 * std::numbers::pi);
       return std::exp(turn * turn * static_cast<double>(lanes.per_square_turn[i]));
     };
-    const double likeness = std::max(std::exp(static_cast<double>(lanes.log_likeness[i])) *
-                                         facing(static_cast<double>(lanes.heading_rad[i])),
-                                     std::exp(static_cast<double>(lanes.other_log_likeness[i])) *
-                                         facing(static_cast<double>(lanes.other_heading_rad[i])));
-    product += likeness * expected;
+    const double similarity =
+        std::max(std::exp(static_cast<double>(lanes.log_similarity[i])) *
+                     facing(static_cast<double>(lanes.heading_rad[i])),
+                 std::exp(static_cast<double>(lanes.other_log_similarity[i])) *
+                     facing(static_cast<double>(lanes.other_heading_rad[i])));
+    product += similarity * expected;
     square += expected * expected;
   }
   return product * product / square;
 }
 
-TEST(ExplainLikeness, AgreesWithItsDefinitionOnEveryInstructionSet) {
+TEST(ExplainSimilarity, AgreesWithItsDefinitionOnEveryInstructionSet) {
   Random random(1);
   int checked = 0;
   for (int trial = 0; trial < 40; ++trial) {
-    const LikenessLanes lanes = random_lanes(random);
-    const LikenessFall fall{static_cast<float>(random.uniform(0.5, 5.0)),
-                            trial % 2 == 0 ? 0.0F : 0.04F};
+    const SimilarityLanes lanes = random_lanes(random);
+    const SimilarityFall fall{static_cast<float>(random.uniform(0.5, 5.0)),
+                              trial % 2 == 0 ? 0.0F : 0.04F};
     std::vector<float> x, y, heading, found(17);
     for (std::size_t p = 0; p < found.size(); ++p) {
       x.push_back(static_cast<float>(random.uniform(-1.5, 1.5)));
@@ -65,9 +66,9 @@ TEST(ExplainLikeness, AgreesWithItsDefinitionOnEveryInstructionSet) {
       heading.push_back(static_cast<float>(random.uniform(-3.1, 3.1)));
     }
     std::vector<float> plain(found.size());
-    explain_likeness(lanes, fall, x, y, heading, plain, Instructions::scalar);
+    explain_similarity(lanes, fall, x, y, heading, plain, Instructions::scalar);
     for (const Instructions set : available_instructions()) {
-      explain_likeness(lanes, fall, x, y, heading, found, set);
+      explain_similarity(lanes, fall, x, y, heading, found, set);
       EXPECT_EQ(found, plain) << name(set);
       for (std::size_t p = 0; p < found.size(); ++p) {
         const double wanted = explained(lanes, fall, static_cast<double>(x[p]),
@@ -80,13 +81,13 @@ TEST(ExplainLikeness, AgreesWithItsDefinitionOnEveryInstructionSet) {
   EXPECT_GE(checked, 40 * 17);
 }
 
-TEST(ExplainLikeness, FarFromEveryReferenceNothingIsExplained) {
+TEST(ExplainSimilarity, FarFromEveryReferenceNothingIsExplained) {
   Random random(2);
-  const LikenessLanes lanes = random_lanes(random);
+  const SimilarityLanes lanes = random_lanes(random);
   const std::vector<float> x{1e4F}, y{1e4F}, heading{0.0F};
   for (const Instructions set : available_instructions()) {
     std::vector<float> found{-1.0F};
-    explain_likeness(lanes, {10.0F, 0.0F}, x, y, heading, found, set);
+    explain_similarity(lanes, {10.0F, 0.0F}, x, y, heading, found, set);
     EXPECT_GE(found[0], 0.0F);
     EXPECT_LT(found[0], 1e-3F);
   }
@@ -114,11 +115,11 @@ TEST(Exponentials, AgreeWithTheirDefinitionOnEveryInstructionSet) {
   EXPECT_THROW(exponentials(logarithms, 1.0F, shorter, Instructions::scalar), ContractError);
 }
 
-TEST(ExplainLikeness, RefusesSpansOfDifferentSizes) {
-  const LikenessLanes lanes{};
+TEST(ExplainSimilarity, RefusesSpansOfDifferentSizes) {
+  const SimilarityLanes lanes{};
   const std::vector<float> two(2), one(1);
   std::vector<float> out(2);
-  EXPECT_THROW(explain_likeness(lanes, {1.0F, 0.0F}, two, one, two, out, Instructions::scalar),
+  EXPECT_THROW(explain_similarity(lanes, {1.0F, 0.0F}, two, one, two, out, Instructions::scalar),
                ContractError);
 }
 

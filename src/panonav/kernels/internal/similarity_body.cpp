@@ -1,9 +1,6 @@
-#pragma once
+#include "panonav/kernels/internal/bodies.hpp"
 
-// The bodies of explain_likeness and exponentials: loops without branches, which the compiler
-// vectorises for each instruction set. In an unnamed namespace, so that each has a copy of its own.
-
-#include "panonav/kernels/likeness_targets.hpp"
+// Loops without branches, which the compiler vectorises for each instruction set.
 
 namespace panonav::kernels {
 namespace {
@@ -34,14 +31,14 @@ inline float wrapped(float angle_rad) {
 // Poses whose sums stay in registers.
 constexpr int poses_together = 16;
 
-inline void explain_likeness_together(const LikenessLanes& lanes, const LikenessFall& fall,
-                                      const float* __restrict x_m, const float* __restrict y_m,
-                                      const float* __restrict heading_rad,
-                                      float* __restrict explained) {
+inline void explain_similarity_together(const SimilarityLanes& lanes, const SimilarityFall& fall,
+                                        const float* __restrict x_m, const float* __restrict y_m,
+                                        const float* __restrict heading_rad,
+                                        float* __restrict explained) {
   constexpr float least = -60.0F;  // the squares are normal numbers still: others are slow
   float squares[poses_together] = {};
   float products[poses_together] = {};
-  for (int i = 0; i < likeness_lanes; ++i) {
+  for (int i = 0; i < similarity_lanes; ++i) {
     for (int p = 0; p < poses_together; ++p) {
       const float dx = lanes.x_m[i] - x_m[p];
       const float dy = lanes.y_m[i] - y_m[p];
@@ -49,28 +46,33 @@ inline void explain_likeness_together(const LikenessLanes& lanes, const Likeness
       const float expected = exp_of(-apart * fall.per_metre, least);
       const float turn = wrapped(heading_rad[p] - lanes.heading_rad[i]);
       const float other_turn = wrapped(heading_rad[p] - lanes.other_heading_rad[i]);
-      const float facing = lanes.log_likeness[i] + turn * turn * lanes.per_square_turn[i];
+      const float facing = lanes.log_similarity[i] + turn * turn * lanes.per_square_turn[i];
       const float other =
-          lanes.other_log_likeness[i] + other_turn * other_turn * lanes.per_square_turn[i];
+          lanes.other_log_similarity[i] + other_turn * other_turn * lanes.per_square_turn[i];
       squares[p] += expected * expected;
       products[p] += exp_of(facing > other ? facing : other, least) * expected;
     }
   }
   for (int p = 0; p < poses_together; ++p) {
-    // What is left of likeness 0 is nothing.
+    // What is left of similarity 0 is nothing.
     const float product = products[p] > 1e-16F ? products[p] : 0.0F;
     explained[p] = product * product / (squares[p] + 1e-30F);
   }
 }
 
-inline void explain_likeness_loop(const LikenessLanes& lanes, const LikenessFall& fall,
-                                  const float* __restrict x_m, const float* __restrict y_m,
-                                  const float* __restrict heading_rad, float* __restrict explained,
-                                  int count) {
+}  // namespace
+
+template <Instructions set>
+void SimilarityBody<set>::explain_similarity(const SimilarityLanes& lanes,
+                                             const SimilarityFall& fall,
+                                             const float* __restrict x_m,
+                                             const float* __restrict y_m,
+                                             const float* __restrict heading_rad,
+                                             float* __restrict explained, int count) {
   int done = 0;
   for (; done + poses_together <= count; done += poses_together) {
-    explain_likeness_together(lanes, fall, x_m + done, y_m + done, heading_rad + done,
-                              explained + done);
+    explain_similarity_together(lanes, fall, x_m + done, y_m + done, heading_rad + done,
+                                explained + done);
   }
   if (done == count) return;
   float x[poses_together] = {};
@@ -82,14 +84,16 @@ inline void explain_likeness_loop(const LikenessLanes& lanes, const LikenessFall
     y[p - done] = y_m[p];
     heading[p - done] = heading_rad[p];
   }
-  explain_likeness_together(lanes, fall, x, y, heading, last);
+  explain_similarity_together(lanes, fall, x, y, heading, last);
   for (int p = done; p < count; ++p) explained[p] = last[p - done];
 }
 
-inline void exponentials_loop(const float* __restrict logarithms, float scale,
-                              float* __restrict values, int count) {
+template <Instructions set>
+void SimilarityBody<set>::exponentials(const float* __restrict logarithms, float scale,
+                                       float* __restrict values, int count) {
   for (int i = 0; i < count; ++i) values[i] = exp_of(scale * logarithms[i], -126.0F);
 }
 
-}  // namespace
+template struct SimilarityBody<Instructions::PANONAV_TARGET>;
+
 }  // namespace panonav::kernels

@@ -1,25 +1,15 @@
-#pragma once
-
-// The body of turn_products for vectors of `lanes` floats. In an unnamed namespace, so that each
-// instruction set has a copy of its own.
-
-#include "panonav/kernels/turn_products_targets.hpp"
+#include "panonav/kernels/internal/vector.hpp"
 
 namespace panonav::kernels {
 namespace {
-
-template <int lanes>
-struct FloatVector {
-  typedef float Type __attribute__((vector_size(4 * lanes), aligned(4), may_alias));
-};
 
 // `row_count` rows at `vectors * lanes` turns: all sums stay in registers, and each value that is
 // loaded is used for all rows or all turns.
 template <int lanes, int row_count, int vectors>
 inline void products_of_block(const float* rows, int columns, const float* periodic,
                               float* products, int stride,
-                              typename FloatVector<lanes>::Type* most) {
-  using Vector = typename FloatVector<lanes>::Type;
+                              typename Vectors<lanes>::UnalignedFloats* most) {
+  using Vector = typename Vectors<lanes>::UnalignedFloats;
   Vector sums[row_count][vectors] = {};
   for (int i = 0; i < columns; ++i) {
     Vector turned[vectors];
@@ -42,7 +32,7 @@ inline void products_of_block(const float* rows, int columns, const float* perio
 template <int lanes, int row_count, int vectors>
 inline void products_of_rows(const float* rows, int columns, int stride, const float* periodic,
                              float* products, float* largest) {
-  using Vector = typename FloatVector<lanes>::Type;
+  using Vector = typename Vectors<lanes>::UnalignedFloats;
   Vector most[row_count];
   for (int r = 0; r < row_count; ++r) most[r] = Vector{} - 3.4e38F;
   int t = 0;
@@ -60,9 +50,14 @@ inline void products_of_rows(const float* rows, int columns, int stride, const f
   }
 }
 
-template <int lanes, int vectors>
-inline void turn_products_loop(const float* rows, int count, int columns, const float* periodic,
-                               float* products, float* largest) {
+}  // namespace
+
+template <Instructions set>
+void TurnProductsBody<set>::turn_products(const float* rows, int count, int columns,
+                                          const float* periodic, float* products, float* largest) {
+  constexpr int lanes = lanes_of<set>;
+  // As many as leave registers for the rows.
+  constexpr int vectors = set == Instructions::avx512 ? 5 : set == Instructions::neon ? 4 : 2;
   const int stride =
       (columns + turn_products_lanes - 1) / turn_products_lanes * turn_products_lanes;
   constexpr int row_count = 4;
@@ -77,5 +72,6 @@ inline void turn_products_loop(const float* rows, int count, int columns, const 
   }
 }
 
-}  // namespace
+template struct TurnProductsBody<Instructions::PANONAV_TARGET>;
+
 }  // namespace panonav::kernels

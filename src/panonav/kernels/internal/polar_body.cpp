@@ -1,16 +1,22 @@
-#pragma once
-
-// The body of to_polar: one loop without branches, which the compiler vectorises for each
-// instruction set. In an unnamed namespace, so that each has a copy of its own.
-
-#include "panonav/kernels/polar_targets.hpp"
+#include "panonav/kernels/internal/bodies.hpp"
 
 namespace panonav::kernels {
-namespace {
 
-inline void to_polar_loop(const float* __restrict real, const float* __restrict imaginary,
-                          float* __restrict magnitudes, float* __restrict phases_rad, int count) {
+// Without vectors the library's arc tangent; else one loop without branches, which the compiler
+// vectorises for each instruction set.
+template <Instructions set>
+void PolarBody<set>::to_polar(const float* __restrict real, const float* __restrict imaginary,
+                              float* __restrict magnitudes, float* __restrict phases_rad,
+                              int count) {
   constexpr float pi = 3.14159265358979323846F;
+  if constexpr (set == Instructions::scalar) {
+    for (int i = 0; i < count; ++i) {
+      const float phase = __builtin_atan2f(imaginary[i], real[i]);
+      magnitudes[i] = __builtin_sqrtf(real[i] * real[i] + imaginary[i] * imaginary[i]);
+      phases_rad[i] = magnitudes[i] > 0.0F ? (phase >= pi ? -pi : phase) : 0.0F;
+    }
+    return;
+  }
   constexpr float tan_pi_8 = 0.41421356237309504880F;
   for (int i = 0; i < count; ++i) {
     const float x = real[i] < 0.0F ? -real[i] : real[i];
@@ -40,5 +46,6 @@ inline void to_polar_loop(const float* __restrict real, const float* __restrict 
   }
 }
 
-}  // namespace
+template struct PolarBody<Instructions::PANONAV_TARGET>;
+
 }  // namespace panonav::kernels

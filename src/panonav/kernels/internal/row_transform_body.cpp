@@ -1,42 +1,29 @@
-#pragma once
-
-// The vector body of RowTransform for any number of lanes (4, 8, 16), written with the vector
-// extension of GCC and Clang. Everything is in an unnamed namespace, so that each instruction set
-// has a copy of its own.
-
-#include "panonav/kernels/row_transform_targets.hpp"
+#include "panonav/kernels/internal/vector.hpp"
 
 namespace panonav::kernels {
 namespace {
 
 template <int lanes>
-struct Vector {
-  typedef float Floats __attribute__((vector_size(4 * lanes)));
-  typedef float UnalignedFloats __attribute__((vector_size(4 * lanes), aligned(4)));
-  typedef long long Pairs __attribute__((vector_size(4 * lanes)));
-};
-
-template <int lanes>
-inline typename Vector<lanes>::Floats load(const float* from) {
-  return *reinterpret_cast<const typename Vector<lanes>::UnalignedFloats*>(from);
+inline typename Vectors<lanes>::Floats load(const float* from) {
+  return *reinterpret_cast<const typename Vectors<lanes>::UnalignedFloats*>(from);
 }
 
 template <int lanes>
-inline void store(float* to, typename Vector<lanes>::Floats value) {
-  *reinterpret_cast<typename Vector<lanes>::UnalignedFloats*>(to) = value;
+inline void store(float* to, typename Vectors<lanes>::Floats value) {
+  *reinterpret_cast<typename Vectors<lanes>::UnalignedFloats*>(to) = value;
 }
 
 /// Two floats, repeated over all lanes.
 template <int lanes>
-inline typename Vector<lanes>::Floats repeat_pair(const float* pair) {
-  long long bits;
+inline typename Vectors<lanes>::Floats repeat_pair(const float* pair) {
+  int64_t bits;
   __builtin_memcpy(&bits, pair, sizeof bits);
-  const typename Vector<lanes>::Pairs repeated = bits - typename Vector<lanes>::Pairs{};
-  return reinterpret_cast<typename Vector<lanes>::Floats>(repeated);
+  const typename Vectors<lanes>::Longs repeated = bits - typename Vectors<lanes>::Longs{};
+  return reinterpret_cast<typename Vectors<lanes>::Floats>(repeated);
 }
 
 template <int lanes>
-inline typename Vector<lanes>::Floats reversed(typename Vector<lanes>::Floats v) {
+inline typename Vectors<lanes>::Floats reversed(typename Vectors<lanes>::Floats v) {
   if constexpr (lanes == 16) {
     return __builtin_shufflevector(v, v, 15, 14, 13, 12, 11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0);
   } else if constexpr (lanes == 8) {
@@ -48,8 +35,8 @@ inline typename Vector<lanes>::Floats reversed(typename Vector<lanes>::Floats v)
 
 /// a0 b0 a1 b1 ..
 template <int lanes>
-inline void store_interleaved(float* to, typename Vector<lanes>::Floats a,
-                              typename Vector<lanes>::Floats b) {
+inline void store_interleaved(float* to, typename Vectors<lanes>::Floats a,
+                              typename Vectors<lanes>::Floats b) {
   if constexpr (lanes == 16) {
     store<16>(
         to, __builtin_shufflevector(a, b, 0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23));
@@ -64,7 +51,7 @@ inline void store_interleaved(float* to, typename Vector<lanes>::Floats a,
   }
 }
 
-/// Columns c .. c + lanes - 1 of a row with an even number of columns; see scalar::row_transform.
+/// Columns c .. c + lanes - 1 of a row with an even number of columns, like fold_one.
 template <int lanes>
 inline void fold_quarter(const float* row, int columns, int c, float* even, float* odd) {
   const int half = columns / 2;
@@ -81,6 +68,7 @@ inline void fold_quarter(const float* row, int columns, int c, float* even, floa
                            near_difference + far_difference);
 }
 
+/// Interleaved: index 2 c belongs to even k, 2 c + 1 to odd k.
 inline void fold_one(const float* row, int columns, int c, float* even, float* odd) {
   const int half = columns / 2;
   const float near_sum = row[c] + row[columns - c];
@@ -116,6 +104,7 @@ inline void fold(const float* row, int columns, int folded, float* even, float* 
     for (int c = 1; c < end; ++c) fold_one(row, columns, c, even, odd);
   }
   if (half % 2 == 0) {
+    // A quarter turn folds onto itself: its cosine is 0 for odd k, its sine for even k.
     const int c = half / 2;
     even[2 * c] = row[c] + row[columns - c];
     even[2 * c + 1] = 0.0F;
@@ -128,7 +117,7 @@ inline void fold(const float* row, int columns, int folded, float* even, float* 
 /// the sums of different rows hide each other's latency.
 template <int lanes, int rows>
 inline void transform_rows(const RowTransformJob& job, int first_row) {
-  using Floats = typename Vector<lanes>::Floats;
+  using Floats = typename Vectors<lanes>::Floats;
   const int length = 2 * job.folded;
   float* const even = job.scratch;
   float* const odd = job.scratch + static_cast<long>(rows) * length;
@@ -164,12 +153,16 @@ inline void transform_rows(const RowTransformJob& job, int first_row) {
   }
 }
 
-template <int lanes>
-inline void transform_all(const RowTransformJob& job) {
+}  // namespace
+
+template <Instructions set>
+void RowTransformBody<set>::row_transform(const RowTransformJob& job) {
+  constexpr int lanes = lanes_of<set>;
   int y = 0;
   for (; y + 4 <= job.rows; y += 4) transform_rows<lanes, 4>(job, y);
   for (; y < job.rows; ++y) transform_rows<lanes, 1>(job, y);
 }
 
-}  // namespace
+template struct RowTransformBody<Instructions::PANONAV_TARGET>;
+
 }  // namespace panonav::kernels

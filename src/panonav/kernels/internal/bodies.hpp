@@ -1,0 +1,127 @@
+#pragma once
+
+// The bodies of the kernels, declared once for all instruction sets. `internal/NAME_body.cpp`
+// defines NAMEBody and is compiled once for each set. No C++ standard header here: see
+// CMakeLists.txt.
+
+#include "panonav/kernels/types.hpp"
+
+namespace panonav::kernels {
+
+template <Instructions set>
+struct ColumnMatchBody {
+  static void match_columns(const uint8_t* query, const uint8_t* reference, uint16_t* costs);
+};
+
+/// The functions of DistanceKernels.
+template <Instructions set>
+struct DistanceBody {
+  static uint32_t l1(const uint8_t* a, const uint8_t* b, size_t count);
+  static uint32_t masked_l1(const uint8_t* a, const uint8_t* b, const uint8_t* mask, size_t count);
+  static uint32_t sketch_bounds(const uint8_t* sketches, const int32_t* slacks, size_t octets,
+                                const SketchQuery& query, uint32_t* bounds);
+  static void sketch_bounds_at(const uint8_t* sketches, const int32_t* slacks,
+                               const uint32_t* indices, size_t count, const SketchQuery& query,
+                               uint32_t* bounds);
+  static size_t collect_at_most(const uint32_t* values, size_t count, uint32_t limit,
+                                uint32_t* indices);
+};
+
+template <Instructions set>
+struct MotionBody {
+  static void normal_pairs(const uint64_t* bits, float* first, float* second, int count);
+  static void move_poses(double* x_m, double* y_m, double* heading_rad, const double* forward_m,
+                         const double* left_m, const double* turn_error_rad, double turn_rad,
+                         double share_before, int count);
+};
+
+template <Instructions set>
+struct PolarBody {
+  static void to_polar(const float* real, const float* imaginary, float* magnitudes,
+                       float* phases_rad, int count);
+};
+
+struct RemapJob {
+  const uint16_t* pairs;
+  const uint32_t* positions;
+  const uint32_t* weights;
+  int taps, count;
+  float scale;
+  float* values;
+};
+
+/// Width and height are those of the result.
+template <Instructions set>
+struct RemapBody {
+  static void halve(const uint8_t* pixels, ptrdiff_t stride, int width, int height,
+                    uint8_t* halved);
+  static void pair_rows(const uint8_t* pixels, ptrdiff_t stride, int width, int height,
+                        uint16_t* pairs);
+  static void remap(const RemapJob& job);
+};
+
+/// Components are handled in blocks of this many; tables are padded to whole blocks.
+inline constexpr int row_transform_block = 16;
+
+struct RowTransformJob {
+  const float* values;  ///< rows * columns
+  int rows, columns, components, folded;
+  const float* cosines;  ///< [block][folded][row_transform_block]
+  const float* sines;
+  float* scratch;  ///< row_transform_scratch(folded) floats
+  float* real;     ///< index k * stride + row
+  float* imaginary;
+  size_t stride;
+};
+
+/// Four rows are folded at a time, each into pairs (even k, odd k) for the cosines and for the
+/// sines.
+constexpr size_t row_transform_scratch(int folded) {
+  return 4 * 4 * static_cast<size_t>(folded);
+}
+
+template <Instructions set>
+struct RowTransformBody {
+  static void row_transform(const RowTransformJob& job);
+};
+
+template <Instructions set>
+struct SimilarityBody {
+  static void explain_similarity(const SimilarityLanes& lanes, const SimilarityFall& fall,
+                                 const float* x_m, const float* y_m, const float* heading_rad,
+                                 float* explained, int count);
+  static void exponentials(const float* logarithms, float scale, float* values, int count);
+};
+
+/// Products of a row come in multiples of this many turns.
+inline constexpr int turn_products_lanes = 16;
+
+template <Instructions set>
+struct TurnProductsBody {
+  static void turn_products(const float* rows, int count, int columns, const float* periodic,
+                            float* products, float* largest);
+};
+
+/// Calls `run` with the Body of an instruction set; of a set that this build lacks, with the scalar
+/// one.
+template <template <Instructions> class Body, class Run>
+decltype(auto) with_body(Instructions set, Run run) {
+  switch (set) {
+#ifdef PANONAV_HAS_AVX2
+    case Instructions::avx2:
+      return run(Body<Instructions::avx2>{});
+#endif
+#ifdef PANONAV_HAS_AVX512
+    case Instructions::avx512:
+      return run(Body<Instructions::avx512>{});
+#endif
+#ifdef PANONAV_HAS_NEON
+    case Instructions::neon:
+      return run(Body<Instructions::neon>{});
+#endif
+    default:
+      return run(Body<Instructions::scalar>{});
+  }
+}
+
+}  // namespace panonav::kernels

@@ -1,0 +1,134 @@
+#include "panonav/kernels/internal/vector.hpp"
+
+namespace panonav::kernels {
+namespace {
+
+#ifdef __AVX2__
+// Turn s of 4 e + f puts query column c on reference column 4 (c + e) + f: with all columns of one
+// f behind each other, neighbouring turns of one f meet neighbouring columns, and all sums stay in
+// registers. Columns are there twice, so that no turn has to start again at the front.
+constexpr int matched_residues = matched_reference_columns / matched_query_columns;
+constexpr int matched_halves = matched_bands / 8;
+struct HalvedColumns {
+  alignas(64) uint8_t at[matched_residues][matched_halves][2 * matched_query_columns][8];
+};
+
+// From 16 bands of 128 bytes each: eight bands of sixteen columns at a time.
+inline void halve_columns(const uint8_t* reference, HalvedColumns& halved) {
+  for (int half = 0; half < matched_halves; ++half) {
+    for (int first = 0; first < matched_reference_columns; first += 16) {
+      __m128i rows[8];
+      for (int b = 0; b < 8; ++b) {
+        rows[b] = _mm_loadu_si128(reinterpret_cast<const __m128i*>(
+            reference + (8 * half + b) * matched_reference_columns + first));
+      }
+      __m128i pairs[8];  // of bands; columns 0 .. 7 and 8 .. 15
+      for (int b = 0; b < 4; ++b) {
+        pairs[b] = _mm_unpacklo_epi8(rows[2 * b], rows[2 * b + 1]);
+        pairs[b + 4] = _mm_unpackhi_epi8(rows[2 * b], rows[2 * b + 1]);
+      }
+      for (int eight = 0; eight < 2; ++eight) {
+        const __m128i* const p = pairs + 4 * eight;
+        const __m128i fours[4] = {_mm_unpacklo_epi16(p[0], p[1]), _mm_unpackhi_epi16(p[0], p[1]),
+                                  _mm_unpacklo_epi16(p[2], p[3]), _mm_unpackhi_epi16(p[2], p[3])};
+        // Columns (0, 1), (2, 3), (4, 5), (6, 7) of these eight.
+        const __m128i columns[4] = {
+            _mm_unpacklo_epi32(fours[0], fours[2]), _mm_unpackhi_epi32(fours[0], fours[2]),
+            _mm_unpacklo_epi32(fours[1], fours[3]), _mm_unpackhi_epi32(fours[1], fours[3])};
+        const int e = first / 4 + 2 * eight;
+        for (int f = 0; f < matched_residues; ++f) {
+          const __m128i low = columns[f / 2];
+          const __m128i high = columns[f / 2 + 2];
+          const __m128i both =
+              f % 2 == 0 ? _mm_unpacklo_epi64(low, high) : _mm_unpackhi_epi64(low, high);
+          _mm_store_si128(reinterpret_cast<__m128i*>(halved.at[f][half][e]), both);
+          _mm_store_si128(reinterpret_cast<__m128i*>(halved.at[f][half][e + matched_query_columns]),
+                          both);
+        }
+      }
+    }
+  }
+}
+
+// Where eight absolute differences are added up at once.
+template <Instructions set>
+void match_by_sad(const uint8_t* query, const uint8_t* reference, uint16_t* costs) {
+  using Vector = ByteVector<set>;
+  using Register = typename Vector::Register;
+  using Ints = typename Vectors<lanes_of<set>>::Ints;
+  using Floats = typename Vectors<lanes_of<set>>::Floats;
+  constexpr int width = sizeof(Register) / sizeof(uint64_t);
+  HalvedColumns halved;
+  halve_columns(reference, halved);
+  for (int first = 0; first < matched_query_columns; first += width) {
+    Ints sums[2] = {};  // turns of f = 0 and 1, side by side; of 2 and 3
+    for (int c = 0; c < matched_query_columns; ++c) {
+      const uint8_t* const column = query + c * matched_bands;
+      const Register upper = Vector::repeat(load_group(column));
+      const Register lower = Vector::repeat(load_group(column + 8));
+      const auto l1 = [&](int f) {
+        return Vector::sad(upper, Vector::load(halved.at[f][0][first + c])) +
+               Vector::sad(lower, Vector::load(halved.at[f][1][first + c]));
+      };
+      for (int pair = 0; pair < 2; ++pair) {
+        const Register both = l1(2 * pair) | (l1(2 * pair + 1) << 32);
+        const Floats root =
+            Vector::root(__builtin_convertvector(reinterpret_cast<Ints>(both), Floats));
+        // 1.5 * 2^23: adding it rounds to a whole number, which the last bits then hold.
+        sums[pair] += reinterpret_cast<Ints>(root * 16.0F + 12582912.0F);
+      }
+    }
+    for (int e = 0; e < width; ++e) {
+      for (int f = 0; f < matched_residues; ++f) {
+        // Each root came with the bits of the float that rounded it; whole multiples of 65,536.
+        costs[4 * (first + e) + f] = static_cast<uint16_t>(sums[f / 2][2 * e + f % 2]);
+      }
+    }
+  }
+}
+#endif
+
+// Loops without branches, which the compiler vectorises.
+void match_by_loops(const uint8_t* __restrict query, const uint8_t* __restrict reference,
+                    uint16_t* __restrict costs) {
+  constexpr int columns = matched_reference_columns;
+  constexpr int step = columns / matched_query_columns;
+  // Query column c meets reference column d at the turn d - step c, from -columns + step on.
+  uint16_t totals[2 * columns] = {};
+  for (int c = 0; c < matched_query_columns; ++c) {
+    uint16_t sums[columns] = {};
+    for (int band = 0; band < matched_bands; ++band) {
+      const uint8_t mine = query[c * matched_bands + band];
+      const uint8_t* const theirs = reference + band * columns;
+      for (int d = 0; d < columns; ++d) {
+        const uint8_t larger = theirs[d] > mine ? theirs[d] : mine;
+        const uint8_t smaller = theirs[d] > mine ? mine : theirs[d];
+        sums[d] = static_cast<uint16_t>(sums[d] + static_cast<uint8_t>(larger - smaller));
+      }
+    }
+    uint16_t* const met = totals + columns - step * c;
+    for (int d = 0; d < columns; ++d) {
+      // 256 L1 is a whole number below 2^24 and roots are rounded correctly: the same everywhere.
+      const float root = __builtin_sqrtf(static_cast<float>(static_cast<int>(sums[d]) << 8));
+      met[d] = static_cast<uint16_t>(met[d] + static_cast<int>(root + 0.5F));
+    }
+  }
+  for (int s = 0; s < columns; ++s) {
+    costs[s] = static_cast<uint16_t>(totals[s] + totals[s + columns]);
+  }
+}
+
+}  // namespace
+
+template <Instructions set>
+void ColumnMatchBody<set>::match_columns(const uint8_t* query, const uint8_t* reference,
+                                         uint16_t* costs) {
+#ifdef __AVX2__
+  if constexpr (set != Instructions::scalar) return match_by_sad<set>(query, reference, costs);
+#endif
+  match_by_loops(query, reference, costs);
+}
+
+template struct ColumnMatchBody<Instructions::PANONAV_TARGET>;
+
+}  // namespace panonav::kernels

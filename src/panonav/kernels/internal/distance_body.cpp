@@ -1,0 +1,170 @@
+#include "panonav/kernels/internal/vector.hpp"
+
+namespace panonav::kernels {
+namespace {
+
+template <Instructions set, bool masked>
+uint32_t l1_of(const uint8_t* a, const uint8_t* b, const uint8_t* mask, size_t count) {
+  using Vector = ByteVector<set>;
+  using Register = typename Vector::Register;
+  Register sums{};
+  size_t i = 0;
+  const auto add = [&](auto load) {
+    Register x = load(a + i);
+    Register y = load(b + i);
+    if constexpr (masked) {
+      const Register m = load(mask + i);
+      x = x & m;
+      y = y & m;
+    }
+    sums = Vector::add_sad(sums, x, y);
+  };
+  if constexpr (set != Instructions::scalar) {  // the compiler makes more of plain loops
+    for (; i + sizeof(Register) <= count; i += sizeof(Register)) add(Vector::load);
+  }
+  if constexpr (requires { Vector::load_first(a, i); }) {
+    if (i < count) [[likely]] {
+      add([&](const uint8_t* from) { return Vector::load_first(from, count - i); });
+    }
+    i = count;
+  }
+  auto total = static_cast<uint32_t>(Vector::total(sums));
+  for (; i < count; ++i) {
+    const int bits = masked ? mask[i] : 255;
+    const int difference = (a[i] & bits) - (b[i] & bits);
+    total += static_cast<uint32_t>(difference < 0 ? -difference : difference);
+  }
+  return total;
+}
+
+/// `fixed_groups` > 0: that many groups, whose part of the query then stays in registers.
+template <Instructions set, size_t fixed_groups, bool masked>
+uint32_t interleaved_bounds(const uint8_t* sketches, const int32_t* slacks, size_t octets,
+                            const SketchQuery& query, uint32_t* bounds) {
+  using Vector = ByteVector<set>;
+  using Register = typename Vector::Register;
+  constexpr size_t registers = 64 / sizeof(Register);
+  constexpr size_t kept = fixed_groups > 0 ? fixed_groups : 1;
+  Register kept_values[kept];
+  Register kept_steps[kept];
+  for (size_t group = 0; group < fixed_groups; ++group) {
+    kept_values[group] = Vector::repeat(load_group(query.values + group * 8));
+    kept_steps[group] = Vector::repeat(query.steps[group]);
+  }
+  const size_t groups = fixed_groups > 0 ? fixed_groups : query.groups;
+  EightInts smallest = EightInts{} + 0x7FFFFFFF;
+  const EightInts constant = EightInts{} + query.constant;
+  const EightInts largest_slack = EightInts{} + query.largest_slack;
+  for (size_t octet = 0; octet < octets; ++octet) {
+    Register sums[registers] = {};
+    for (size_t group = 0; group < groups; ++group) {
+      const Register values = fixed_groups > 0
+                                  ? kept_values[group]
+                                  : Vector::repeat(load_group(query.values + group * 8));
+      const Register step =
+          fixed_groups > 0 ? kept_steps[group] : Vector::repeat(query.steps[group]);
+      for (size_t r = 0; r < registers; ++r) {
+        Register x = Vector::load(sketches + group * 64 + r * sizeof(Register));
+        if (masked) x = x & Vector::repeat(load_group(query.mask + group * 8));
+        sums[r] = sums[r] + Vector::product(Vector::sad(x, values), step);
+      }
+    }
+    sketches += query.stored_groups * 64;
+    EightInts sum;
+    Vector::narrow(sums, sum);
+    const EightInts slack = *reinterpret_cast<const EightInts*>(slacks + octet * 8);
+    const EightInts taken = slack < largest_slack ? slack : largest_slack;
+    const EightInts difference = sum + constant - taken;
+    const EightInts bound = difference > 0 ? difference : EightInts{};
+    *reinterpret_cast<EightInts*>(bounds + octet * 8) = bound;
+    smallest = bound < smallest ? bound : smallest;
+  }
+  uint32_t each[8];
+  __builtin_memcpy(each, &smallest, sizeof each);
+  uint32_t least = each[0];
+  for (const uint32_t bound : each) least = bound < least ? bound : least;
+  return least;
+}
+
+bool counts_everywhere(const SketchQuery& query) {
+  for (size_t group = 0; group < query.groups; ++group) {
+    if (load_group(query.mask + group * 8) != ~uint64_t{0}) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+template <Instructions set>
+uint32_t DistanceBody<set>::l1(const uint8_t* a, const uint8_t* b, size_t count) {
+  return l1_of<set, false>(a, b, nullptr, count);
+}
+
+template <Instructions set>
+uint32_t DistanceBody<set>::masked_l1(const uint8_t* a, const uint8_t* b, const uint8_t* mask,
+                                      size_t count) {
+  return l1_of<set, true>(a, b, mask, count);
+}
+
+template <Instructions set>
+uint32_t DistanceBody<set>::sketch_bounds(const uint8_t* sketches, const int32_t* slacks,
+                                          size_t octets, const SketchQuery& query,
+                                          uint32_t* bounds) {
+  // 15 components make 5 groups; other shapes take the general body, and so do sets that have too
+  // few registers to keep the query in them.
+  if constexpr (set == Instructions::avx512) {
+    if (query.groups == 5 && counts_everywhere(query)) {
+      return interleaved_bounds<set, 5, false>(sketches, slacks, octets, query, bounds);
+    }
+  }
+  return interleaved_bounds<set, 0, true>(sketches, slacks, octets, query, bounds);
+}
+
+template <Instructions set>
+void DistanceBody<set>::sketch_bounds_at(const uint8_t* sketches, const int32_t* slacks,
+                                         const uint32_t* indices, size_t count,
+                                         const SketchQuery& query, uint32_t* bounds) {
+  using Vector = ByteVector<set>;
+  using Register = typename Vector::Register;
+  constexpr size_t ahead = 8;
+  for (size_t i = 0; i < count; ++i) {
+    if (i + ahead < count) {
+      const uint8_t* const next = sketches + indices[i + ahead] * query.stored_groups * 8;
+      for (size_t group = 0; group < query.groups; group += 8) __builtin_prefetch(next + group * 8);
+    }
+    const uint8_t* const sketch = sketches + indices[i] * query.stored_groups * 8;
+    Register sums{};
+    for (size_t group = 0; group < query.groups; group += sizeof(Register) / 8) {
+      const Register x = Vector::load(sketch + group * 8) & Vector::load(query.mask + group * 8);
+      const Register sad = Vector::sad(x, Vector::load(query.values + group * 8));
+      sums = sums + Vector::product(sad, Vector::load(query.steps + group));
+    }
+    const int32_t slack = slacks[indices[i]];
+    const int32_t taken = slack < query.largest_slack ? slack : query.largest_slack;
+    const int64_t bound = static_cast<int64_t>(Vector::total(sums)) + query.constant - taken;
+    bounds[i] = bound < 0 ? 0U : static_cast<uint32_t>(bound);
+  }
+}
+
+template <Instructions set>
+size_t DistanceBody<set>::collect_at_most(const uint32_t* values, size_t count, uint32_t limit,
+                                          uint32_t* indices) {
+  size_t found = 0;
+  size_t i = 0;
+  if constexpr (set != Instructions::scalar) {
+    constexpr size_t together = sizeof(typename ByteVector<set>::Register) / sizeof(uint32_t);
+    for (; i + together <= count; i += together) {
+      found +=
+          ByteVector<set>::collect(values + i, limit, static_cast<uint32_t>(i), indices + found);
+    }
+  }
+  for (; i < count; ++i) {
+    indices[found] = static_cast<uint32_t>(i);
+    found += values[i] <= limit ? 1 : 0;
+  }
+  return found;
+}
+
+template struct DistanceBody<Instructions::PANONAV_TARGET>;
+
+}  // namespace panonav::kernels

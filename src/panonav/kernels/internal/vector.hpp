@@ -1,0 +1,244 @@
+#pragma once
+
+// The vectors of an instruction set. In an unnamed namespace, so that each has a copy of its own.
+
+#include "panonav/kernels/internal/bodies.hpp"
+
+#if defined(__AVX2__)
+#include <immintrin.h>
+#elif defined(__ARM_NEON)
+#include <arm_neon.h>
+#endif
+
+namespace panonav::kernels {
+namespace {
+
+/// Vectors of `lanes` numbers of 32 bits, with the vector extension of GCC and Clang.
+template <int lanes>
+struct Vectors {
+  typedef float Floats __attribute__((vector_size(4 * lanes)));
+  typedef float UnalignedFloats __attribute__((vector_size(4 * lanes), aligned(4)));
+  typedef int32_t Ints __attribute__((vector_size(4 * lanes)));
+  typedef int64_t Longs __attribute__((vector_size(4 * lanes)));
+};
+
+template <Instructions set>
+constexpr int lanes_of = set == Instructions::avx512 ? 16
+                         : set == Instructions::avx2 ? 8
+                                                     : 4;
+
+/// The few instructions that no compiler makes of a loop. A Register holds groups of eight bytes,
+/// which are numbers of 64 bits too (`+`, `&`), or twice as many of 32.
+///   load(from)             from any address
+///   repeat(number)         in each group
+///   sad(a, b)              of each group the sum of the absolute differences of its bytes
+///   add_sad(sums, a, b)    the same added to sums of which only the total counts
+///   total(sums)            of all numbers; below 2^32
+///   product(a, b)          of each group; factors below 2^32
+///   narrow(sums, eight)    the eight numbers of 64 / sizeof(Register) registers, each below 2^32
+///   add_products(sums, bytes, weights)   adds to each number of 32 bits its four bytes times their
+///                          weights, which add up to at most 127
+///   halve(upper, lower, to)   `halved` means of 2 x 2 bytes, halves rounded up
+///   collect(values, limit, first, to)    of sizeof(Register) / 4 values those <= limit: writes
+///                          first + position, may write as many as there are values; their number
+template <Instructions set>
+struct ByteVector;
+
+typedef int32_t EightInts __attribute__((vector_size(32), aligned(4)));
+
+inline uint64_t load_group(const void* from) {
+  uint64_t group;
+  __builtin_memcpy(&group, from, sizeof group);
+  return group;
+}
+
+inline size_t write_set_bits(unsigned bits, uint32_t first, uint32_t* to) {
+  size_t count = 0;
+  for (; bits != 0; bits &= bits - 1) {
+    to[count++] = first + static_cast<uint32_t>(__builtin_ctz(bits));
+  }
+  return count;
+}
+
+template <>
+struct ByteVector<Instructions::scalar> {
+  using Register = uint64_t;
+  typedef uint8_t Octet __attribute__((vector_size(8)));
+  static Register load(const void* from) { return load_group(from); }
+  static Register repeat(uint64_t number) { return number; }
+  static Register sad(Register a, Register b) {
+    Octet x;
+    Octet y;
+    __builtin_memcpy(&x, &a, sizeof x);
+    __builtin_memcpy(&y, &b, sizeof y);
+    const Octet differences = (x > y ? x : y) - (x > y ? y : x);
+    uint64_t bytes;
+    __builtin_memcpy(&bytes, &differences, sizeof bytes);
+    // Four sums of two in 16 bits each; the product adds them up in the highest.
+    constexpr uint64_t every_other = 0x00FF00FF00FF00FFU;
+    const uint64_t sums = (bytes & every_other) + ((bytes >> 8U) & every_other);
+    return (sums * 0x0001000100010001U) >> 48U;
+  }
+  static Register add_sad(Register sums, Register a, Register b) { return sums + sad(a, b); }
+  static uint64_t total(Register sums) { return sums; }
+  static Register product(Register a, Register b) { return a * b; }
+  static void narrow(const Register* sums, EightInts& eight) {
+    int32_t each[8];
+    for (int i = 0; i < 8; ++i) each[i] = static_cast<int32_t>(sums[i]);
+    __builtin_memcpy(&eight, each, sizeof each);
+  }
+};
+
+#ifdef __AVX2__
+template <>
+struct ByteVector<Instructions::avx2> {
+  using Register = __m256i;
+  static Register load(const void* from) {
+    return _mm256_loadu_si256(static_cast<const Register*>(from));
+  }
+  static Register repeat(uint64_t number) {
+    return _mm256_set1_epi64x(static_cast<long long>(number));
+  }
+  static Register sad(Register a, Register b) { return _mm256_sad_epu8(a, b); }
+  static Register add_sad(Register sums, Register a, Register b) { return sums + sad(a, b); }
+  static uint64_t total(Register sums) {
+    const __m128i two = _mm256_castsi256_si128(sums) + _mm256_extracti128_si256(sums, 1);
+    return static_cast<uint64_t>(two[0] + two[1]);
+  }
+  static Register product(Register a, Register b) { return _mm256_mul_epu32(a, b); }
+  static void narrow(const Register* sums, EightInts& eight) {
+    const Register even = _mm256_setr_epi32(0, 2, 4, 6, 0, 2, 4, 6);
+    const Register low = _mm256_permutevar8x32_epi32(sums[0], even);
+    const Register high = _mm256_permutevar8x32_epi32(sums[1], even);
+    eight = reinterpret_cast<EightInts>(_mm256_blend_epi32(low, high, 0xF0));
+  }
+  static Register add_products(Register sums, Register bytes, Register weights) {
+    const Register of_two = _mm256_maddubs_epi16(bytes, weights);
+    return _mm256_add_epi32(sums, _mm256_madd_epi16(of_two, _mm256_set1_epi16(1)));
+  }
+  static size_t collect(const uint32_t* values, uint32_t limit, uint32_t first, uint32_t* to) {
+    const Register x = load(values);
+    const Register top = _mm256_set1_epi32(static_cast<int>(limit));
+    const Register low = _mm256_cmpeq_epi32(_mm256_min_epu32(x, top), x);
+    return write_set_bits(static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(low))),
+                          first, to);
+  }
+  static constexpr int halved = 32;
+  static void halve(const uint8_t* upper, const uint8_t* lower, uint8_t* to) {
+    const auto means = [&](int at) {
+      const Register ones = _mm256_set1_epi8(1);
+      const Register sum = _mm256_add_epi16(_mm256_maddubs_epi16(load(upper + at), ones),
+                                            _mm256_maddubs_epi16(load(lower + at), ones));
+      return _mm256_srli_epi16(_mm256_add_epi16(sum, _mm256_set1_epi16(2)), 2);
+    };
+    // Packing works within halves of the register; the permutation puts the quarters in order.
+    const Register packed =
+        _mm256_permute4x64_epi64(_mm256_packus_epi16(means(0), means(32)), 0xd8);
+    __builtin_memcpy(to, &packed, sizeof packed);
+  }
+  static __m256 root(__m256 a) { return _mm256_sqrt_ps(a); }
+};
+#endif
+
+#ifdef __AVX512BW__
+template <>
+struct ByteVector<Instructions::avx512> {
+  using Register = __m512i;
+  static Register load(const void* from) { return _mm512_loadu_si512(from); }
+  /// The first `count` bytes, 1 .. 63, and zeros.
+  static Register load_first(const void* from, size_t count) {
+    return _mm512_maskz_loadu_epi8(~__mmask64{0} >> (64 - count), from);
+  }
+  static Register repeat(uint64_t number) {
+    return _mm512_set1_epi64(static_cast<long long>(number));
+  }
+  static Register sad(Register a, Register b) { return _mm512_sad_epu8(a, b); }
+  static Register add_sad(Register sums, Register a, Register b) { return sums + sad(a, b); }
+  // _mm512_reduce_add_epi64 and some conversions make gcc 12 warn of uninitialised values.
+  static uint64_t total(Register sums) {
+    return ByteVector<Instructions::avx2>::total(_mm512_maskz_extracti64x4_epi64(0xF, sums, 0) +
+                                                 _mm512_maskz_extracti64x4_epi64(0xF, sums, 1));
+  }
+  static Register product(Register a, Register b) { return _mm512_maskz_mul_epu32(0xFF, a, b); }
+  static void narrow(const Register* sums, EightInts& eight) {
+    eight = reinterpret_cast<EightInts>(_mm512_maskz_cvtepi64_epi32(0xFF, sums[0]));
+  }
+  static Register add_products(Register sums, Register bytes, Register weights) {
+    const Register of_two = _mm512_maddubs_epi16(bytes, weights);
+    return _mm512_add_epi32(sums, _mm512_madd_epi16(of_two, _mm512_set1_epi16(1)));
+  }
+  /// 32 bytes, each beside the one below; other sets are served as well by a loop.
+  static void pair(const uint8_t* upper, const uint8_t* lower, uint16_t* to) {
+    const auto widened = [](const uint8_t* from) {
+      return _mm512_cvtepu8_epi16(ByteVector<Instructions::avx2>::load(from));
+    };
+    _mm512_storeu_si512(to, widened(upper) | _mm512_slli_epi16(widened(lower), 8));
+  }
+  static size_t collect(const uint32_t* values, uint32_t limit, uint32_t first, uint32_t* to) {
+    const __mmask16 low =
+        _mm512_cmple_epu32_mask(load(values), _mm512_set1_epi32(static_cast<int>(limit)));
+    if (low == 0) return 0;
+    const Register positions =
+        _mm512_add_epi32(_mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15),
+                         _mm512_set1_epi32(static_cast<int>(first)));
+    _mm512_storeu_si512(to, _mm512_maskz_compress_epi32(low, positions));
+    return static_cast<size_t>(_mm_popcnt_u64(low));
+  }
+  static constexpr int halved = 32;
+  static void halve(const uint8_t* upper, const uint8_t* lower, uint8_t* to) {
+    const Register ones = _mm512_set1_epi8(1);
+    const Register sum = _mm512_add_epi16(_mm512_maddubs_epi16(load(upper), ones),
+                                          _mm512_maddubs_epi16(load(lower), ones));
+    const __m256i means =
+        _mm512_cvtepi16_epi8(_mm512_srli_epi16(_mm512_add_epi16(sum, _mm512_set1_epi16(2)), 2));
+    __builtin_memcpy(to, &means, sizeof means);
+  }
+  static __m512 root(__m512 a) { return _mm512_sqrt_ps(a); }
+};
+#endif
+
+#ifdef __ARM_NEON
+template <>
+struct ByteVector<Instructions::neon> {
+  using Register = uint64x2_t;
+  static uint8x16_t bytes(Register a) { return vreinterpretq_u8_u64(a); }
+  static Register load(const void* from) {
+    return vreinterpretq_u64_u8(vld1q_u8(static_cast<const uint8_t*>(from)));
+  }
+  static Register repeat(uint64_t number) { return vdupq_n_u64(number); }
+  static Register sad(Register a, Register b) {
+    return vpaddlq_u32(vpaddlq_u16(vpaddlq_u8(vabdq_u8(bytes(a), bytes(b)))));
+  }
+  static Register add_sad(Register sums, Register a, Register b) {
+    return vreinterpretq_u64_u32(
+        vpadalq_u16(vreinterpretq_u32_u64(sums), vpaddlq_u8(vabdq_u8(bytes(a), bytes(b)))));
+  }
+  static uint64_t total(Register sums) { return vaddvq_u32(vreinterpretq_u32_u64(sums)); }
+  static Register product(Register a, Register b) { return vmull_u32(vmovn_u64(a), vmovn_u64(b)); }
+  static void narrow(const Register* sums, EightInts& eight) {
+    const uint32x4_t low = vcombine_u32(vmovn_u64(sums[0]), vmovn_u64(sums[1]));
+    const uint32x4_t high = vcombine_u32(vmovn_u64(sums[2]), vmovn_u64(sums[3]));
+    __builtin_memcpy(&eight, &low, sizeof low);
+    __builtin_memcpy(reinterpret_cast<uint8_t*>(&eight) + sizeof low, &high, sizeof high);
+  }
+  static Register add_products(Register sums, Register a, Register weights) {
+    // Two sums of two for each number, then one.
+    const uint8x16_t w = bytes(weights);
+    const uint32x4_t low = vpaddlq_u16(vmull_u8(vget_low_u8(bytes(a)), vget_low_u8(w)));
+    const uint32x4_t high = vpaddlq_u16(vmull_high_u8(bytes(a), w));
+    return vreinterpretq_u64_u32(vaddq_u32(vreinterpretq_u32_u64(sums), vpaddq_u32(low, high)));
+  }
+  static constexpr int halved = 8;
+  static void halve(const uint8_t* upper, const uint8_t* lower, uint8_t* to) {
+    vst1_u8(to, vrshrn_n_u16(vpadalq_u8(vpaddlq_u8(vld1q_u8(upper)), vld1q_u8(lower)), 2));
+  }
+  static size_t collect(const uint32_t* values, uint32_t limit, uint32_t first, uint32_t* to) {
+    const uint32x4_t low = vcleq_u32(vld1q_u32(values), vdupq_n_u32(limit));
+    const uint32x4_t bit = {1, 2, 4, 8};
+    return write_set_bits(vaddvq_u32(vandq_u32(low, bit)), first, to);
+  }
+};
+#endif
+
+}  // namespace
+}  // namespace panonav::kernels

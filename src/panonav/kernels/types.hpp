@@ -1,0 +1,51 @@
+#pragma once
+
+// What callers and bodies of the kernels share. No C++ standard header here: see CMakeLists.txt.
+
+#include <stddef.h>
+#include <stdint.h>
+
+namespace panonav::kernels {
+
+/// Instruction sets for which kernels have bodies. `avx2` means AVX2 and FMA; `avx512` means F, BW,
+/// DQ and VL.
+enum class Instructions { scalar, avx2, avx512, neon };
+
+/// A query as `sketch_bounds` and `sketch_bounds_at` compare it. Sketches consist of groups of 8
+/// bytes.
+struct SketchQuery {
+  const uint8_t* values;  ///< 8 bytes per group, 0 where the mask is 0
+  const uint8_t* mask;    ///< 8 bytes per group: 255 where a byte counts, else 0
+  const uint64_t* steps;  ///< one weight per group, below 2^22
+  size_t groups;          ///< compared; a multiple of 8 for `sketch_bounds_at`
+  size_t stored_groups;   ///< of each view, >= groups
+  int32_t constant;       ///< added to every bound
+  int32_t largest_slack;  ///< slacks above are taken as this
+};
+
+/// Sizes of what `match_columns` compares.
+inline constexpr int matched_query_columns = 32;
+inline constexpr int matched_reference_columns = 128;
+inline constexpr int matched_bands = 16;
+
+inline constexpr int similarity_lanes = 12;
+
+/// What reference views around a place tell of a view, side by side. A lane without a reference has
+/// similarity 0, the logarithm of which is minus infinity, and lies far away.
+struct SimilarityLanes {
+  float x_m[similarity_lanes];
+  float y_m[similarity_lanes];
+  float log_similarity[similarity_lanes];        ///< to the view
+  float heading_rad[similarity_lanes];           ///< that the reference tells of the view
+  float other_log_similarity[similarity_lanes];  ///< at the other heading that fits
+  float other_heading_rad[similarity_lanes];
+  float per_square_turn[similarity_lanes];  ///< <= 0; 0: the heading does not count
+};
+
+/// How similarity falls with distance: exp(-sqrt(distance^2 + blur) * per_metre).
+struct SimilarityFall {
+  float per_metre;
+  float blur_square_m2;
+};
+
+}  // namespace panonav::kernels
