@@ -88,7 +88,7 @@ void plan(benchmark::State& state) {
 }
 BENCHMARK(plan)->Unit(benchmark::kMillisecond);
 
-// A passage on the way is found shut: the way around it.
+// An edge on the way is found shut: the way around it.
 void plan_around(benchmark::State& state) {
   AreaPlanner planning = planner();
   planning.set_goal(graph().view(graph().size() - 1));
@@ -96,7 +96,7 @@ void plan_around(benchmark::State& state) {
   for (auto _ : state) {
     const std::size_t node = random.index(graph().size());
     const std::size_t area = planning.areas().area_of[node];
-    const std::size_t shut = graph().exits(node).front().passage;
+    const std::size_t shut = graph().exits(node).front().edge;
     planning.close({&shut, 1});
     benchmark::DoNotOptimize(planning.field(area));
     state.PauseTiming();
@@ -129,7 +129,7 @@ void look(benchmark::State& state, bool border, bool from_file, bool all = false
         next = 0;
       }
       const auto begin = std::chrono::steady_clock::now();
-      const NavigationDecision decision = navigator.look(seen[next++]);
+      const NavigationDecision decision = navigator.observe(seen[next++]);
       const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - begin;
       const auto had = [&](NavigationEvent event) {
         return std::ranges::find(decision.events, event) != decision.events.end();

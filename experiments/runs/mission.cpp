@@ -8,6 +8,7 @@
 
 #include "experiments/runs/line_camera.hpp"
 #include "experiments/runs/mapping_run.hpp"
+#include "experiments/runs/simulated_robot.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/localisation/monte_carlo.hpp"
@@ -93,21 +94,6 @@ RoutePanorama record_route(const MissionPlace& place, const std::vector<Pose2>& 
   return route;
 }
 
-// Whether the robot touches nothing on the straight way. Scenes name areas to drive in, too, whose
-// borders are nothing to touch.
-bool has_room(const FreeSpace& space, double robot_radius_m, Point2 from, Point2 to) {
-  constexpr double fine_m = 0.01;
-  const int steps = std::max(1, static_cast<int>(std::ceil(distance(from, to) / fine_m)));
-  for (int i = 1; i <= steps; ++i) {
-    const double share = static_cast<double>(i) / steps;
-    if (space.clearance_m({from.x_m + share * (to.x_m - from.x_m),
-                           from.y_m + share * (to.y_m - from.y_m)}) < robot_radius_m) {
-      return false;
-    }
-  }
-  return true;
-}
-
 // The shortest way, or the straight one where the map of free places has none.
 double shortest_way_m(const FreeSpace& space, Point2 from, Point2 to) {
   if (!std::isfinite(to.x_m) || !std::isfinite(to.y_m)) return distance(from, to);
@@ -162,7 +148,7 @@ RememberedPlace remember_grid(const MissionPlace& place, double spacing_m, std::
     static_cast<void>(memory.append(views[i], {.name = std::to_string(i)}));
   }
   const Lattice lattice = arrange(memory, {}, {}, executor);
-  return {std::move(memory), navigation_graph(lattice), std::move(poses), spacing_m};
+  return {std::move(memory), graph_of_lattice(lattice), std::move(poses), spacing_m};
 }
 
 RememberedPlace remember_drive(const MissionPlace& place, const std::vector<Pose2>& poses,
@@ -185,7 +171,7 @@ RememberedPlace remember_drive(const MissionPlace& place, const std::vector<Pose
     memory.set_pose(node.view, ReferencePose{node.pose.x_m, node.pose.y_m, node.pose.heading_rad});
   }
   const double way_m = path_length_m(poses);
-  NavigationGraph graph = navigation_graph(map, memory, executor);
+  NavigationGraph graph = graph_of_map_and_neighbours(map, memory, executor);
   std::vector<KnownRoute> routes;
   if (place.line) {
     std::vector<RouteView> placed;
@@ -218,7 +204,8 @@ MissionRobot::MissionRobot(const MissionPlace& place, const BaseOptions& base,
 bool MissionRobot::is_clear(Point2 from, Point2 to) const {
   // Who stands too near already must not keep it from going away.
   const bool somebody = people_.touch(to, robot_radius_m_) && !people_.touch(from, robot_radius_m_);
-  return !somebody && has_room(*space_, robot_radius_m_, from, to);
+  constexpr double fine_m = 0.01;
+  return !somebody && has_room_between(*space_, robot_radius_m_, from, to, fine_m);
 }
 
 void MissionRobot::wait(double seconds) {
@@ -257,21 +244,14 @@ std::optional<double> MissionRobot::free_direction(double wanted_rad, double dis
     side_ = 0;
     return wanted_rad;
   }
-  const double apart_rad = radians(15.0);
   // Farther round it would turn back: whoever sends it must know that the way is shut.
   constexpr int feelers_each_side = 6;
-  const int kept = side_;
-  for (int i = 1; i <= feelers_each_side; ++i) {
-    for (const int side : {1, -1}) {
-      if (kept != 0 && side != kept) continue;
-      const double direction_rad = wanted_rad + side * i * apart_rad;
-      if (!is_open(direction_rad, 0.5 * distance_m)) continue;
-      side_ = side;
-      return wrap_angle(direction_rad);
-    }
-  }
-  side_ = -kept;
-  return std::nullopt;
+  const auto aside = feel_aside(wanted_rad, feelers_each_side, side_, [&](double direction_rad) {
+    return is_open(direction_rad, 0.5 * distance_m);
+  });
+  side_ = aside ? aside->side : -side_;
+  if (!aside) return std::nullopt;
+  return wrap_angle(aside->direction_rad);
 }
 
 bool MissionRobot::take_obstacle() noexcept {
@@ -389,7 +369,7 @@ class Voyage {
       report.line = line;
       report.moved = moved;
     }
-    const NavigationDecision decision = navigator.look(view, report);
+    const NavigationDecision decision = navigator.observe(view, report);
     in_doubt_ = std::ranges::any_of(decision.events, [](NavigationEvent event) {
       return event == NavigationEvent::unknown_place || event == NavigationEvent::relocalised ||
              event == NavigationEvent::kidnapped;

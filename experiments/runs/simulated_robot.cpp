@@ -1,5 +1,6 @@
 #include "experiments/runs/simulated_robot.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -9,7 +10,6 @@ namespace panonav {
 
 namespace {
 
-constexpr double feeler_spacing_rad = std::numbers::pi / 12.0;
 constexpr int feelers_each_side = 11;
 
 Point2 ahead(const Pose2& pose, double direction_rad, double distance_m) {
@@ -33,6 +33,32 @@ double free_way_m(const FreeSpace& space, Point2 from, Point2 to) {
 
 }  // namespace
 
+bool has_room_between(const FreeSpace& space, double robot_radius_m, Point2 from, Point2 to,
+                      double spacing_m) {
+  const int steps = std::max(1, static_cast<int>(std::ceil(distance(from, to) / spacing_m)));
+  for (int i = 1; i <= steps; ++i) {
+    const double share = static_cast<double>(i) / steps;
+    if (space.clearance_m({from.x_m + share * (to.x_m - from.x_m),
+                           from.y_m + share * (to.y_m - from.y_m)}) < robot_radius_m) {
+      return false;
+    }
+  }
+  return true;
+}
+
+std::optional<AsideDirection> feel_aside(double wanted_rad, int feelers_each_side, int side,
+                                         const std::function<bool(double)>& is_open) {
+  constexpr double apart_rad = std::numbers::pi / 12.0;
+  for (int i = 1; i <= feelers_each_side; ++i) {
+    for (const int tried : {1, -1}) {
+      if (side != 0 && tried != side) continue;
+      const double direction_rad = wanted_rad + tried * i * apart_rad;
+      if (is_open(direction_rad)) return AsideDirection{direction_rad, tried};
+    }
+  }
+  return std::nullopt;
+}
+
 SimulatedRobot::SimulatedRobot(const FreeSpace& space, const OdometryNoise& motion,
                                ObstacleRule obstacles, const Pose2& start, std::uint64_t seed)
     : space_(&space), motion_(motion), obstacles_(obstacles), pose_(start), random_(seed, 1) {
@@ -46,36 +72,25 @@ bool SimulatedRobot::is_open(double direction_rad, double distance_m) const {
   return space_->is_free_between(pose_.position(), ahead(pose_, direction_rad, distance_m));
 }
 
-std::optional<double> SimulatedRobot::open_on_side(double wanted_rad, double advance_m, int side,
-                                                   int feeler) const {
-  const double direction_rad = wanted_rad + side * feeler * feeler_spacing_rad;
-  if (!is_open(direction_rad, 0.5 * advance_m)) return std::nullopt;
-  return direction_rad;
-}
-
 std::optional<double> SimulatedRobot::free_direction(double wanted_rad, double advance_m) {
   if (is_open(wanted_rad, advance_m)) {
     side_ = 0;
     return wanted_rad;
   }
   if (obstacles_ == ObstacleRule::stop) return std::nullopt;
-  const int kept = side_;
-  for (int i = 1; i <= feelers_each_side; ++i) {
-    for (const int side : {1, -1}) {
-      if (kept != 0 && side != kept) continue;
-      const auto direction_rad = open_on_side(wanted_rad, advance_m, side, i);
-      if (!direction_rad) continue;
-      side_ = side;
-      return direction_rad;
-    }
+  const auto feel = [&] {
+    return feel_aside(wanted_rad, feelers_each_side, side_, [&](double direction_rad) {
+      return is_open(direction_rad, 0.5 * advance_m);
+    });
+  };
+  auto aside = feel();
+  if (!aside && side_ != 0) {
+    side_ = -side_;
+    aside = feel();
   }
-  if (kept == 0) return std::nullopt;
-  side_ = -kept;
-  for (int i = 1; i <= feelers_each_side; ++i) {
-    const auto direction_rad = open_on_side(wanted_rad, advance_m, side_, i);
-    if (direction_rad) return direction_rad;
-  }
-  return std::nullopt;
+  if (!aside) return std::nullopt;
+  side_ = aside->side;
+  return aside->direction_rad;
 }
 
 bool SimulatedRobot::go(double direction_rad, double advance_m) {

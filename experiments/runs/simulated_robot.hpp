@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 
 #include "panonav/core/random.hpp"
@@ -9,6 +10,22 @@
 #include "panonav/simulation/free_space.hpp"
 
 namespace panonav {
+
+/// Whether a robot touches nothing on the straight way, looked at every `spacing_m` beyond `from`.
+/// Scenes name areas to drive in, too, whose borders are nothing to touch.
+[[nodiscard]] bool has_room_between(const FreeSpace& space, double robot_radius_m, Point2 from,
+                                    Point2 to, double spacing_m);
+
+/// A direction beside the wanted one, on the left (1) or the right (-1) of it.
+struct AsideDirection {
+  double direction_rad = 0.0;
+  int side = 0;
+};
+/// With feelers left and right of the wanted direction, 15 degrees apart: the nearest direction
+/// that is open; on one side only, unless `side` is 0. Empty: none is.
+[[nodiscard]] std::optional<AsideDirection> feel_aside(
+    double wanted_rad, int feelers_each_side, int side,
+    const std::function<bool(double direction_rad)>& is_open);
 
 /// What a robot does whose way is not free.
 enum class ObstacleRule {
@@ -40,8 +57,6 @@ class SimulatedRobot {
 
  private:
   [[nodiscard]] bool is_open(double direction_rad, double distance_m) const;
-  [[nodiscard]] std::optional<double> open_on_side(double wanted_rad, double advance_m, int side,
-                                                   int feeler) const;
 
   const FreeSpace* space_;
   OdometryNoise motion_;

@@ -46,10 +46,10 @@ void expect_partition(const NavigationGraph& graph, const SubAreas& areas) {
     }
   }
   EXPECT_EQ(views, graph.size());
-  for (std::size_t p = 0; p < graph.passages().size(); ++p) {
-    const Passage& passage = graph.passages()[p];
+  for (std::size_t p = 0; p < graph.edges().size(); ++p) {
+    const NavigationEdge& edge = graph.edges()[p];
     const bool crosses =
-        areas.area_of[*graph.node_of(passage.a)] != areas.area_of[*graph.node_of(passage.b)];
+        areas.area_of[*graph.node_of(edge.a)] != areas.area_of[*graph.node_of(edge.b)];
     EXPECT_EQ(std::ranges::binary_search(areas.gates, p), crosses);
   }
 }
@@ -138,7 +138,7 @@ TEST(AreaPlanner, WithAllGatesEveryWayIsAShortestOne) {
     const NavigationGraph graph = random_graph(120, 130 + 15 * seed, seed);
     AreaPlanner planner(graph, {.areas = {.views_per_area = 15}, .gates_per_border = 0});
     ASSERT_GT(planner.areas().nodes.size(), 4U);
-    std::vector<std::uint8_t> closed(graph.passages().size(), 0);
+    std::vector<std::uint8_t> closed(graph.edges().size(), 0);
     for (int round = 0; round < 3; ++round) {
       if (round == 1) {
         std::vector<std::size_t> shut;

@@ -82,7 +82,7 @@ TEST(ChainJoin, PlansLeadOverAChain) {
     for (const ViewId view : memory.views()) {
       (islands.remembered.pose_of(view).x_m < 4.0 ? left : right).push_back(view);
     }
-    const NavigationGraph before = navigation_graph(memory, executor);
+    const NavigationGraph before = graph_of_memory(memory, executor);
     ASSERT_FALSE(direction_field(before, right[0])[*before.node_of(left[0])].reachable());
 
     const JoinedChain joined = join_chain(memory, islands.chain, "through the door");
@@ -99,7 +99,7 @@ TEST(ChainJoin, PlansLeadOverAChain) {
       const double apart_m = distance(place_of(link.a).position(), place_of(link.b).position());
       EXPECT_LT(apart_m, 1.0) << "a link of places that lie apart";
     }
-    const NavigationGraph graph = navigation_graph(memory, executor, joined.motion);
+    const NavigationGraph graph = graph_of_memory(memory, executor, joined.motion);
     AreaPlanner planner(graph, {.areas = {.views_per_area = 60}});
     const MemoryViewSource source(memory);
     Navigator navigator(source, planner);
@@ -127,7 +127,7 @@ TEST(ChainJoin, PlansLeadOverAChain) {
       RobotReport report;
       NavigationDecision decision;
       for (int look = 0; look < 300; ++look) {
-        decision = navigator.look(two_rooms_signature(islands.world, robot.pose(), noise), report);
+        decision = navigator.observe(two_rooms_signature(islands.world, robot.pose(), noise), report);
         if (decision.state != NavigationState::moving) break;
         report.obstacle = robot.go(decision.direction_rad, decision.advance_m);
       }

@@ -29,7 +29,7 @@ TEST(DirectionField, WaysAreTheShortestOnes) {
   std::size_t compared = 0;
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
     const NavigationGraph graph = random_graph(30, 20 + seed, seed);
-    std::vector<std::uint8_t> closed(graph.passages().size(), 0);
+    std::vector<std::uint8_t> closed(graph.edges().size(), 0);
     for (std::size_t p = 0; p < closed.size(); p += 7) closed[p] = 1;
     const auto ways = all_ways(graph, closed);
     for (std::size_t goal = 0; goal < graph.size(); goal += 5) {
@@ -48,9 +48,9 @@ TEST(DirectionField, WaysAreTheShortestOnes) {
         ASSERT_EQ(way.back(), goal);
         double length = 0.0;
         for (std::size_t i = 0; i + 1 < way.size(); ++i) {
-          const std::size_t passage = guides[way[i]].passage;
-          ASSERT_EQ(closed[passage], 0);
-          length += graph.passages()[passage].length;
+          const std::size_t edge = guides[way[i]].edge;
+          ASSERT_EQ(closed[edge], 0);
+          length += graph.edges()[edge].length;
         }
         ASSERT_NEAR(length, truth, 1e-9);
       }
@@ -93,7 +93,7 @@ TEST(DirectionField, DirectionsPointAlongTheWayInTheFrameOfEachView) {
 }
 
 TEST(DirectionField, DoesNotLookRoundCorners) {
-  // East twice, then north: from the start the third passage must not count.
+  // East twice, then north: from the start the third edge must not count.
   const std::vector<Pose2> poses{{0, 0, 0.5}, {1, 0, 0}, {1, 1, 0}, {1, 2, 0}};
   const NavigationGraph graph = posed_graph(poses, 1.1, [](Point2, Point2) { return true; });
   const auto guides = direction_field(graph, graph.view(3), {.links_ahead = 3});
@@ -106,17 +106,17 @@ TEST(DirectionField, RefusesWhatIsNotThere) {
   EXPECT_THROW((void)direction_field(graph, ViewId{11}), ContractError);
   EXPECT_THROW((void)direction_field(graph, graph.view(0), {.links_ahead = 0}), OptionError);
   const std::vector<std::uint8_t> wrong(1, 0);
-  if (graph.passages().size() != 1) {
+  if (graph.edges().size() != 1) {
     EXPECT_THROW((void)direction_field(graph, graph.view(0), {}, wrong), ContractError);
   }
 }
 
-TEST(NavigationGraph, KnowsBothWaysOfAPassage) {
+TEST(NavigationGraph, KnowsBothWaysOfAnEdge) {
   const Pose2 a_from_b{1.0, 2.0, 0.7};
   const NavigationGraph graph({ViewId{3}, ViewId{9}},
                               {{ViewId{9}, ViewId{3}, 2.0, a_from_b}, {ViewId{3}, ViewId{9}, 5.0}});
-  ASSERT_EQ(graph.passages().size(), 1U);
-  EXPECT_EQ(graph.passages()[0].length, 2.0);
+  ASSERT_EQ(graph.edges().size(), 1U);
+  EXPECT_EQ(graph.edges()[0].length, 2.0);
   EXPECT_EQ(*graph.motion_from(1, 0), a_from_b);
   const Pose2 round = *graph.motion_from(0, 0) * *graph.motion_from(1, 0);
   EXPECT_NEAR(round.x_m, 0.0, 1e-12);

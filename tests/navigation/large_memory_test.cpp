@@ -24,8 +24,8 @@ TEST(LargeMemory, EveryPlaceIsFoundWithOneAreaInMemory) {
   // Cut at the walls: hardly any area holds views of two rooms.
   std::size_t doors = 0;
   for (const std::size_t gate : areas.gates) {
-    const auto a = static_cast<int>(*graph.node_of(graph.passages()[gate].a));
-    const auto b = static_cast<int>(*graph.node_of(graph.passages()[gate].b));
+    const auto a = static_cast<int>(*graph.node_of(graph.edges()[gate].a));
+    const auto b = static_cast<int>(*graph.node_of(graph.edges()[gate].b));
     doors += a % width / room_width != b % width / room_width ||
              a / width / room_height != b / width / room_height;
   }
@@ -49,7 +49,7 @@ TEST(LargeMemory, EveryPlaceIsFoundWithOneAreaInMemory) {
   ASSERT_GT(way.size(), 100U);
   std::set<std::size_t> entered;
   for (const std::size_t node : way) {
-    const auto decision = navigator.look(memory.signature(graph.view(node)));
+    const auto decision = navigator.observe(memory.signature(graph.view(node)));
     EXPECT_EQ(decision.nearest, graph.view(node));
     EXPECT_EQ(decision.area, areas.area_of[node]);
     entered.insert(decision.area);

@@ -43,7 +43,7 @@ struct World {
   }
   [[nodiscard]] Navigator navigator() const {
     Executor executor(1);
-    return {source, AreaPlanner(navigation_graph(remembered.memory, executor))};
+    return {source, AreaPlanner(graph_of_memory(remembered.memory, executor))};
   }
   [[nodiscard]] ViewId view_at(Point2 place) const {
     const auto& poses = remembered.poses;
@@ -98,7 +98,7 @@ Drive drive(Navigator& navigator, ViewId goal, const Pose2& start, std::uint64_t
     report.line = line;
     run.path.push_back(robot.pose());
     run.decisions.push_back(
-        navigator.look(two_rooms_signature(world().walls, robot.pose(), noise), report));
+        navigator.observe(two_rooms_signature(world().walls, robot.pose(), noise), report));
     const NavigationDecision& decision = run.decisions.back();
     if (decision.state != NavigationState::moving) break;
     obstacle = robot.go(decision.direction_rad, decision.advance_m);
@@ -194,13 +194,13 @@ TEST(NavigatorOnARoute, AShutDoorEndsTheLegAndTheRouteIsNotTriedAgain) {
     RobotReport report{.obstacle = obstacle, .moved = robot.take_odometry()};
     const auto line = two_rooms_line(walls, robot.pose());
     report.line = line;
-    decision = navigator.look(two_rooms_signature(walls, robot.pose(), noise), report);
+    decision = navigator.observe(two_rooms_signature(walls, robot.pose(), noise), report);
     for (const NavigationEvent event : decision.events) {
       begun_after += static_cast<int>(left > 0 && event == NavigationEvent::route);
       left += static_cast<int>(event == NavigationEvent::route_left);
     }
     since_left += left;
-    ASSERT_LT(decision.look, 200);
+    ASSERT_LT(decision.step, 200);
     ASSERT_NE(decision.state, NavigationState::arrived);
     if (decision.state != NavigationState::moving) break;
     obstacle = robot.go(decision.direction_rad, decision.advance_m);

@@ -36,7 +36,7 @@ struct Drive {
 
 AreaPlanner phase_planner(const VisualMemory& memory, int views_per_area = 60) {
   Executor executor(1);
-  return AreaPlanner(navigation_graph(memory, executor),
+  return AreaPlanner(graph_of_memory(memory, executor),
                      {.areas = {.views_per_area = views_per_area}});
 }
 
@@ -53,7 +53,7 @@ Drive drive(const ToyWorld& world, const RememberedWorld& remembered, Navigator&
   for (int look = 1; look <= 600; ++look) {
     if (look == kidnap_look) robot.carry_to(kidnap_to);
     const auto decision =
-        navigator.look(two_rooms_signature(world, robot.pose(), noise, light), report);
+        navigator.observe(two_rooms_signature(world, robot.pose(), noise, light), report);
     run.events.insert(run.events.end(), decision.events.begin(), decision.events.end());
     run.bytes_read += decision.bytes_read;
     run.end = decision;
@@ -92,7 +92,7 @@ TEST(Navigator, ArrivesFromAnywhereByPhasesAlone) {
     for (const Link& link : remembered.memory.links()) {
       map.edges.push_back({link.a, link.b, {}, link.kind, 1.0});
     }
-    const NavigationGraph by_positions = navigation_graph(map);
+    const NavigationGraph by_positions = graph_of_map(map);
     Random random(seed, 3);
     for (int i = 0; i < 15; ++i) {
       const ViewId goal = remembered.memory.views()[random.index(remembered.memory.size())];
@@ -178,7 +178,7 @@ TEST(Navigator, FewComponentsInTheOpenAreEnoughAndCostLess) {
             run.end.state == NavigationState::arrived && run.error_m <= 0.5 * spacing_m;
         Work& work = all ? full_work : coarse_work;
         work.bytes += run.bytes_read;
-        work.looks += run.end.look;
+        work.looks += run.end.step;
       }
     }
   }
@@ -209,7 +209,7 @@ TEST(Navigator, ComparesAllComponentsWhereItMatters) {
   int coarse = 0;
   for (std::size_t i = 0; i < way.size(); ++i) {
     const Pose2& pose = remembered.pose_of(graph.view(way[i]));
-    const auto decision = navigator.look(two_rooms_signature(world, pose, noise));
+    const auto decision = navigator.observe(two_rooms_signature(world, pose, noise));
     ASSERT_EQ(decision.nearest, graph.view(way[i]));
     EXPECT_GT(decision.bytes_read, 0U);
     // What counts is the place where the robot was before it looked.
@@ -249,7 +249,7 @@ TEST(Navigator, AKidnappedRobotStillArrives) {
     }
   }
   EXPECT_GE(outcome.arrived, outcome.runs * 9 / 10);
-  // Not by who was carried a few passages only: the search around finds such a place.
+  // Not by who was carried a few edges only: the search around finds such a place.
   EXPECT_GE(noticed, outcome.runs / 3);
 }
 
@@ -283,7 +283,7 @@ TEST(Navigator, AShutDoorIsGoneRoundOrMakesTheGoalUnreachable) {
         outcome.arrived += arrived;
         if (!second_door) {
           told += run.end.state == NavigationState::unreachable;
-          looks += run.end.look;
+          looks += run.end.step;
           EXPECT_TRUE(run.had(NavigationEvent::closed));
         }
       }
@@ -325,11 +325,11 @@ TEST(Navigator, GoesNowhereWithoutAWay) {
   const Drive run =
       drive(world, remembered, navigator, goal, {6.8, 3.4, 0.0}, DriveKind::holonomic, 1);
   EXPECT_EQ(run.end.state, NavigationState::unreachable);
-  EXPECT_EQ(run.end.look, 1);
+  EXPECT_EQ(run.end.step, 1);
   EXPECT_EQ(run.end.advance_m, 0.0);
 }
 
-// A step leads beyond the references that lie two passages away, and past the goal.
+// A step leads beyond the references that lie two edges away, and past the goal.
 TEST(Navigator, ArrivesOverReferencesThatStandCloseTogether) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   constexpr double close_m = 0.1;
@@ -359,7 +359,7 @@ TEST(Navigator, ArrivesOverReferencesThatStandCloseTogether) {
   EXPECT_LT(upper_median(ratios), 2.0);
 }
 
-// The memory lacks the passages of some views: a robot that stands at one goes on by another.
+// The memory lacks the edges of some views: a robot that stands at one goes on by another.
 TEST(Navigator, GoesOnFromAPlaceWithoutAWay) {
   const ToyWorld world = two_rooms(1, false);
   RememberedWorld remembered(world, high, spacing_m, 1);
@@ -399,7 +399,7 @@ TEST(Navigator, SameCallsGiveTheSameDecisions) {
     Random noise(5);
     RobotReport report;
     for (int look = 0; look < 30; ++look) {
-      const auto decision = navigator.look(two_rooms_signature(world, robot.pose(), noise), report);
+      const auto decision = navigator.observe(two_rooms_signature(world, robot.pose(), noise), report);
       log.push_back(describe(decision));
       report.obstacle = robot.go(decision.direction_rad, decision.advance_m);
     }
@@ -416,11 +416,43 @@ TEST(Navigator, TakesThePlaceOfAnotherEstimate) {
   navigator.set_goal(remembered.memory.views().back());
   Random noise(5);
   const ViewId here = remembered.memory.views()[20];
-  const auto decision = navigator.look(two_rooms_signature(world, remembered.pose_of(here), noise),
+  const auto decision = navigator.observe(two_rooms_signature(world, remembered.pose_of(here), noise),
                                        {.estimate = here});
   EXPECT_EQ(decision.nearest, here);
   EXPECT_TRUE(std::ranges::find(decision.events, NavigationEvent::relocalised) ==
               decision.events.end());
+}
+
+// What the way to another goal was says nothing of how far a step leads, which tells a robot when it
+// is near enough to its goal for homing.
+TEST(Navigator, ForgetsTheWayToTheGoalBefore) {
+  const WalledWorld world = two_rooms(2, true);
+  const RememberedWorld remembered(world, high, spacing_m, 2);
+  const MemoryViewSource source(remembered.memory);
+  const AreaPlanner planner = phase_planner(remembered.memory);
+  const NavigationGraph& graph = planner.graph();
+  const std::size_t here = 20;
+  const auto beside = nodes_around(graph, {&here, 1}, 1);
+  const auto around = nodes_around(graph, {&here, 1}, 2);
+  const auto two_edges_away = std::ranges::find_if(
+      around, [&](std::size_t node) { return !std::ranges::binary_search(beside, node); });
+  ASSERT_NE(two_edges_away, around.end());
+  const ViewId goal = graph.view(*two_edges_away);
+  Random noise(5);
+  const FourierSignature seen = two_rooms_signature(world, remembered.poses[here], noise);
+  const RobotReport report{.estimate = graph.view(here)};
+  Navigator fresh(source, planner);
+  fresh.set_goal(goal);
+  Navigator changed(source, planner);
+  changed.set_goal(graph.views().back());
+  (void)changed.observe(seen, report);
+  changed.set_goal(goal);
+  const auto expected = fresh.observe(seen, report);
+  const auto decision = changed.observe(seen, report);
+  ASSERT_FALSE(expected.homing);
+  EXPECT_FALSE(decision.homing);
+  EXPECT_EQ(decision.next, expected.next);
+  EXPECT_EQ(decision.direction_rad, expected.direction_rad);
 }
 
 TEST(Navigator, RefusesWhatItCannotDo) {
@@ -429,7 +461,7 @@ TEST(Navigator, RefusesWhatItCannotDo) {
   const MemoryViewSource source(remembered.memory);
   Navigator navigator(source, phase_planner(remembered.memory));
   Random noise(1);
-  EXPECT_THROW((void)navigator.look(two_rooms_signature(world, {1, 1, 0}, noise)), ContractError);
+  EXPECT_THROW((void)navigator.observe(two_rooms_signature(world, {1, 1, 0}, noise)), ContractError);
   EXPECT_THROW(navigator.set_goal(ViewId{99999}), ContractError);
   EXPECT_THROW(Navigator(source, phase_planner(remembered.memory), {.step_m = 0.0}), OptionError);
   EXPECT_THROW(Navigator(source, phase_planner(remembered.memory), {.shortest_leg_m = 0.0}),

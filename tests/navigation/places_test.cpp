@@ -57,23 +57,23 @@ struct Grid {
 TEST(NavigationGraph, PhasesAloneTellDirections) {
   const Grid grid;
   Executor executor(1);
-  const NavigationGraph graph = navigation_graph(grid.memory, executor);
-  ASSERT_EQ(graph.passages().size(), grid.memory.links().size());
+  const NavigationGraph graph = graph_of_memory(grid.memory, executor);
+  ASSERT_EQ(graph.edges().size(), grid.memory.links().size());
   std::size_t told = 0;
-  for (const Passage& passage : graph.passages()) {
-    if (!passage.a_from_b) continue;
+  for (const NavigationEdge& edge : graph.edges()) {
+    if (!edge.a_from_b) continue;
     ++told;
-    const Pose2 truth = inverse(grid.poses[passage.a.value]) * grid.poses[passage.b.value];
-    EXPECT_LT(std::abs(angle_difference(std::atan2(passage.a_from_b->y_m, passage.a_from_b->x_m),
+    const Pose2 truth = inverse(grid.poses[edge.a.value]) * grid.poses[edge.b.value];
+    EXPECT_LT(std::abs(angle_difference(std::atan2(edge.a_from_b->y_m, edge.a_from_b->x_m),
                                         std::atan2(truth.y_m, truth.x_m))),
               radians(25.0));
-    EXPECT_LT(std::abs(angle_difference(passage.a_from_b->heading_rad, truth.heading_rad)),
+    EXPECT_LT(std::abs(angle_difference(edge.a_from_b->heading_rad, truth.heading_rad)),
               radians(15.0));
   }
-  EXPECT_GT(told, graph.passages().size() * 9 / 10);
+  EXPECT_GT(told, graph.edges().size() * 9 / 10);
   Executor two(2);
-  const NavigationGraph again = navigation_graph(grid.memory, two);
-  EXPECT_TRUE(std::ranges::equal(graph.passages(), again.passages()));
+  const NavigationGraph again = graph_of_memory(grid.memory, two);
+  EXPECT_TRUE(std::ranges::equal(graph.edges(), again.edges()));
 
   // Whatever the goal, nearly all views send the robot nearer to it.
   int nearer = 0;
@@ -100,55 +100,55 @@ TEST(NavigationGraph, AMapTellsWhatItsPosesTell) {
                            {{ViewId{1}, ViewId{4}, {}, LinkKind::sequence, 1.0},
                             {ViewId{4}, ViewId{6}, {}, LinkKind::closure, 0.05},
                             {ViewId{6}, ViewId{9}, {}, LinkKind::sequence, 1.0}}};
-  const NavigationGraph graph = navigation_graph(map);
-  ASSERT_EQ(graph.passages().size(), 1U);  // one contradicts the map, one leads to another frame
-  EXPECT_NEAR(graph.passages()[0].length, 2.0, 1e-12);
-  EXPECT_NEAR(graph.passages()[0].a_from_b->x_m, 2.0 * std::cos(0.3), 1e-12);
-  EXPECT_NEAR(graph.passages()[0].a_from_b->y_m, -2.0 * std::sin(0.3), 1e-12);
-  EXPECT_EQ(navigation_graph(map, 0.0).passages().size(), 2U);
+  const NavigationGraph graph = graph_of_map(map);
+  ASSERT_EQ(graph.edges().size(), 1U);  // one contradicts the map, one leads to another frame
+  EXPECT_NEAR(graph.edges()[0].length, 2.0, 1e-12);
+  EXPECT_NEAR(graph.edges()[0].a_from_b->x_m, 2.0 * std::cos(0.3), 1e-12);
+  EXPECT_NEAR(graph.edges()[0].a_from_b->y_m, -2.0 * std::sin(0.3), 1e-12);
+  EXPECT_EQ(graph_of_map(map, 0.0).edges().size(), 2U);
 }
 
 TEST(NavigationGraph, ALatticeGivesLengthsAndPhasesGiveDirections) {
   const Grid grid;
   Executor executor(1);
   const Lattice lattice = arrange(grid.memory, {}, {}, executor);
-  const NavigationGraph graph = navigation_graph(lattice);
-  ASSERT_GT(graph.passages().size(), 60U);
+  const NavigationGraph graph = graph_of_lattice(lattice);
+  ASSERT_GT(graph.edges().size(), 60U);
   int right = 0;
-  for (const Passage& passage : graph.passages()) {
-    if (!passage.a_from_b) continue;
-    const Pose2 truth = inverse(grid.poses[passage.a.value]) * grid.poses[passage.b.value];
-    right += std::abs(angle_difference(std::atan2(passage.a_from_b->y_m, passage.a_from_b->x_m),
+  for (const NavigationEdge& edge : graph.edges()) {
+    if (!edge.a_from_b) continue;
+    const Pose2 truth = inverse(grid.poses[edge.a.value]) * grid.poses[edge.b.value];
+    right += std::abs(angle_difference(std::atan2(edge.a_from_b->y_m, edge.a_from_b->x_m),
                                        std::atan2(truth.y_m, truth.x_m))) < radians(25.0);
   }
-  EXPECT_GE(right, static_cast<int>(graph.passages().size()) * 9 / 10);
+  EXPECT_GE(right, static_cast<int>(graph.edges().size()) * 9 / 10);
 }
 
 TEST(NavigationGraph, AStoredLatticeSaysTheSameAsTheLattice) {
   const Grid grid;
   Executor executor(1);
   const Lattice lattice = arrange(grid.memory, {}, {}, executor);
-  const NavigationGraph graph = navigation_graph(lattice);
+  const NavigationGraph graph = graph_of_lattice(lattice);
   const NavigationGraph stored =
-      stored_lattice_graph(map_of(lattice), MemoryViewSource(grid.memory), executor);
+      graph_of_stored_lattice(map_of(lattice), MemoryViewSource(grid.memory), executor);
   ASSERT_EQ(stored.size(), graph.size());
-  // Springs may be longer than they came to lie, so the stored lattice has some passages more.
-  ASSERT_GE(stored.passages().size(), graph.passages().size() * 9 / 10);
+  // Springs may be longer than they came to lie, so the stored lattice has some edges more.
+  ASSERT_GE(stored.edges().size(), graph.edges().size() * 9 / 10);
   std::size_t same = 0;
-  for (const Passage& passage : graph.passages()) {
-    const auto found = std::ranges::find_if(stored.passages(), [&](const Passage& other) {
-      return other.a == passage.a && other.b == passage.b;
+  for (const NavigationEdge& edge : graph.edges()) {
+    const auto found = std::ranges::find_if(stored.edges(), [&](const NavigationEdge& other) {
+      return other.a == edge.a && other.b == edge.b;
     });
-    if (found == stored.passages().end()) continue;
-    const bool both = found->a_from_b && passage.a_from_b;
+    if (found == stored.edges().end()) continue;
+    const bool both = found->a_from_b && edge.a_from_b;
     if (both) {
-      EXPECT_NEAR(found->length, passage.length, 1e-9);
-      EXPECT_NEAR(found->a_from_b->x_m, passage.a_from_b->x_m, 1e-9);
-      EXPECT_NEAR(found->a_from_b->y_m, passage.a_from_b->y_m, 1e-9);
+      EXPECT_NEAR(found->length, edge.length, 1e-9);
+      EXPECT_NEAR(found->a_from_b->x_m, edge.a_from_b->x_m, 1e-9);
+      EXPECT_NEAR(found->a_from_b->y_m, edge.a_from_b->y_m, 1e-9);
     }
-    same += both == (found->a_from_b || passage.a_from_b) ? 1 : 0;
+    same += both == (found->a_from_b || edge.a_from_b) ? 1 : 0;
   }
-  EXPECT_GE(same, graph.passages().size() * 9 / 10);
+  EXPECT_GE(same, graph.edges().size() * 9 / 10);
 }
 
 // A square grid of views, all with heading 0, laid out and seen without error.
@@ -186,27 +186,27 @@ void add_springs_to_neighbours(Lattice& lattice, std::size_t first, std::size_t 
   }
 }
 
-bool has_passage(const NavigationGraph& graph, std::size_t a, std::size_t b) {
+bool has_edge(const NavigationGraph& graph, std::size_t a, std::size_t b) {
   return std::ranges::any_of(graph.exits(a), [&](const auto& exit) { return exit.node == b; });
 }
 
 TEST(NavigationGraph, LengthsAreInSpacingsOfTheReferences) {
   Lattice lattice = exact_grid(9, 5);
   add_springs_to_neighbours(lattice, 0, lattice.nodes.size());
-  const NavigationGraph graph = navigation_graph(lattice);
-  ASSERT_EQ(graph.passages().size(), lattice.springs.size());
-  for (const Passage& passage : graph.passages()) {
+  const NavigationGraph graph = graph_of_lattice(lattice);
+  ASSERT_EQ(graph.edges().size(), lattice.springs.size());
+  for (const NavigationEdge& edge : graph.edges()) {
     const Pose2 truth =
-        inverse(lattice.nodes[passage.a.value].pose) * lattice.nodes[passage.b.value].pose;
-    EXPECT_NEAR(passage.length, std::hypot(truth.x_m, truth.y_m), 1e-9);
-    ASSERT_TRUE(passage.a_from_b.has_value());
-    EXPECT_NEAR(passage.a_from_b->x_m, truth.x_m, 1e-9);
-    EXPECT_NEAR(passage.a_from_b->y_m, truth.y_m, 1e-9);
+        inverse(lattice.nodes[edge.a.value].pose) * lattice.nodes[edge.b.value].pose;
+    EXPECT_NEAR(edge.length, std::hypot(truth.x_m, truth.y_m), 1e-9);
+    ASSERT_TRUE(edge.a_from_b.has_value());
+    EXPECT_NEAR(edge.a_from_b->x_m, truth.x_m, 1e-9);
+    EXPECT_NEAR(edge.a_from_b->y_m, truth.y_m, 1e-9);
   }
 }
 
 // Two places far apart that look alike: the arrangement holds springs between them.
-TEST(NavigationGraph, LeavesOutPassagesToPlacesThatLookAlike) {
+TEST(NavigationGraph, LeavesOutEdgesToPlacesThatLookAlike) {
   constexpr std::size_t columns = 14;
   Lattice lattice = exact_grid(columns, 6);
   add_springs_to_neighbours(lattice, 0, lattice.nodes.size());
@@ -220,16 +220,16 @@ TEST(NavigationGraph, LeavesOutPassagesToPlacesThatLookAlike) {
     const auto column = static_cast<double>(node.view.value % columns);
     if (column >= 7.0) node.pose = {14.0 - column, node.pose.y_m, node.pose.heading_rad};
   }
-  const NavigationGraph graph = navigation_graph(lattice);
-  EXPECT_FALSE(has_passage(graph, here, alike));
-  EXPECT_FALSE(has_passage(graph, here + columns, alike + columns));
+  const NavigationGraph graph = graph_of_lattice(lattice);
+  EXPECT_FALSE(has_edge(graph, here, alike));
+  EXPECT_FALSE(has_edge(graph, here + columns, alike + columns));
   // All others, but those that the fold has bent.
-  EXPECT_TRUE(has_passage(graph, here, here + 1));
-  EXPECT_TRUE(has_passage(graph, alike, alike + columns));
+  EXPECT_TRUE(has_edge(graph, here, here + 1));
+  EXPECT_TRUE(has_edge(graph, alike, alike + columns));
 }
 
 // What is left out for that comes back where nothing else joins two parts.
-TEST(NavigationGraph, KeepsTheOnlyPassageBetweenTwoParts) {
+TEST(NavigationGraph, KeepsTheOnlyEdgeBetweenTwoParts) {
   constexpr std::size_t side = 6;
   Lattice lattice = exact_grid(side, 2 * side);
   const std::size_t half = side * side;
@@ -239,9 +239,9 @@ TEST(NavigationGraph, KeepsTheOnlyPassageBetweenTwoParts) {
   for (const std::size_t beyond : {door + side, door + side + 1}) {
     add_spring(lattice, door, beyond, lattice.nodes[beyond].pose.position());
   }
-  const NavigationGraph graph = navigation_graph(lattice);
-  EXPECT_TRUE(has_passage(graph, door, door + side));
-  EXPECT_FALSE(has_passage(graph, door, door + side + 1));
+  const NavigationGraph graph = graph_of_lattice(lattice);
+  EXPECT_TRUE(has_edge(graph, door, door + side));
+  EXPECT_FALSE(has_edge(graph, door, door + side + 1));
   const auto guides = direction_field(graph, ViewId{0});
   EXPECT_TRUE(std::ranges::all_of(guides, [](const Guide& guide) { return guide.reachable(); }));
 }
@@ -250,7 +250,7 @@ TEST(PlaceScale, TellsNeighboursFromStrangers) {
   const Grid grid;
   const MemoryViewSource source(grid.memory);
   Executor executor(1);
-  const NavigationGraph graph = navigation_graph(grid.memory, executor);
+  const NavigationGraph graph = graph_of_memory(grid.memory, executor);
   const PlaceScale scale = learn_place_scale(source, graph);
   EXPECT_GT(scale.neighbours, 0.0);
   EXPECT_LT(scale.neighbours, scale.limit());
@@ -262,7 +262,7 @@ TEST(PlaceScale, ArrivalMeansHalfTheSpacing) {
   const Grid grid;
   const MemoryViewSource source(grid.memory);
   Executor executor(1);
-  const NavigationGraph graph = navigation_graph(grid.memory, executor);
+  const NavigationGraph graph = graph_of_memory(grid.memory, executor);
   Random random(2);
   for (const std::size_t node : {std::size_t{7}, std::size_t{14}, std::size_t{21}}) {
     const ArrivalScale scale = learn_arrival_scale(source, graph, graph.view(node));
@@ -295,7 +295,7 @@ TEST(AreaViews, HoldsAnAreaAndFindsWhatTheWholeMemoryFinds) {
   const Grid grid;
   const MemoryViewSource source(grid.memory);
   Executor executor(1);
-  const NavigationGraph graph = navigation_graph(grid.memory, executor);
+  const NavigationGraph graph = graph_of_memory(grid.memory, executor);
   const SubAreas areas = divide(graph, {.views_per_area = 6});
   ASSERT_GT(areas.nodes.size(), 3U);
   AreaViews views(source, 1);
@@ -341,7 +341,7 @@ TEST(AreaViews, WhatIsLoadedAheadNeedNotBeLoadedAgain) {
     mutable std::size_t loaded = 0;
   } source(grid.memory);
   Executor executor(1);
-  const NavigationGraph graph = navigation_graph(grid.memory, executor);
+  const NavigationGraph graph = graph_of_memory(grid.memory, executor);
   const SubAreas areas = divide(graph, {.views_per_area = 12});
   ASSERT_GT(areas.nodes.size(), 2U);
   AreaViews at_once(source, 1);
@@ -373,7 +373,7 @@ TEST(AreaViews, FewComponentsReadLess) {
   const Grid grid;
   const MemoryViewSource source(grid.memory);
   Executor executor(1);
-  const NavigationGraph graph = navigation_graph(grid.memory, executor);
+  const NavigationGraph graph = graph_of_memory(grid.memory, executor);
   const SubAreas areas = undivided(graph);
   std::uint64_t read[2] = {0, 0};
   for (const int components : {0, 5}) {
@@ -402,14 +402,14 @@ TEST(Obstacle, ClosesAllThatCrossesItAndNothingElse) {
   // From the middle, the way to the east is shut over one spacing either way.
   const std::size_t node = 12;
   const double direction = angle_difference(0.0, poses[node].heading_rad);
-  const auto across = passages_across(graph, {node, direction, 0.5, 1.0});
+  const auto across = edges_across(graph, {node, direction, 0.5, 1.0});
   std::size_t expected = 0;
-  for (std::size_t p = 0; p < graph.passages().size(); ++p) {
-    const Point2 a = poses[*graph.node_of(graph.passages()[p].a)].position();
-    const Point2 b = poses[*graph.node_of(graph.passages()[p].b)].position();
+  for (std::size_t p = 0; p < graph.edges().size(); ++p) {
+    const Point2 a = poses[*graph.node_of(graph.edges()[p].a)].position();
+    const Point2 b = poses[*graph.node_of(graph.edges()[p].b)].position();
     const bool crosses = std::min(a.x_m, b.x_m) == 2.0 && std::max(a.x_m, b.x_m) == 3.0 &&
                          std::abs(0.5 * (a.y_m + b.y_m) - 2.0) <= 1.0 + 1e-9;
-    // The bar ends on passages at its rim: both answers are right there.
+    // The bar ends on edges at its rim: both answers are right there.
     const bool at_rim = std::abs(std::abs(0.5 * (a.y_m + b.y_m) - 2.0) - 1.0) < 1e-6;
     if (!at_rim) {
       EXPECT_EQ(std::ranges::binary_search(across, p), crosses);
@@ -417,8 +417,8 @@ TEST(Obstacle, ClosesAllThatCrossesItAndNothingElse) {
     expected += crosses && !at_rim;
   }
   EXPECT_EQ(expected, 5U);
-  EXPECT_THROW((void)passages_across(graph, {99, 0.0, 0.5, 1.0}), ContractError);
-  EXPECT_THROW((void)passages_across(graph, {0, 0.0, -0.5, 1.0}), ContractError);
+  EXPECT_THROW((void)edges_across(graph, {99, 0.0, 0.5, 1.0}), ContractError);
+  EXPECT_THROW((void)edges_across(graph, {0, 0.0, -0.5, 1.0}), ContractError);
 }
 
 }  // namespace

@@ -39,7 +39,7 @@ inline NavigationGraph graph_of_rooms() {
     return (x / room_width == to_x / room_width || door_across) &&
            (y / room_height == to_y / room_height || door_along);
   };
-  std::vector<Passage> passages;
+  std::vector<NavigationEdge> edges;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       for (const auto& [dx, dy] : {std::pair{1, 0}, {0, 1}, {1, 1}, {-1, 1}}) {
@@ -48,11 +48,11 @@ inline NavigationGraph graph_of_rooms() {
         if (to_x < 0 || to_x >= width || to_y >= height || !joined(x, y, to_x, to_y)) continue;
         const auto a = static_cast<std::size_t>(y * width + x);
         const auto b = static_cast<std::size_t>(to_y * width + to_x);
-        passages.push_back({views[a], views[b], std::hypot(dx, dy), inverse(poses[a]) * poses[b]});
+        edges.push_back({views[a], views[b], std::hypot(dx, dy), inverse(poses[a]) * poses[b]});
       }
     }
   }
-  return {views, passages};
+  return {views, edges};
 }
 
 // Signatures of the usual size, each another one, of the views 1, 2, .. as in a file.

@@ -20,12 +20,12 @@ inline std::vector<ViewId> numbered_views(std::size_t count) {
   return views;
 }
 
-/// Passages at random, connected or not.
-inline NavigationGraph random_graph(std::size_t nodes, std::size_t passages, std::uint64_t seed) {
+/// Edges at random, connected or not.
+inline NavigationGraph random_graph(std::size_t nodes, std::size_t edges, std::uint64_t seed) {
   Random random(seed);
   const auto views = numbered_views(nodes);
-  std::vector<Passage> made;
-  for (std::size_t i = 0; i < passages; ++i) {
+  std::vector<NavigationEdge> made;
+  for (std::size_t i = 0; i < edges; ++i) {
     const std::size_t a = random.index(nodes);
     const std::size_t b = random.index(nodes);
     if (a != b) made.push_back({views[a], views[b], random.uniform(0.1, 2.0), std::nullopt});
@@ -33,12 +33,12 @@ inline NavigationGraph random_graph(std::size_t nodes, std::size_t passages, std
   return {views, made};
 }
 
-/// Views with poses and a passage between all that are no farther apart than `reach_m` and see
+/// Views with poses and an edge between all that are no farther apart than `reach_m` and see
 /// each other, as `sees` says.
 template <class Sees>
 NavigationGraph posed_graph(const std::vector<Pose2>& poses, double reach_m, const Sees& sees) {
   const auto views = numbered_views(poses.size());
-  std::vector<Passage> made;
+  std::vector<NavigationEdge> made;
   for (std::size_t a = 0; a < poses.size(); ++a) {
     for (std::size_t b = a + 1; b < poses.size(); ++b) {
       const double length = distance(poses[a].position(), poses[b].position());
@@ -55,12 +55,12 @@ inline std::vector<double> all_ways(const NavigationGraph& graph,
   const std::size_t n = graph.size();
   std::vector<double> ways(n * n, std::numeric_limits<double>::infinity());
   for (std::size_t i = 0; i < n; ++i) ways[i * n + i] = 0.0;
-  for (std::size_t p = 0; p < graph.passages().size(); ++p) {
+  for (std::size_t p = 0; p < graph.edges().size(); ++p) {
     if (!closed.empty() && closed[p] != 0) continue;
-    const Passage& passage = graph.passages()[p];
-    const std::size_t a = *graph.node_of(passage.a);
-    const std::size_t b = *graph.node_of(passage.b);
-    ways[a * n + b] = std::min(ways[a * n + b], passage.length);
+    const NavigationEdge& edge = graph.edges()[p];
+    const std::size_t a = *graph.node_of(edge.a);
+    const std::size_t b = *graph.node_of(edge.b);
+    ways[a * n + b] = std::min(ways[a * n + b], edge.length);
     ways[b * n + a] = ways[a * n + b];
   }
   for (std::size_t k = 0; k < n; ++k) {

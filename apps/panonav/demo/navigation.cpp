@@ -33,7 +33,7 @@ using Pipeline = std::shared_ptr<const ViewEncoder>;
 
 RememberedPlace remembered_place(const VisualMemory& memory, const Lattice& arranged,
                                  double spacing_m) {
-  RememberedPlace remembered{memory, navigation_graph(arranged), {}, spacing_m};
+  RememberedPlace remembered{memory, graph_of_lattice(arranged), {}, spacing_m};
   for (const ViewId view : remembered.graph.views()) {
     const ReferencePose& pose = *memory.info(view).pose;
     remembered.truth.push_back({pose.x_m, pose.y_m, *pose.heading_rad});

@@ -73,7 +73,7 @@ ordered_json as_json(const NavigationDecision& decision, const Pose2& pose,
                      const VisualMemory& memory) {
   auto events = ordered_json::array();
   for (const NavigationEvent event : decision.events) events.push_back(name_of(event));
-  return {{"look", decision.look},
+  return {{"look", decision.step},
           {"state", name_of(decision.state)},
           {"direction_rad", decision.direction_rad},
           {"advance_m", decision.advance_m},
@@ -119,7 +119,7 @@ std::string in_words(NavigationEvent event) {
 }
 
 std::string as_text(const NavigationDecision& decision, const VisualMemory& memory) {
-  std::string line = "look " + std::to_string(decision.look) + "  ";
+  std::string line = "look " + std::to_string(decision.step) + "  ";
   if (decision.nearest) line += "at " + file_of(*decision.nearest, memory) + "  ";
   for (std::size_t i = 0; i < decision.events.size(); ++i) {
     line += (i > 0 ? ", " : "") + in_words(decision.events[i]);
@@ -157,7 +157,7 @@ ordered_json summary_json(const NavigateArguments& wanted, const Remembered& rem
       {"passages_from", name_of(remembered.origin)},
       {"route", or_null(wanted.route)},
       {"views", graph.size()},
-      {"passages", graph.passages().size()},
+      {"passages", graph.edges().size()},
       {"areas", planner.areas().nodes.size()},
       {"end", name_of(run.end)},
       {"reason", reason_of(run.end)},
@@ -249,7 +249,7 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
   const Mission mission = mission_of(wanted, goal, place, seed);
   if (!session.json()) {
     session.print(std::to_string(remembered.place.graph.size()) + " views, " +
-                  std::to_string(remembered.place.graph.passages().size()) + " passages from " +
+                  std::to_string(remembered.place.graph.edges().size()) + " passages from " +
                   (remembered.origin == GraphOrigin::arrangement
                        ? "an arrangement made now (panonav arrange would keep one)"
                        : "the memory's " + std::string(name_of(remembered.origin))));

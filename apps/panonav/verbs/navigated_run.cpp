@@ -25,18 +25,18 @@ std::optional<NavigationGraph> graph_from(GraphOrigin origin, const MemoryFile& 
     case GraphOrigin::map: {
       const auto map = file.map("map");
       if (!map) return std::nullopt;
-      return navigation_graph(*map, memory, executor);
+      return graph_of_map_and_neighbours(*map, memory, executor);
     }
     case GraphOrigin::lattice: {
       const auto map = file.map("lattice");
       if (!map) return std::nullopt;
-      return stored_lattice_graph(*map, MemoryViewSource(memory), executor);
+      return graph_of_stored_lattice(*map, MemoryViewSource(memory), executor);
     }
     case GraphOrigin::links:
       if (memory.links().empty()) return std::nullopt;
-      return navigation_graph(memory, executor);
+      return graph_of_memory(memory, executor);
     case GraphOrigin::arrangement:
-      return navigation_graph(arrange(memory, {}, {}, executor));
+      return graph_of_lattice(arrange(memory, {}, {}, executor));
   }
   return std::nullopt;
 }
@@ -53,12 +53,12 @@ std::vector<Pose2> true_poses(const NavigationGraph& graph, const VisualMemory& 
   return poses;
 }
 
-/// Median length of the passages between views whose places are known; 0 without any.
+/// Median length of the edges between views whose places are known; 0 without any.
 double spacing_of(const NavigationGraph& graph, const std::vector<Pose2>& truth) {
   std::vector<double> lengths;
-  for (const Passage& passage : graph.passages()) {
-    const double length = distance(truth[*graph.node_of(passage.a)].position(),
-                                   truth[*graph.node_of(passage.b)].position());
+  for (const NavigationEdge& edge : graph.edges()) {
+    const double length = distance(truth[*graph.node_of(edge.a)].position(),
+                                   truth[*graph.node_of(edge.b)].position());
     if (std::isfinite(length)) lengths.push_back(length);
   }
   return lengths.empty() ? 0.0 : upper_median(std::move(lengths));

@@ -16,7 +16,7 @@
 
 namespace panonav::command {
 
-/// What the passages of a memory are taken from.
+/// What the edges of a memory are taken from.
 enum class GraphOrigin {
   map,          ///< of the verb `map`: motions as the map has them
   lattice,      ///< of the verb `arrange`: directions from the views' phases
@@ -27,7 +27,7 @@ enum class GraphOrigin {
 [[nodiscard]] std::string_view name_of(GraphOrigin origin);
 [[nodiscard]] std::optional<GraphOrigin> graph_origin(std::string_view name);
 
-/// What a robot remembers that has this memory file, and where its passages are from.
+/// What a robot remembers that has this memory file, and where its edges are from.
 struct Remembered {
   RememberedPlace place;
   GraphOrigin origin = GraphOrigin::map;

@@ -35,23 +35,23 @@ AreaPlanner::AreaPlanner(NavigationGraph graph, SubAreas areas, const PlannerOpt
     : graph_(std::move(graph)),
       areas_(std::move(areas)),
       options_(options),
-      closed_(graph_.passages().size(), 0),
+      closed_(graph_.edges().size(), 0),
       ends_(areas_.nodes.size()) {
   validate(options_);
   require(areas_.area_of.size() == graph_.size() && areas_.place_of.size() == graph_.size(),
           "views in areas", static_cast<double>(areas_.area_of.size()), "those of the graph");
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> known;
   for (const std::size_t gate : areas_.gates) {
-    const Passage& passage = graph_.passages()[gate];
-    const auto [low, high] = std::minmax(areas_.area_of[*graph_.node_of(passage.a)],
-                                         areas_.area_of[*graph_.node_of(passage.b)]);
+    const NavigationEdge& edge = graph_.edges()[gate];
+    const auto [low, high] = std::minmax(areas_.area_of[*graph_.node_of(edge.a)],
+                                         areas_.area_of[*graph_.node_of(edge.b)]);
     const auto [found, is_new] = known.try_emplace({low, high}, borders_.size());
     if (is_new) {
       ends_[low].borders.push_back(borders_.size());
       ends_[high].borders.push_back(borders_.size());
       borders_.push_back({low, high, {}, {}});
     }
-    borders_[found->second].passages.push_back(gate);
+    borders_[found->second].edges.push_back(gate);
   }
   for (Border& border : borders_) choose_gates(border);
   for (std::size_t area = 0; area < ends_.size(); ++area) find_ways(area);
@@ -63,10 +63,9 @@ std::size_t AreaPlanner::gates() const noexcept {
   return count;
 }
 
-std::pair<std::size_t, std::size_t> AreaPlanner::ends_of(std::size_t passage,
-                                                         std::size_t area) const {
-  const std::size_t a = *graph_.node_of(graph_.passages()[passage].a);
-  const std::size_t b = *graph_.node_of(graph_.passages()[passage].b);
+std::pair<std::size_t, std::size_t> AreaPlanner::ends_of(std::size_t edge, std::size_t area) const {
+  const std::size_t a = *graph_.node_of(graph_.edges()[edge].a);
+  const std::size_t b = *graph_.node_of(graph_.edges()[edge].b);
   return areas_.area_of[a] == area ? std::pair(a, b) : std::pair(b, a);
 }
 
@@ -79,7 +78,7 @@ std::vector<Guide> AreaPlanner::tree_from(std::size_t area, std::size_t node) co
 std::optional<std::size_t> AreaPlanner::end_beyond(std::size_t area,
                                                    const NavigationGraph::Exit& exit) const {
   const std::size_t beyond = areas_.area_of[exit.node];
-  if (beyond == area || closed_[exit.passage] != 0) return std::nullopt;
+  if (beyond == area || closed_[exit.edge] != 0) return std::nullopt;
   const auto& nodes = ends_[beyond].nodes;
   const auto found = std::ranges::lower_bound(nodes, exit.node);
   if (found == nodes.end() || *found != exit.node) return std::nullopt;
@@ -89,7 +88,7 @@ std::optional<std::size_t> AreaPlanner::end_beyond(std::size_t area,
 // The gates that lie farthest from those chosen before, one after the other.
 void AreaPlanner::choose_gates(Border& border) const {
   std::vector<std::size_t> open;
-  for (const std::size_t gate : border.passages) {
+  for (const std::size_t gate : border.edges) {
     if (closed_[gate] == 0) open.push_back(gate);
   }
   const auto most = static_cast<std::size_t>(options_.gates_per_border);
@@ -170,19 +169,18 @@ void AreaPlanner::plan_over_areas() {
     for (const NavigationGraph::Exit& exit : graph_.exits(ends.nodes[at.end])) {
       const std::size_t beyond = areas_.area_of[exit.node];
       const auto end = end_beyond(at.area, exit);
-      if (end) offer(at.way + graph_.passages()[exit.passage].length, beyond, *end);
+      if (end) offer(at.way + graph_.edges()[exit.edge].length, beyond, *end);
     }
   }
 }
 
-void AreaPlanner::close(std::span<const std::size_t> passages) {
+void AreaPlanner::close(std::span<const std::size_t> edges) {
   std::set<std::size_t> changed;
-  for (const std::size_t passage : passages) {
-    require(passage < closed_.size(), "passage", static_cast<double>(passage),
-            "a passage of the graph");
-    closed_[passage] = 1;
-    changed.insert(areas_.area_of[*graph_.node_of(graph_.passages()[passage].a)]);
-    changed.insert(areas_.area_of[*graph_.node_of(graph_.passages()[passage].b)]);
+  for (const std::size_t edge : edges) {
+    require(edge < closed_.size(), "edge", static_cast<double>(edge), "an edge of the graph");
+    closed_[edge] = 1;
+    changed.insert(areas_.area_of[*graph_.node_of(graph_.edges()[edge].a)]);
+    changed.insert(areas_.area_of[*graph_.node_of(graph_.edges()[edge].b)]);
   }
   // A closed gate gives its place to another one of the border.
   for (Border& border : borders_) {
@@ -196,11 +194,11 @@ void AreaPlanner::close(std::span<const std::size_t> passages) {
 
 void AreaPlanner::open_all() {
   std::set<std::size_t> changed;
-  for (std::size_t passage = 0; passage < closed_.size(); ++passage) {
-    if (closed_[passage] == 0) continue;
-    closed_[passage] = 0;
-    changed.insert(areas_.area_of[*graph_.node_of(graph_.passages()[passage].a)]);
-    changed.insert(areas_.area_of[*graph_.node_of(graph_.passages()[passage].b)]);
+  for (std::size_t edge = 0; edge < closed_.size(); ++edge) {
+    if (closed_[edge] == 0) continue;
+    closed_[edge] = 0;
+    changed.insert(areas_.area_of[*graph_.node_of(graph_.edges()[edge].a)]);
+    changed.insert(areas_.area_of[*graph_.node_of(graph_.edges()[edge].b)]);
   }
   for (Border& border : borders_) {
     if (changed.contains(border.low) && changed.contains(border.high)) choose_gates(border);
@@ -222,8 +220,8 @@ std::vector<Guide> AreaPlanner::field(std::size_t area) const {
       const auto end = end_beyond(area, exit);
       if (!end) continue;
       const double way =
-          ends_[areas_.area_of[exit.node]].to_goal[*end] + graph_.passages()[exit.passage].length;
-      if (way < unreachable) roots.push_back({node, way, exit.node, exit.passage});
+          ends_[areas_.area_of[exit.node]].to_goal[*end] + graph_.edges()[exit.edge].length;
+      if (way < unreachable) roots.push_back({node, way, exit.node, exit.edge});
     }
   }
   std::vector<Guide> guides = search_tree(graph_, areas_, area, roots, closed_);

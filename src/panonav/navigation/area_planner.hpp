@@ -26,7 +26,7 @@ void visit_options(PlannerOptions& options, OptionVisitor& visitor);
 /// Plans over areas first, then inside: the sub-goals of the outlook of [M04 section 3.5]. The ways
 /// between the gates of an area are found once; a goal then costs a search in its own area and one
 /// over the gates, and the field of an area a search in that area. So a plan does not look at
-/// views outside the areas that it needs. Closed passages stay closed until they are opened.
+/// views outside the areas that it needs. Closed edges stay closed until they are opened.
 class AreaPlanner {
  public:
   /// Throws OptionError. Cost: that of `divide`, and a search in its area for each gate.
@@ -43,11 +43,11 @@ class AreaPlanner {
   void set_goal(ViewId goal);
   [[nodiscard]] std::optional<ViewId> goal() const;
 
-  /// Passages that cannot be used now. Throws ContractError on one that there is not. Cost: the
+  /// Edges that cannot be used now. Throws ContractError on one that there is not. Cost: the
   /// ways between gates of the areas at both ends are found anew, and the plan over areas.
-  void close(std::span<const std::size_t> passages);
+  void close(std::span<const std::size_t> edges);
   void open_all();
-  [[nodiscard]] bool is_closed(std::size_t passage) const { return closed_.at(passage) != 0; }
+  [[nodiscard]] bool is_closed(std::size_t edge) const { return closed_.at(edge) != 0; }
   [[nodiscard]] std::size_t closed() const noexcept;
 
   /// Guides towards the goal by place in the area; none is reachable without a goal. Throws
@@ -59,11 +59,11 @@ class AreaPlanner {
   [[nodiscard]] std::vector<std::size_t> planned_way(std::size_t start) const;
 
  private:
-  /// Two areas and the passages between them.
+  /// Two areas and the edges between them.
   struct Border {
-    std::size_t low = 0, high = 0;      // areas
-    std::vector<std::size_t> passages;  // all
-    std::vector<std::size_t> chosen;    // those that count
+    std::size_t low = 0, high = 0;    // areas
+    std::vector<std::size_t> edges;   // all
+    std::vector<std::size_t> chosen;  // those that count
   };
   /// Ends of gates within an area, and the ways between them.
   struct Ends {
@@ -72,8 +72,8 @@ class AreaPlanner {
     std::vector<double> ways;        // nodes.size() squared; infinite where there is none
     std::vector<double> to_goal;     // of each of `nodes`
   };
-  /// Ends of a passage with the one in `area` first.
-  [[nodiscard]] std::pair<std::size_t, std::size_t> ends_of(std::size_t passage,
+  /// Ends of an edge with the one in `area` first.
+  [[nodiscard]] std::pair<std::size_t, std::size_t> ends_of(std::size_t edge,
                                                             std::size_t area) const;
   [[nodiscard]] std::vector<Guide> tree_from(std::size_t area, std::size_t node) const;
   [[nodiscard]] std::optional<std::size_t> end_beyond(std::size_t area,
@@ -85,7 +85,7 @@ class AreaPlanner {
   NavigationGraph graph_;
   SubAreas areas_;
   PlannerOptions options_;
-  std::vector<std::uint8_t> closed_;  // by passage
+  std::vector<std::uint8_t> closed_;  // by edge
   std::vector<Border> borders_;
   std::vector<Ends> ends_;  // by area
   std::optional<std::size_t> goal_;

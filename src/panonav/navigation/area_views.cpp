@@ -56,6 +56,7 @@ void AreaViews::enter(const NavigationGraph& graph, const SubAreas& areas, std::
   }
   ahead_ = {};
   load(here_, here_.views.size());
+  std::erase_if(coefficients_, [&](const auto& known) { return !holds(known.first.first); });
 }
 
 void AreaViews::load_ahead(const NavigationGraph& graph, const SubAreas& areas, std::size_t area,
@@ -84,13 +85,18 @@ std::optional<CompassReading> AreaViews::turn_against(ViewId view, const SeenVie
   return compass(seen.packed, require_part_of(view).packed(view), {.components = seen.components});
 }
 
-HomingView AreaViews::view(ViewId view, int components) {
-  const FourierSignature signature = require_part_of(view).signature(view);
-  const int compared = components == 0 ? signature.components() : components;
+const HomingView& AreaViews::view(ViewId view, int components) {
+  const VisualMemory& part = require_part_of(view);
+  const int compared = components == 0 ? part.shape().components : components;
   // Magnitudes and phases, a byte each.
-  bytes_read_ += 2 * static_cast<std::uint64_t>(signature.rows()) * compared;
-  const HomingView whole = homing_view(signature);
-  return components == 0 ? whole : first_components(whole, components);
+  bytes_read_ += 2 * static_cast<std::uint64_t>(part.shape().rows) * compared;
+  const auto known = coefficients_.find({view, compared});
+  if (known != coefficients_.end()) return known->second;
+  HomingView whole = homing_view(part.signature(view));
+  return coefficients_
+      .try_emplace({view, compared},
+                   components == 0 ? std::move(whole) : first_components(whole, components))
+      .first->second;
 }
 
 std::optional<FoundView> AreaViews::nearest(const NavigationGraph& graph,

@@ -3,8 +3,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "panonav/memory/view_source.hpp"
@@ -36,7 +38,7 @@ struct FoundView {
 /// hand. Of the memory nothing else is held but what was loaded ahead of the area that comes next.
 class AreaViews {
  public:
-  /// Views up to `links` passages outside an area are loaded with it. The source must outlive
+  /// Views up to `links` edges outside an area are loaded with it. The source must outlive
   /// *this.
   AreaViews(const ViewSource& source, int links);
 
@@ -56,8 +58,9 @@ class AreaViews {
   /// Throw ContractError on a view that is not loaded.
   /// How far the robot is turned against the view.
   [[nodiscard]] std::optional<CompassReading> turn_against(ViewId view, const SeenView& seen);
-  /// By its first components; 0: all.
-  [[nodiscard]] HomingView view(ViewId view, int components = 0);
+  /// By its first components; 0: all. The coefficients are computed once and kept with the area:
+  /// valid until the next `enter`.
+  [[nodiscard]] const HomingView& view(ViewId view, int components = 0);
   /// The least dissimilar of those `nodes` that are loaded; empty when none is. Ties by node.
   [[nodiscard]] std::optional<FoundView> nearest(const NavigationGraph& graph,
                                                  std::span<const std::size_t> nodes,
@@ -87,6 +90,8 @@ class AreaViews {
   int links_;
   Loading here_;
   Loading ahead_;
+  // Of views of `here_`, by view and number of components.
+  std::map<std::pair<ViewId, int>, HomingView> coefficients_;
   std::uint64_t bytes_read_ = 0;
 };
 

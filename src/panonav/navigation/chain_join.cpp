@@ -47,11 +47,11 @@ FourierSignature signature_of(const HomingView& view) {
 }
 
 PlaceScale scale_of(const VisualMemory& memory) {
-  std::vector<Passage> passages;
-  for (const Link& link : memory.links()) passages.push_back({link.a, link.b, 1.0, std::nullopt});
+  std::vector<NavigationEdge> edges;
+  for (const Link& link : memory.links()) edges.push_back({link.a, link.b, 1.0, std::nullopt});
   const auto views = memory.views();
   return learn_place_scale(MemoryViewSource(memory),
-                           NavigationGraph({views.begin(), views.end()}, std::move(passages)));
+                           NavigationGraph({views.begin(), views.end()}, std::move(edges)));
 }
 
 bool show_one_neighbourhood(const HomingView& a, const HomingView& b, const PlaceScale& scale) {

@@ -24,7 +24,7 @@ struct JoinedChain {
   std::vector<ViewId> views;  ///< of the snapshots, in their order
   std::vector<Link> links;    ///< those that were added
   /// From each snapshot to the next one, by the odometry of the recording: what
-  /// `navigation_graph(source, links, motion, executor)` and `arrange` go by.
+  /// `graph_of_links` and `arrange` go by.
   std::vector<CoarseMotion> motion;
 };
 

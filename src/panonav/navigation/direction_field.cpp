@@ -13,7 +13,7 @@ namespace panonav {
 void visit_options(FieldOptions& options, OptionVisitor& visitor) {
   using T = FieldOptions;
   constexpr OptionTable table{
-      option<&T::links_ahead>("passages ahead that count for a direction", 1, 100),
+      option<&T::links_ahead>("edges ahead that count for a direction", 1, 100),
       option<&T::most_bend_rad>("a way that has bent by more is not looked along any further", 0,
                                 std::numbers::pi),
   };
@@ -24,8 +24,8 @@ std::vector<Guide> search_tree(const NavigationGraph& graph, const SubAreas& are
                                std::size_t area, std::span<const SearchRoot> roots,
                                std::span<const std::uint8_t> closed) {
   require(area < areas.nodes.size(), "area", static_cast<double>(area), "one of the areas");
-  require(closed.empty() || closed.size() == graph.passages().size(), "size of closed",
-          static_cast<double>(closed.size()), "0 or the number of passages");
+  require(closed.empty() || closed.size() == graph.edges().size(), "size of closed",
+          static_cast<double>(closed.size()), "0 or the number of edges");
   const std::vector<std::size_t>& nodes = areas.nodes[area];
   std::vector<Guide> guides(nodes.size());
   for (std::size_t place = 0; place < nodes.size(); ++place) guides[place].next = nodes[place];
@@ -36,7 +36,7 @@ std::vector<Guide> search_tree(const NavigationGraph& graph, const SubAreas& are
             static_cast<double>(root.node), "a node of the area");
     Guide& guide = guides[areas.place_of[root.node]];
     if (!(root.way < guide.way)) continue;
-    guide = {root.way, root.next, root.passage, std::nullopt};
+    guide = {root.way, root.next, root.edge, std::nullopt};
     open.emplace(root.way, root.node);
   }
   while (!open.empty()) {
@@ -45,11 +45,11 @@ std::vector<Guide> search_tree(const NavigationGraph& graph, const SubAreas& are
     if (way > guides[areas.place_of[node]].way) continue;
     for (const NavigationGraph::Exit& exit : graph.exits(node)) {
       if (areas.area_of[exit.node] != area) continue;
-      if (!closed.empty() && closed[exit.passage] != 0) continue;
-      const double longer = way + graph.passages()[exit.passage].length;
+      if (!closed.empty() && closed[exit.edge] != 0) continue;
+      const double longer = way + graph.edges()[exit.edge].length;
       Guide& guide = guides[areas.place_of[exit.node]];
       if (longer < guide.way) {
-        guide = {longer, node, exit.passage, std::nullopt};
+        guide = {longer, node, exit.edge, std::nullopt};
         open.emplace(longer, exit.node);
       }
     }
@@ -70,7 +70,7 @@ std::optional<double> direction_at(const NavigationGraph& graph, const SubAreas&
   for (int i = 0; i < options.links_ahead && areas.area_of[here] == areas.area_of[node]; ++i) {
     const Guide& guide = guides[areas.place_of[here]];
     if (!guide.reachable() || guide.next == here) break;
-    const auto motion = graph.motion_from(here, guide.passage);
+    const auto motion = graph.motion_from(here, guide.edge);
     if (!motion) break;
     const Pose2 node_from_next = node_from_here * *motion;
     const double x = node_from_next.x_m - node_from_here.x_m;

@@ -14,7 +14,7 @@
 namespace panonav {
 
 struct FieldOptions {
-  /// So many passages ahead count for a direction, where the way does not bend away.
+  /// So many edges ahead count for a direction, where the way does not bend away.
   int links_ahead = 3;
   /// A way that has bent by more is not looked along any further: it may go round a corner.
   double most_bend_rad = 0.7854;
@@ -23,10 +23,10 @@ void visit_options(FieldOptions& options, OptionVisitor& visitor);
 
 /// What a reference view says of the way to the goal.
 struct Guide {
-  /// Length of the way along the passages; infinite: the goal cannot be reached from here.
+  /// Length of the way along the edges; infinite: the goal cannot be reached from here.
   double way = std::numeric_limits<double>::infinity();
-  std::size_t next = 0;     ///< node after this one; itself at the goal, or when unreachable
-  std::size_t passage = 0;  ///< that leads there
+  std::size_t next = 0;  ///< node after this one; itself at the goal, or when unreachable
+  std::size_t edge = 0;  ///< that leads there
   /// The direction of motion in the frame of the robot that took this view. Empty at the goal, when
   /// unreachable, and where nothing tells.
   std::optional<double> direction_rad;
@@ -40,14 +40,14 @@ struct Guide {
 struct SearchRoot {
   std::size_t node = 0;
   double way = 0.0;
-  std::size_t next = 0;     ///< beyond the root; the root itself where the goal is
-  std::size_t passage = 0;  ///< that leads there
+  std::size_t next = 0;  ///< beyond the root; the root itself where the goal is
+  std::size_t edge = 0;  ///< that leads there
 };
 
-/// The search tree of [M04 section 3.5] from its roots over the nodes of one area and all passages
+/// The search tree of [M04 section 3.5] from its roots over the nodes of one area and all edges
 /// for which `closed` is 0 (empty: all), without directions. By place in the area. Ties are decided
 /// by the lower node. Roots must lie in the area. Throws ContractError on numbers out of range or
-/// spans of another size. Cost: O((nodes + passages) log nodes) of the area.
+/// spans of another size. Cost: O((nodes + edges) log nodes) of the area.
 [[nodiscard]] std::vector<Guide> search_tree(const NavigationGraph& graph, const SubAreas& areas,
                                              std::size_t area, std::span<const SearchRoot> roots,
                                              std::span<const std::uint8_t> closed);

@@ -22,19 +22,28 @@ namespace panonav {
 
 namespace {
 
-// Of the median length: what a passage between pictures of one place costs at least, and what one
+// Of the median length: what an edge between pictures of one place costs at least, and what one
 // costs of which nothing is known.
 constexpr double least_length_share = 0.1;
 constexpr double unknown_length_share = 3.0;
 
-void require_valid(const Passage& passage) {
-  require(passage.a != passage.b, "view of a passage", static_cast<double>(passage.a.value),
+void require_valid(const NavigationEdge& edge) {
+  require(edge.a != edge.b, "view of an edge", static_cast<double>(edge.a.value),
           "two different views");
-  require(std::isfinite(passage.length) && passage.length > 0.0, "length of a passage",
-          passage.length, "> 0 and finite");
-  if (passage.a_from_b && !is_finite(*passage.a_from_b)) {
-    throw ContractError("motion of a passage", "not finite", "finite");
+  require(std::isfinite(edge.length) && edge.length > 0.0, "length of an edge", edge.length,
+          "> 0 and finite");
+  if (edge.a_from_b && !is_finite(*edge.a_from_b)) {
+    throw ContractError("motion of an edge", "not finite", "finite");
   }
+}
+
+void scale_way(Pose2& motion, double factor) {
+  motion.x_m *= factor;
+  motion.y_m *= factor;
+}
+
+double length_of(const Pose2& motion) {
+  return std::hypot(motion.x_m, motion.y_m);
 }
 
 // The motion that two readings tell: they are averaged, as each has its own error.
@@ -48,18 +57,18 @@ std::optional<Pose2> motion_of(const PhaseReading& reading) {
                wrap_angle(reading.turn_rad)};
 }
 
-// Passages of which neither length nor motion is known get their length from the others, and those
+// Edges of which neither length nor motion is known get their length from the others, and those
 // between pictures of one place a least one.
-void complete_lengths(std::vector<Passage>& passages) {
+void complete_lengths(std::vector<NavigationEdge>& edges) {
   std::vector<double> lengths;
-  for (const Passage& passage : passages) {
-    if (passage.length > 0.0) lengths.push_back(passage.length);
+  for (const NavigationEdge& edge : edges) {
+    if (edge.length > 0.0) lengths.push_back(edge.length);
   }
   const double typical = lengths.empty() ? 1.0 : upper_median(lengths);
-  for (Passage& passage : passages) {
-    const bool known = passage.a_from_b || passage.length > 0.0;
-    passage.length = known ? std::max(passage.length, least_length_share * typical)
-                           : unknown_length_share * typical;
+  for (NavigationEdge& edge : edges) {
+    const bool known = edge.a_from_b || edge.length > 0.0;
+    edge.length = known ? std::max(edge.length, least_length_share * typical)
+                        : unknown_length_share * typical;
   }
 }
 
@@ -69,12 +78,12 @@ bool agree(const Pose2& a, const Pose2& b) {
   return std::abs(turned) <= most_disagreement_rad && std::abs(aside) <= most_disagreement_rad;
 }
 
-// Whether most triangles with a third view that tell anything say the same of a passage, as
+// Whether most triangles with a third view that tell anything say the same of an edge, as
 // `arrange` asks; true where there is no triangle at all, and false where none of them tells
 // anything.
-bool is_supported(const NavigationGraph& graph, const Passage& passage) {
-  const std::size_t a = *graph.node_of(passage.a);
-  const std::size_t b = *graph.node_of(passage.b);
+bool is_supported(const NavigationGraph& graph, const NavigationEdge& edge) {
+  const std::size_t a = *graph.node_of(edge.a);
+  const std::size_t b = *graph.node_of(edge.b);
   int triangles = 0;
   int telling = 0;
   int closed = 0;
@@ -83,18 +92,18 @@ bool is_supported(const NavigationGraph& graph, const Passage& passage) {
     const auto second = std::ranges::lower_bound(exits, b, {}, &NavigationGraph::Exit::node);
     if (second == exits.end() || second->node != b) continue;
     ++triangles;
-    const auto a_from_c = graph.motion_from(a, first.passage);
-    const auto c_from_b = graph.motion_from(first.node, second->passage);
+    const auto a_from_c = graph.motion_from(a, first.edge);
+    const auto c_from_b = graph.motion_from(first.node, second->edge);
     if (!a_from_c || !c_from_b) continue;
     ++telling;
-    closed += static_cast<int>(agree(*passage.a_from_b, *a_from_c * *c_from_b));
+    closed += static_cast<int>(agree(*edge.a_from_b, *a_from_c * *c_from_b));
   }
   return triangles == 0 || 2 * closed > telling;
 }
 
-// Reads some passages from the phases of their views, which are all held at once.
-void read_some_passages(const ViewSource& source, std::span<const Link> links,
-                        std::span<Passage> passages, Executor& executor) {
+// Reads some edges from the phases of their views, which are all held at once.
+void read_some_edges(const ViewSource& source, std::span<const Link> links,
+                     std::span<NavigationEdge> edges, Executor& executor) {
   std::set<ViewId> wanted;
   for (const Link& link : links) wanted.insert({link.a, link.b});
   const VisualMemory memory = source.load(std::vector<ViewId>(wanted.begin(), wanted.end()));
@@ -102,82 +111,81 @@ void read_some_passages(const ViewSource& source, std::span<const Link> links,
   executor.for_chunks(
       links.size(), links_per_chunk, [&](std::size_t begin, std::size_t end, std::size_t) {
         for (std::size_t i = begin; i < end; ++i) {
-          passages[i] = {links[i].a, links[i].b, 0.0, std::nullopt};
+          edges[i] = {links[i].a, links[i].b, 0.0, std::nullopt};
           const auto reading = read_phases(homing_view(memory.signature(links[i].a)),
                                            homing_view(memory.signature(links[i].b)));
           if (!reading) continue;
-          passages[i].a_from_b = motion_of(*reading);
-          if (passages[i].a_from_b) passages[i].length = reading->length;
+          edges[i].a_from_b = motion_of(*reading);
+          if (edges[i].a_from_b) edges[i].length = reading->length;
         }
       });
 }
 
 // Length 0 and no motion where nothing tells.
-std::vector<Passage> read_passages(const ViewSource& source, std::span<const Link> links,
-                                   Executor& executor) {
-  std::vector<Passage> passages(links.size());
+std::vector<NavigationEdge> read_edges(const ViewSource& source, std::span<const Link> links,
+                                       Executor& executor) {
+  std::vector<NavigationEdge> edges(links.size());
   constexpr std::size_t links_at_once = 2048;
   for (std::size_t first = 0; first < links.size(); first += links_at_once) {
     const std::size_t count = std::min(links_at_once, links.size() - first);
-    read_some_passages(source, links.subspan(first, count),
-                       std::span(passages).subspan(first, count), executor);
+    read_some_edges(source, links.subspan(first, count), std::span(edges).subspan(first, count),
+                    executor);
   }
-  return passages;
+  return edges;
 }
 
 // For each link the motion of the robot between its views, if it is known, in the unit of `read`.
-std::vector<Passage> driven_passages(std::span<const Link> links,
-                                     std::span<const CoarseMotion> motion,
-                                     std::span<const Passage> read) {
+std::vector<NavigationEdge> driven_edges(std::span<const Link> links,
+                                         std::span<const CoarseMotion> motion,
+                                         std::span<const NavigationEdge> read) {
   std::map<std::pair<ViewId, ViewId>, Pose2> ways;
   for (const CoarseMotion& way : motion) {
     if (!is_finite(way.step)) throw ContractError("motion of the robot", "not finite", "finite");
     ways[{way.from, way.to}] = way.step;
     ways[{way.to, way.from}] = inverse(way.step);
   }
-  std::vector<Passage> driven;
+  std::vector<NavigationEdge> driven;
   std::vector<double> units;
   for (std::size_t i = 0; i < links.size(); ++i) {
     driven.push_back({links[i].a, links[i].b, 0.0, std::nullopt});
     const auto way = ways.find({links[i].a, links[i].b});
     if (way == ways.end()) continue;
     driven[i].a_from_b = way->second;
-    driven[i].length = std::hypot(way->second.x_m, way->second.y_m);
+    driven[i].length = length_of(way->second);
     const bool both = driven[i].length > 0.0 && read[i].length > 0.0;
     if (both && agree(way->second, *read[i].a_from_b)) {
       units.push_back(read[i].length / driven[i].length);
     }
   }
   const double unit = units.empty() ? 1.0 : upper_median(units);
-  for (Passage& passage : driven) {
-    if (!passage.a_from_b) continue;
-    passage.a_from_b->x_m *= unit;
-    passage.a_from_b->y_m *= unit;
-    passage.length *= unit;
+  for (NavigationEdge& edge : driven) {
+    if (!edge.a_from_b) continue;
+    scale_way(*edge.a_from_b, unit);
+    edge.length *= unit;
   }
   return driven;
 }
 
 }  // namespace
 
-NavigationGraph::NavigationGraph(std::vector<ViewId> views, std::vector<Passage> passages)
+NavigationGraph::NavigationGraph(std::vector<ViewId> views, std::vector<NavigationEdge> edges)
     : views_(std::move(views)), begins_(views_.size() + 1) {
   for (std::size_t i = 1; i < views_.size(); ++i) {
     require(views_[i - 1] < views_[i], "views", static_cast<double>(views_[i].value), "ascending");
   }
   struct Ends {
-    std::size_t low, high, passage;
+    std::size_t low, high, edge;
   };
   std::vector<Ends> ends;
-  for (const Passage& passage : passages) {
-    require_valid(passage);
-    const auto a = node_of(passage.a);
-    const auto b = node_of(passage.b);
-    require(a && b, "view of a passage", static_cast<double>((a ? passage.b : passage.a).value),
+  for (const NavigationEdge& edge : edges) {
+    require_valid(edge);
+    const auto a = node_of(edge.a);
+    const auto b = node_of(edge.b);
+    require(a && b, "view of an edge", static_cast<double>((a ? edge.b : edge.a).value),
             "a view of the graph");
     ends.push_back({std::min(*a, *b), std::max(*a, *b), ends.size()});
   }
-  std::ranges::sort(ends, {}, [](const Ends& e) { return std::tuple(e.low, e.high, e.passage); });
+  std::ranges::sort(ends, {}, [](const Ends& e) { return std::tuple(e.low, e.high, e.edge); });
   ends.erase(
       std::unique(ends.begin(), ends.end(),
                   [](const Ends& x, const Ends& y) { return x.low == y.low && x.high == y.high; }),
@@ -191,8 +199,8 @@ NavigationGraph::NavigationGraph(std::vector<ViewId> views, std::vector<Passage>
   std::vector<std::size_t> next(begins_.begin(), begins_.end() - 1);
   // In this order the lower ends of a node come before its higher ones, both ascending.
   for (const Ends& e : ends) {
-    exits_[next[e.high]++] = {e.low, passages_.size()};
-    passages_.push_back(passages[e.passage]);
+    exits_[next[e.high]++] = {e.low, edges_.size()};
+    edges_.push_back(edges[e.edge]);
   }
   for (std::size_t p = 0; p < ends.size(); ++p) exits_[next[ends[p].low]++] = {ends[p].high, p};
 }
@@ -203,8 +211,8 @@ std::optional<std::size_t> NavigationGraph::node_of(ViewId view) const {
   return static_cast<std::size_t>(found - views_.begin());
 }
 
-std::optional<Pose2> NavigationGraph::motion_from(std::size_t node, std::size_t passage) const {
-  const Passage& p = passages_.at(passage);
+std::optional<Pose2> NavigationGraph::motion_from(std::size_t node, std::size_t edge) const {
+  const NavigationEdge& p = edges_.at(edge);
   if (!p.a_from_b || views_.at(node) == p.a) return p.a_from_b;
   return inverse(*p.a_from_b);
 }
@@ -225,46 +233,46 @@ std::vector<std::size_t> nodes_around(const NavigationGraph& graph,
   return {found.begin(), found.end()};
 }
 
-NavigationGraph navigation_graph(const ViewSource& source, std::span<const Link> links,
-                                 std::span<const CoarseMotion> motion, Executor& executor) {
+NavigationGraph graph_of_links(const ViewSource& source, std::span<const Link> links,
+                               std::span<const CoarseMotion> motion, Executor& executor) {
   const std::span<const ViewId> views = source.views();
-  std::vector<Passage> passages = read_passages(source, links, executor);
-  const std::vector<Passage> driven = driven_passages(links, motion, passages);
-  std::vector<Passage> read = passages;
+  std::vector<NavigationEdge> edges = read_edges(source, links, executor);
+  const std::vector<NavigationEdge> driven = driven_edges(links, motion, edges);
+  std::vector<NavigationEdge> read = edges;
   complete_lengths(read);
   const NavigationGraph graph({views.begin(), views.end()}, std::move(read));
-  for (std::size_t i = 0; i < passages.size(); ++i) {
-    Passage& passage = passages[i];
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    NavigationEdge& edge = edges[i];
     if (driven[i].a_from_b) {
-      passage = driven[i];
-    } else if (passage.a_from_b && !is_supported(graph, passage)) {
-      passage = {passage.a, passage.b, 0.0, std::nullopt};
+      edge = driven[i];
+    } else if (edge.a_from_b && !is_supported(graph, edge)) {
+      edge = {edge.a, edge.b, 0.0, std::nullopt};
     }
   }
-  complete_lengths(passages);
-  return {{views.begin(), views.end()}, std::move(passages)};
+  complete_lengths(edges);
+  return {{views.begin(), views.end()}, std::move(edges)};
 }
 
-NavigationGraph navigation_graph(const VisualMemory& memory, Executor& executor,
-                                 std::span<const CoarseMotion> motion) {
-  return navigation_graph(MemoryViewSource(memory), memory.links(), motion, executor);
+NavigationGraph graph_of_memory(const VisualMemory& memory, Executor& executor,
+                                std::span<const CoarseMotion> motion) {
+  return graph_of_links(MemoryViewSource(memory), memory.links(), motion, executor);
 }
 
-NavigationGraph navigation_graph(const TopologicalMap& map, double least_weight) {
+NavigationGraph graph_of_map(const TopologicalMap& map, double least_weight) {
   validate(map);
   std::vector<ViewId> views;
   for (const MapNode& node : map.nodes) views.push_back(node.view);
-  std::vector<Passage> passages;
+  std::vector<NavigationEdge> edges;
   for (const MapEdge& edge : map.edges) {
     if (edge.weight < least_weight) continue;
     const MapNode& a = *std::ranges::lower_bound(map.nodes, edge.a, {}, &MapNode::view);
     const MapNode& b = *std::ranges::lower_bound(map.nodes, edge.b, {}, &MapNode::view);
     if (a.part != b.part) continue;
     const Pose2 a_from_b = inverse(a.pose) * b.pose;
-    passages.push_back({edge.a, edge.b, std::hypot(a_from_b.x_m, a_from_b.y_m), a_from_b});
+    edges.push_back({edge.a, edge.b, length_of(a_from_b), a_from_b});
   }
-  complete_lengths(passages);
-  return {std::move(views), std::move(passages)};
+  complete_lengths(edges);
+  return {std::move(views), std::move(edges)};
 }
 
 namespace {
@@ -302,53 +310,49 @@ std::vector<NodePair> near_pairs(const TopologicalMap& map, double reach) {
 
 }  // namespace
 
-NavigationGraph navigation_graph(const TopologicalMap& map, const VisualMemory& memory,
-                                 Executor& executor, double least_weight) {
-  const NavigationGraph edges = navigation_graph(map, least_weight);
-  if (edges.passages().empty()) return edges;
+NavigationGraph graph_of_map_and_neighbours(const TopologicalMap& map, const VisualMemory& memory,
+                                            Executor& executor, double least_weight) {
+  const NavigationGraph mapped = graph_of_map(map, least_weight);
+  if (mapped.edges().empty()) return mapped;
   std::vector<double> lengths;
   std::vector<double> differences;
-  for (const Passage& passage : edges.passages()) {
-    lengths.push_back(passage.length);
-    differences.push_back(image_difference(homing_view(memory.signature(passage.a)),
-                                           homing_view(memory.signature(passage.b))));
+  for (const NavigationEdge& edge : mapped.edges()) {
+    lengths.push_back(edge.length);
+    differences.push_back(image_difference(homing_view(memory.signature(edge.a)),
+                                           homing_view(memory.signature(edge.b))));
   }
-  // What a grid's diagonal is to its spacing; as different as nearly all passages are.
+  // What a grid's diagonal is to its spacing; as different as nearly all edges are.
   const double reach = 1.5 * upper_median(lengths);
   const double most_difference = quantile(differences, 0.9);
   const std::vector<NodePair> pairs = near_pairs(map, reach);
-  std::vector<std::optional<Passage>> found(pairs.size());
+  std::vector<std::optional<NavigationEdge>> found(pairs.size());
   constexpr std::size_t pairs_per_chunk = 64;
-  executor.for_chunks(pairs.size(), pairs_per_chunk,
-                      [&](std::size_t begin, std::size_t end, std::size_t) {
-                        for (std::size_t i = begin; i < end; ++i) {
-                          const MapNode& a = map.nodes[pairs[i].a];
-                          const MapNode& b = map.nodes[pairs[i].b];
-                          const HomingView view_a = homing_view(memory.signature(a.view));
-                          const HomingView view_b = homing_view(memory.signature(b.view));
-                          if (image_difference(view_a, view_b) > most_difference) continue;
-                          const Pose2 mapped = inverse(a.pose) * b.pose;
-                          const auto reading =
-                              read_phases(view_a, view_b, TurnHint{.turn_rad = mapped.heading_rad});
-                          if (!reading || reading->disagreement_rad > most_disagreement_rad)
-                            continue;
-                          auto motion = motion_of(*reading);
-                          if (!motion) continue;
-                          const double length = std::hypot(mapped.x_m, mapped.y_m);
-                          const double read = std::hypot(motion->x_m, motion->y_m);
-                          if (read > 0.0) {
-                            motion->x_m *= length / read;
-                            motion->y_m *= length / read;
-                          }
-                          found[i] = Passage{a.view, b.view, length, motion};
-                        }
-                      });
-  std::vector<Passage> passages(edges.passages().begin(), edges.passages().end());
-  for (const auto& passage : found) {
-    if (passage) passages.push_back(*passage);
+  executor.for_chunks(
+      pairs.size(), pairs_per_chunk, [&](std::size_t begin, std::size_t end, std::size_t) {
+        for (std::size_t i = begin; i < end; ++i) {
+          const MapNode& a = map.nodes[pairs[i].a];
+          const MapNode& b = map.nodes[pairs[i].b];
+          const HomingView view_a = homing_view(memory.signature(a.view));
+          const HomingView view_b = homing_view(memory.signature(b.view));
+          if (image_difference(view_a, view_b) > most_difference) continue;
+          const Pose2 laid_out = inverse(a.pose) * b.pose;
+          const auto reading =
+              read_phases(view_a, view_b, TurnHint{.turn_rad = laid_out.heading_rad});
+          if (!reading || reading->disagreement_rad > most_disagreement_rad) continue;
+          auto motion = motion_of(*reading);
+          if (!motion) continue;
+          const double length = length_of(laid_out);
+          const double read = length_of(*motion);
+          if (read > 0.0) scale_way(*motion, length / read);
+          found[i] = NavigationEdge{a.view, b.view, length, motion};
+        }
+      });
+  std::vector<NavigationEdge> edges(mapped.edges().begin(), mapped.edges().end());
+  for (const auto& edge : found) {
+    if (edge) edges.push_back(*edge);
   }
-  complete_lengths(passages);
-  return {{edges.views().begin(), edges.views().end()}, std::move(passages)};
+  complete_lengths(edges);
+  return {{mapped.views().begin(), mapped.views().end()}, std::move(edges)};
 }
 
 namespace {
@@ -362,10 +366,6 @@ struct Spring {
   bool one_part = false;
   int support = 0;  // third views that confirm it
 };
-
-double length_of(const Pose2& motion) {
-  return std::hypot(motion.x_m, motion.y_m);
-}
 
 // Counts for each spring the third views that tell the same motion. Those of one place confirm the
 // turn alone.
@@ -425,15 +425,15 @@ std::vector<double> spacings_around(std::size_t views, const std::vector<Spring>
   return spacings;
 }
 
-// A passage that may be kept.
+// An edge that may be kept.
 struct Candidate {
-  Passage passage;
+  NavigationEdge edge;
   NodePair ends;
   double far = 0.0;         // in spacings of the references around
   bool joins_only = false;  // kept only where without it two parts would not be joined
 };
 
-// How long the passages of springs are, in spacings of the references around: likeness falls faster
+// How long the edges of springs are, in spacings of the references around: likeness falls faster
 // with distance where things are near, so that the unit of phases and of the arrangement changes
 // from place to place. What the arrangement kept it laid out by the directions of all springs
 // around; of what it gave up the phases alone tell how far it leads.
@@ -468,12 +468,9 @@ std::vector<Candidate> candidates_of(const std::vector<ViewId>& views,
     Candidate candidate{
         {views[a], views[b], 0.0, spring.motion}, spring.ends, unknown_length_share};
     if (std::isfinite(spacing) && (length > 0.0 || spring.motion)) {
-      candidate.far = candidate.passage.length = length / spacing;
+      candidate.far = candidate.edge.length = length / spacing;
     }
-    if (seen[i] > 0.0) {
-      candidate.passage.a_from_b->x_m *= candidate.far / seen[i];
-      candidate.passage.a_from_b->y_m *= candidate.far / seen[i];
-    }
+    if (seen[i] > 0.0) scale_way(*candidate.edge.a_from_b, candidate.far / seen[i]);
     candidate.joins_only = candidate.far > (given_up ? most_spacings_of_given_up : most_spacings) ||
                            (given_up && spring.support < enough_support);
     candidates.push_back(candidate);
@@ -481,10 +478,10 @@ std::vector<Candidate> candidates_of(const std::vector<ViewId>& views,
   return candidates;
 }
 
-// A passage whose ends have hardly any neighbour in common leads to another place that looks alike:
+// An edge whose ends have hardly any neighbour in common leads to another place that looks alike:
 // ways would be planned through it as through a hole in the wall.
-void doubt_lonely_passages(std::size_t views, std::vector<Candidate>& candidates) {
-  // On an open square grid with passages up to two spacings nearest neighbours have half of theirs
+void doubt_lonely_edges(std::size_t views, std::vector<Candidate>& candidates) {
+  // On an open square grid with edges up to two spacings nearest neighbours have half of theirs
   // in common, views two spacings apart a quarter. One of these may be missing.
   constexpr double least_common = 0.25;
   std::vector<std::vector<std::size_t>> around(views);
@@ -505,24 +502,24 @@ void doubt_lonely_passages(std::size_t views, std::vector<Candidate>& candidates
   }
 }
 
-// The passages of the springs that may be kept.
-std::vector<Passage> passages_of(const std::vector<ViewId>& views, std::vector<Spring> springs,
-                                 double least_weight) {
+// The edges of the springs that may be kept.
+std::vector<NavigationEdge> edges_of(const std::vector<ViewId>& views, std::vector<Spring> springs,
+                                     double least_weight) {
   count_support(views.size(), springs);
   std::erase_if(springs, [&](const Spring& spring) {
     return (spring.weight < least_weight || !spring.one_part) && spring.support == 0;
   });
   std::vector<Candidate> candidates = candidates_of(views, springs, least_weight);
-  doubt_lonely_passages(views.size(), candidates);
+  doubt_lonely_edges(views.size(), candidates);
   // Those in doubt last, and the nearest first: so they are left out where others lead there, too.
   std::ranges::stable_sort(candidates, {}, [](const Candidate& candidate) {
     return std::pair(candidate.joins_only, candidate.far);
   });
   DisjointSets groups(views.size());
-  std::vector<Passage> kept;
+  std::vector<NavigationEdge> kept;
   for (const Candidate& candidate : candidates) {
     const bool joins = groups.join(candidate.ends.a, candidate.ends.b);
-    if (joins || !candidate.joins_only) kept.push_back(candidate.passage);
+    if (joins || !candidate.joins_only) kept.push_back(candidate.edge);
   }
   complete_lengths(kept);
   return kept;
@@ -530,7 +527,7 @@ std::vector<Passage> passages_of(const std::vector<ViewId>& views, std::vector<S
 
 }  // namespace
 
-NavigationGraph navigation_graph(const Lattice& lattice, double least_weight) {
+NavigationGraph graph_of_lattice(const Lattice& lattice, double least_weight) {
   std::vector<ViewId> views;
   for (const LatticeNode& node : lattice.nodes) views.push_back(node.view);
   std::vector<Spring> springs;
@@ -544,12 +541,12 @@ NavigationGraph navigation_graph(const Lattice& lattice, double least_weight) {
                        spring.weight,
                        a.part == b.part});
   }
-  std::vector<Passage> passages = passages_of(views, std::move(springs), least_weight);
-  return {std::move(views), std::move(passages)};
+  std::vector<NavigationEdge> edges = edges_of(views, std::move(springs), least_weight);
+  return {std::move(views), std::move(edges)};
 }
 
-NavigationGraph stored_lattice_graph(const TopologicalMap& arrangement, const ViewSource& source,
-                                     Executor& executor, double least_weight) {
+NavigationGraph graph_of_stored_lattice(const TopologicalMap& arrangement, const ViewSource& source,
+                                        Executor& executor, double least_weight) {
   validate(arrangement);
   std::vector<ViewId> views;
   for (const MapNode& node : arrangement.nodes) views.push_back(node.view);
@@ -566,10 +563,10 @@ NavigationGraph stored_lattice_graph(const TopologicalMap& arrangement, const Vi
     springs.push_back({ends, std::nullopt, distance(a.pose.position(), b.pose.position()),
                        edge.weight, a.part == b.part});
   }
-  const std::vector<Passage> read = read_passages(source, links, executor);
+  const std::vector<NavigationEdge> read = read_edges(source, links, executor);
   for (std::size_t i = 0; i < springs.size(); ++i) springs[i].motion = read[i].a_from_b;
-  std::vector<Passage> passages = passages_of(views, std::move(springs), least_weight);
-  return {std::move(views), std::move(passages)};
+  std::vector<NavigationEdge> edges = edges_of(views, std::move(springs), least_weight);
+  return {std::move(views), std::move(edges)};
 }
 
 }  // namespace panonav

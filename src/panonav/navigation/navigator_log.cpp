@@ -25,7 +25,7 @@ std::string_view name_of(NavigationEvent event) {
 }
 
 std::string describe(const NavigationDecision& decision) {
-  std::string line = std::to_string(decision.look) + " " + std::string(name_of(decision.state));
+  std::string line = std::to_string(decision.step) + " " + std::string(name_of(decision.state));
   if (decision.nearest) line += " at view " + std::to_string(decision.nearest->value);
   if (decision.next) line += " to view " + std::to_string(decision.next->value);
   line += " in area " + std::to_string(decision.area);
@@ -47,8 +47,8 @@ void visit_options(NavigatorOptions& options, OptionVisitor& visitor) {
   using T = NavigatorOptions;
   constexpr OptionTable table{
       option<&T::step_m>("longest way between two looks", above(0), 100),
-      option<&T::near_links>("the next place is looked for within so many passages of the last one",
-                             1, 10),
+      option<&T::near_links>("the next place is looked for within so many edges of the last one", 1,
+                             10),
       option<&T::coarse_components>("components compared in the open, 0 for all", 0, 1000),
       option<&T::views_ahead>("views of the next area that a look loads", 0, 1e6),
       options_of<&T::homing>(),
@@ -57,10 +57,10 @@ void visit_options(NavigatorOptions& options, OptionVisitor& visitor) {
       option<&T::lost_patience>("looks without a known place after which the robot is lost", 1,
                                 1e6),
       option<&T::passage_patience>(
-          "looks without coming nearer after which a passage counts as blocked", 1, 1e6),
+          "looks without coming nearer after which an edge counts as blocked", 1, 1e6),
       option<&T::shortest_leg_m>("shortest way along a recorded route that is worth a leg",
                                  above(0), 1000),
-      option<&T::attempts>("times that closed passages, or the last stretch, are tried", 1, 1000),
+      option<&T::attempts>("times that closed edges, or the last stretch, are tried", 1, 1000),
       option<&T::most_looks>("looks after which a run ends", 1, 1e9),
   };
   table.visit(options, visitor);

@@ -9,8 +9,8 @@
 
 namespace panonav {
 
-std::vector<std::size_t> passages_across(const NavigationGraph& graph, const Obstacle& obstacle,
-                                         int links) {
+std::vector<std::size_t> edges_across(const NavigationGraph& graph, const Obstacle& obstacle,
+                                      int links) {
   require(obstacle.node < graph.size(), "node of an obstacle", static_cast<double>(obstacle.node),
           "a node of the graph");
   require(std::isfinite(obstacle.direction_rad), "direction_rad", obstacle.direction_rad, "finite");
@@ -26,7 +26,7 @@ std::vector<std::size_t> passages_across(const NavigationGraph& graph, const Obs
     std::vector<std::size_t> next;
     for (const std::size_t node : front) {
       for (const NavigationGraph::Exit& exit : graph.exits(node)) {
-        const auto motion = graph.motion_from(node, exit.passage);
+        const auto motion = graph.motion_from(node, exit.edge);
         if (motion && placed.try_emplace(exit.node, placed.at(node) * *motion).second) {
           next.push_back(exit.node);
         }
@@ -37,7 +37,7 @@ std::vector<std::size_t> passages_across(const NavigationGraph& graph, const Obs
   std::vector<std::size_t> across;
   for (const auto& [node, pose] : placed) {
     for (const NavigationGraph::Exit& exit : graph.exits(node)) {
-      if (exit.node < node || !graph.motion_from(node, exit.passage)) continue;
+      if (exit.node < node || !graph.motion_from(node, exit.edge)) continue;
       const auto other = placed.find(exit.node);
       if (other == placed.end()) continue;
       const double before = pose.x_m - obstacle.distance;
@@ -45,7 +45,7 @@ std::vector<std::size_t> passages_across(const NavigationGraph& graph, const Obs
       if ((before < 0.0) == (beyond < 0.0)) continue;
       const double share = before / (before - beyond);
       const double y = pose.y_m + share * (other->second.y_m - pose.y_m);
-      if (std::abs(y) <= obstacle.half_width) across.push_back(exit.passage);
+      if (std::abs(y) <= obstacle.half_width) across.push_back(exit.edge);
     }
   }
   std::ranges::sort(across);

@@ -15,10 +15,10 @@ struct Obstacle {
   double half_width = 0.0;     ///< in the graph's unit, >= 0
 };
 
-/// The passages around that cross the bar, ascending: where a door is shut, all those through it.
-/// Nodes up to `links` passages away count, placed by chaining motions along the fewest passages.
+/// The edges around that cross the bar, ascending: where a door is shut, all those through it.
+/// Nodes up to `links` edges away count, placed by chaining motions along the fewest edges.
 /// Throws ContractError when there is no such node or a number is not finite or negative.
-[[nodiscard]] std::vector<std::size_t> passages_across(const NavigationGraph& graph,
-                                                       const Obstacle& obstacle, int links = 2);
+[[nodiscard]] std::vector<std::size_t> edges_across(const NavigationGraph& graph,
+                                                    const Obstacle& obstacle, int links = 2);
 
 }  // namespace panonav

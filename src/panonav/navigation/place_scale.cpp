@@ -47,10 +47,10 @@ PlaceScale learn_place_scale(const ViewSource& source, const NavigationGraph& gr
   const auto most = static_cast<std::size_t>(samples);
   PlaceScale scale;
   std::vector<ViewPair> linked;
-  const std::size_t passages = graph.passages().size();
-  for (std::size_t i = 0; i < std::min(most, passages); ++i) {
-    const Passage& passage = graph.passages()[i * passages / std::min(most, passages)];
-    linked.emplace_back(passage.a, passage.b);
+  const std::size_t edges = graph.edges().size();
+  for (std::size_t i = 0; i < std::min(most, edges); ++i) {
+    const NavigationEdge& edge = graph.edges()[i * edges / std::min(most, edges)];
+    linked.emplace_back(edge.a, edge.b);
   }
   if (!linked.empty()) scale.neighbours = median_difference(source, linked, components);
   // Views half of all views apart in their order: far from each other but for a few.
@@ -72,13 +72,13 @@ ArrivalScale learn_arrival_scale(const ViewSource& source, const NavigationGraph
   ArrivalScale scale;
   if (graph.exits(*node).empty()) return scale;
   std::vector<double> lengths;
-  for (const Passage& passage : graph.passages()) lengths.push_back(passage.length);
+  for (const NavigationEdge& edge : graph.edges()) lengths.push_back(edge.length);
   const double usual = upper_median(std::move(lengths));
   // Views of the goal itself from another drive tell nothing of the spacing, unless there are no
   // others.
   for (const double least : {0.5 * usual, 0.0}) {
     for (const auto& exit : graph.exits(*node)) {
-      if (graph.passages()[exit.passage].length < least) continue;
+      if (graph.edges()[exit.edge].length < least) continue;
       pairs.emplace_back(goal, graph.view(exit.node));
     }
     if (!pairs.empty()) break;

@@ -8,7 +8,7 @@ namespace panonav {
 /// How alike views of one memory look, by `image_difference`: what tells whether a reference shows
 /// the place where the robot is.
 struct PlaceScale {
-  double neighbours = 0.0;  ///< median between views with a passage
+  double neighbours = 0.0;  ///< median between views with an edge
   double strangers = 1.0;   ///< median between views at random
 
   /// A view that differs by more from the reference taken for its place was taken elsewhere: a
@@ -27,7 +27,7 @@ struct PlaceScale {
 struct ArrivalScale {
   double difference = 0.08;  ///< most, by `image_difference`
   double length = 0.02;      ///< most of the home vector, in units of R
-  bool learnt = false;       ///< false: no passage tells
+  bool learnt = false;       ///< false: no edge tells
 };
 
 /// Half of what home vector and difference are between the goal and the nearest references around

@@ -25,7 +25,7 @@ namespace {
 constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
 constexpr double least_side = 1.0 / 3.0;
 
-/// Some nodes of a graph with the passages among them, numbered anew.
+/// Some nodes of a graph with the edges among them, numbered anew.
 struct Part {
   std::vector<std::size_t> nodes;  // ascending
   std::vector<std::size_t> begins, neighbours;
@@ -52,7 +52,7 @@ Part part_of(const NavigationGraph& graph, std::vector<std::size_t> nodes,
   return part;
 }
 
-// Passages from `from` to every node; `none` where there is no way over nodes with side `side`.
+// Edges from `from` to every node; `none` where there is no way over nodes with side `side`.
 std::vector<std::size_t> steps_from(const Part& part, std::size_t from,
                                     std::span<const std::uint8_t> sides, std::uint8_t side) {
   std::vector<std::size_t> steps(part.size(), none);
@@ -226,9 +226,9 @@ SubAreas divide(const NavigationGraph& graph, const SubAreaOptions& options) {
       areas.place_of[areas.nodes[a][place]] = place;
     }
   }
-  for (std::size_t p = 0; p < graph.passages().size(); ++p) {
-    const Passage& passage = graph.passages()[p];
-    if (areas.area_of[*graph.node_of(passage.a)] != areas.area_of[*graph.node_of(passage.b)]) {
+  for (std::size_t p = 0; p < graph.edges().size(); ++p) {
+    const NavigationEdge& edge = graph.edges()[p];
+    if (areas.area_of[*graph.node_of(edge.a)] != areas.area_of[*graph.node_of(edge.b)]) {
       areas.gates.push_back(p);
     }
   }
@@ -238,8 +238,8 @@ SubAreas divide(const NavigationGraph& graph, const SubAreaOptions& options) {
 std::vector<std::uint8_t> narrow_places(const NavigationGraph& graph, const SubAreas& areas,
                                         int links) {
   const auto ends_of = [&](std::size_t gate) {
-    const Passage& passage = graph.passages()[gate];
-    return std::pair(*graph.node_of(passage.a), *graph.node_of(passage.b));
+    const NavigationEdge& edge = graph.edges()[gate];
+    return std::pair(*graph.node_of(edge.a), *graph.node_of(edge.b));
   };
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> widths;
   const auto border_of = [&](std::size_t gate) {

@@ -21,7 +21,7 @@ struct SubAreas {
   std::vector<std::size_t> area_of;             ///< by node
   std::vector<std::size_t> place_of;            ///< by node: its place among those of its area
   std::vector<std::vector<std::size_t>> nodes;  ///< of each area, ascending
-  /// Passages that lead from one area to another: its gates. Ascending.
+  /// Edges that lead from one area to another: its gates. Ascending.
   std::vector<std::size_t> gates;
 };
 
@@ -34,13 +34,13 @@ struct SubAreas {
 /// 2000), relaxed from the distances to its outermost view, and cut where the normalised cut is
 /// least, the smaller side having at least a third. What a cut leaves apart goes to the other side.
 /// Parts that nothing connects are areas of their own, however small. Deterministic. Throws
-/// OptionError. Cost: O(iterations passages log(areas)); 10,000 views with 12 links each take about
+/// OptionError. Cost: O(iterations edges log(areas)); 10,000 views with 12 links each take about
 /// half a second.
 [[nodiscard]] SubAreas divide(const NavigationGraph& graph, const SubAreaOptions& options = {});
 
-/// 1 for each node at most `links` passages away from a narrow gate, as doors are; 0 for the
+/// 1 for each node at most `links` edges away from a narrow gate, as doors are; 0 for the
 /// others. In the open, an area of n views is some sqrt(n) of them across, and its border on
-/// another one has three times as many passages; a third of that, over the smaller area, is narrow.
+/// another one has three times as many edges; a third of that, over the smaller area, is narrow.
 [[nodiscard]] std::vector<std::uint8_t> narrow_places(const NavigationGraph& graph,
                                                       const SubAreas& areas, int links);
 
