@@ -1,6 +1,16 @@
 #include "experiments/reproduction_stages.hpp"
 
+#include <system_error>
+
+#include "panonav/core/error.hpp"
+
 namespace panonav {
+
+void make_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) throw FileError(folder.string(), "cannot be made: " + error.message());
+}
 
 void run_stages(std::span<const ReproductionStage> stages, const ReproductionProgress& progress) {
   double all = 0.0;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <span>
 #include <string>
@@ -14,6 +15,9 @@ struct ReproductionStage {
   double cost = 1.0;  ///< relative, for the progress
   std::function<void()> run;
 };
+
+/// Throws FileError.
+void make_folder(const std::filesystem::path& folder);
 
 /// One after the other; tells how far the whole is by their costs.
 void run_stages(std::span<const ReproductionStage> stages, const ReproductionProgress& progress);

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <string>
 
-#include "experiments/reproduction.hpp"
+#include "experiments/rows.hpp"
 #include "experiments/runs/mapping_run.hpp"
 #include "panonav/core/executor.hpp"
 

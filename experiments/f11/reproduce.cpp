@@ -1,10 +1,9 @@
-#include <filesystem>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include "experiments/f11/experiments.hpp"
 #include "experiments/reproduction_stages.hpp"
+#include "experiments/runs/worlds.hpp"
 #include "panonav/core/error.hpp"
 
 namespace panonav {
@@ -24,9 +23,7 @@ Reproduction reproduce_f11(const MappingReproductionOptions& options, Executor& 
   require(options.views >= 10, "views", options.views, ">= 10");
   require(options.most_views >= 100, "most_views", options.most_views, ">= 100");
   require(options.columns >= 132, "columns", options.columns, ">= 132, twice the components");
-  std::error_code error;
-  std::filesystem::create_directories(options.out, error);
-  if (error) throw FileError(options.out.string(), "cannot be made: " + error.message());
+  make_folder(options.out);
 
   Reproduction result;
   std::vector<ReproductionStage> stages{
@@ -35,10 +32,7 @@ Reproduction reproduce_f11(const MappingReproductionOptions& options, Executor& 
        [&] { reproduce_second_set(options, executor, result); }},
       {"time", 1.0, [&] { measure_step_time(options, executor, result); }},
       {"identical doors", 15.0, [&] { reproduce_identical_doors(options, executor, result); }}};
-  for (const std::string name : {"small_warehouse", "small_house"}) {
-    if (options.data.empty() || !std::filesystem::is_directory(options.data / "scenes" / name)) {
-      continue;
-    }
+  for (const std::string& name : worlds_in(options.data)) {
     stages.push_back({name, 10.0 * options.runs,
                       [&, name] { reproduce_mapping_in_world(options, name, executor, result); }});
   }

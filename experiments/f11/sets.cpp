@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "experiments/f11/experiments.hpp"
-#include "experiments/m03/support.hpp"
+#include "experiments/rows.hpp"
 #include "experiments/runs/surroundings.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/alignment.hpp"
@@ -258,11 +258,10 @@ void reproduce_first_set(const MappingReproductionOptions& options, Executor& ex
             options.out / "f11_figure6a.png");
   result.pictures.push_back(
       {"f11_figure6a.png", "Figure 6 (a): shape difference against k1, for several k2"});
-  write_plot(options.out / "f11_figure4.png", maps, 2);
-  result.pictures.push_back(
-      {"f11_figure4.png",
-       "Figure 4: maps of the loop beside the truth and the wheels, laid over "
-       "the truth with one scale"});
+  add_plot(result, options.out, "f11_figure4.png",
+           "Figure 4: maps of the loop beside the truth and the wheels, laid over the truth with "
+           "one scale",
+           maps, 2);
 }
 
 void reproduce_second_set(const MappingReproductionOptions& options, Executor& executor,
@@ -336,10 +335,9 @@ void reproduce_second_set(const MappingReproductionOptions& options, Executor& e
             options.out / "f11_figure6b.png");
   result.pictures.push_back(
       {"f11_figure6b.png", "Figure 6 (b): shape difference against k1, for several k2"});
-  write_plot(options.out / "f11_figure5.png", maps, 2);
-  result.pictures.push_back(
-      {"f11_figure5.png",
-       "Figure 5: maps of the second set beside the truth and the wheels, laid over the truth"});
+  add_plot(result, options.out, "f11_figure5.png",
+           "Figure 5: maps of the second set beside the truth and the wheels, laid over the truth",
+           maps, 2);
 }
 
 }  // namespace panonav

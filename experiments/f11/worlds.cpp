@@ -9,8 +9,9 @@
 #include <vector>
 
 #include "experiments/f11/experiments.hpp"
-#include "experiments/m03/support.hpp"
+#include "experiments/rows.hpp"
 #include "experiments/runs/surroundings.hpp"
+#include "experiments/runs/worlds.hpp"
 #include "panonav/camera/camera.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
@@ -22,7 +23,6 @@
 #include "panonav/panorama/preprocessing.hpp"
 #include "panonav/panorama/unwarper.hpp"
 #include "panonav/signature/signature_extractor.hpp"
-#include "panonav/simulation/load_gazebo.hpp"
 #include "panonav/simulation/recording.hpp"
 #include "panonav/simulation/scenes.hpp"
 #include "reporting/picture_plot.hpp"
@@ -37,11 +37,6 @@ constexpr int components = 15;
 
 double microseconds_since(Clock::time_point start) {
   return 1e6 * std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-void report(Reproduction& result, const std::string& id, const std::string& what, double ours,
-            const std::string& unit, std::optional<Target> target = std::nullopt) {
-  result.rows.push_back({.id = id, .what = what, .ours = ours, .unit = unit, .target = target});
 }
 
 double rms_m(std::span<const Point2> estimate, std::span<const Point2> truth, bool scale) {
@@ -157,19 +152,19 @@ void map_indoor_walk(const MappingReproductionOptions& options, Executor& execut
   };
   const auto linked =
       static_cast<double>(std::ranges::count(parts.map.edges, LinkKind::sequence, &MapEdge::kind));
-  report(result, "f11.indoor_walk.linked",
-         "indoor_walk_360: consecutive pictures linked by a step read from them",
-         linked / static_cast<double>(walk.recording.views.size() - 1), "");
-  report(result, "f11.indoor_walk.closures", "indoor_walk_360: loops closed",
-         static_cast<double>(closures_of(bridged).size()), "closures");
+  add_row(result, "f11.indoor_walk.linked",
+          "indoor_walk_360: consecutive pictures linked by a step read from them",
+          linked / static_cast<double>(walk.recording.views.size() - 1), "");
+  add_row(result, "f11.indoor_walk.closures", "indoor_walk_360: loops closed",
+          static_cast<double>(closures_of(bridged).size()), "closures");
   // What single views would close: for the eye.
   const auto single = map_recording(
       walk.recording,
       {.mapping = {.bridge_m = 1.5}, .closure = {.sequence = 1, .most_drift = 100.0}});
   const auto refused = closures_of(single);
-  report(result, "f11.indoor_walk.without_sequence",
-         "indoor_walk_360: loops that single views would close, were no sequence asked for",
-         static_cast<double>(refused.size()), "closures");
+  add_row(result, "f11.indoor_walk.without_sequence",
+          "indoor_walk_360: loops that single views would close, were no sequence asked for",
+          static_cast<double>(refused.size()), "closures");
   MapLayer lines{.label = "closures", .colour = "#d62728"};
   const auto place_of = [&](ViewId view) {
     return bridged.estimate[view.value - bridged.map.nodes[0].view.value];
@@ -177,17 +172,15 @@ void map_indoor_walk(const MappingReproductionOptions& options, Executor& execut
   for (const MapEdge& edge : closures_of(bridged)) {
     lines.lines.push_back({place_of(edge.a), place_of(edge.b)});
   }
-  write_plot(options.out / "f11_indoor_walk.png",
-             MapPlot{.title = "indoor_walk_360, no positions known",
-                     .layers = {{.label = "consecutive pictures",
-                                 .colour = "#1f77b4",
-                                 .lines = {bridged.estimate},
-                                 .dots = bridged.estimate},
-                                lines}});
-  result.pictures.push_back(
-      {"f11_indoor_walk.png",
-       "A walk through a building, pictures metres apart: steps that the views do not show count "
-       "as 1.5 m straight ahead; closures in red"});
+  add_plot(result, options.out, "f11_indoor_walk.png",
+           "A walk through a building, pictures metres apart: steps that the views do not show "
+           "count as 1.5 m straight ahead; closures in red",
+           MapPlot{.title = "indoor_walk_360, no positions known",
+                   .layers = {{.label = "consecutive pictures",
+                               .colour = "#1f77b4",
+                               .lines = {bridged.estimate},
+                               .dots = bridged.estimate},
+                              lines}});
   if (refused.empty()) return;
   const Dataset dataset = read_dataset(folder);
   const PanoramaReader reader(dataset.source, shape);
@@ -199,12 +192,10 @@ void map_indoor_walk(const MappingReproductionOptions& options, Executor& execut
     pairs.emplace_back(reader.read(dataset.entries[edge.a.value - first].path),
                        reader.read(dataset.entries[edge.b.value - first].path));
   }
-  write_plot(options.out / "f11_indoor_walk_pairs.png",
-             pairs_picture("indoor_walk_360: pairs that no sequence of views confirms", pairs));
-  result.pictures.push_back(
-      {"f11_indoor_walk_pairs.png",
-       "Pairs of pictures (one over the other) that pass every check of a loop closure but the "
-       "sequence: corridors of one kind on several floors. None of them becomes a closure"});
+  add_plot(result, options.out, "f11_indoor_walk_pairs.png",
+           "Pairs of pictures (one over the other) that pass every check of a loop closure but the "
+           "sequence: corridors of one kind on several floors. None of them becomes a closure",
+           pairs_picture("indoor_walk_360: pairs that no sequence of views confirms", pairs));
 }
 
 }  // namespace
@@ -239,15 +230,11 @@ void measure_step_time(const MappingReproductionOptions& options, Executor& exec
     step_us.push_back(microseconds_since(middle));
     all_us.push_back(microseconds_since(start));
   }
-  result.rows.push_back(
-      {.id = "f11.time.step",
-       .what = "time of a step from a mirror image of 640 x 480 to a pose, median",
-       .published = std::pair(54.0, 153.0),
-       .ours = 1e-3 * median(all_us),
-       .unit = "ms",
-       .target = at_most(0.3)});
-  report(result, "f11.time.odometry", "of these, from signature to pose", 1e-3 * median(step_us),
-         "ms");
+  add_row(result, "f11.time.step",
+          "time of a step from a mirror image of 640 x 480 to a pose, median",
+          1e-3 * median(all_us), "ms", at_most(0.3), std::pair(54.0, 153.0));
+  add_row(result, "f11.time.odometry", "of these, from signature to pose", 1e-3 * median(step_us),
+          "ms");
   // Figure 6 shows the influence of the components on the time, too.
   Series times{.label = "signature to pose", .x = {}, .y = {}};
   for (const int count : {6, 10, 15, 20, 32, 64}) {
@@ -261,17 +248,16 @@ void measure_step_time(const MappingReproductionOptions& options, Executor& exec
       taken_us.push_back(microseconds_since(start));
     }
     times.add(count, 1e-3 * median(taken_us));
-    report(result, "f11.time.components_" + std::to_string(count),
-           "from signature to pose with " + std::to_string(count) + " components", times.y.back(),
-           "ms");
+    add_row(result, "f11.time.components_" + std::to_string(count),
+            "from signature to pose with " + std::to_string(count) + " components", times.y.back(),
+            "ms");
   }
-  write_plot(options.out / "f11_figure6_time.png",
-             LinePlot{.title = "Time from a signature to a pose, median",
-                      .x_label = "components",
-                      .y_label = "time [ms]",
-                      .series = {times}});
-  result.pictures.push_back(
-      {"f11_figure6_time.png", "Figure 6: time of a step against the number of components"});
+  add_plot(result, options.out, "f11_figure6_time.png",
+           "Figure 6: time of a step against the number of components",
+           LinePlot{.title = "Time from a signature to a pose, median",
+                    .x_label = "components",
+                    .y_label = "time [ms]",
+                    .series = {times}});
 }
 
 void reproduce_identical_doors(const MappingReproductionOptions& options, Executor& executor,
@@ -314,11 +300,8 @@ void reproduce_mapping_in_world(const MappingReproductionOptions& options, const
                                 Executor& executor, Reproduction& result) {
   constexpr double length_m = 60.0;
   constexpr double spacing_m = 0.15;
-  GazeboOptions reading;
-  reading.textures.read = [](const std::filesystem::path& path) { return read_image(path); };
-  const PlaceRecording place = empty_place(
-      load_gazebo(options.data / "scenes" / name / "worlds" / (name + ".world"), reading),
-      options.seed, options.columns, executor);
+  const PlaceRecording place =
+      empty_place(read_world(options.data, name), options.seed, options.columns, executor);
   std::vector<double> wheels_m;
   std::vector<double> open_m;
   std::vector<double> closed_m;
@@ -399,35 +382,29 @@ void reproduce_mapping_in_world(const MappingReproductionOptions& options, const
   add_rate(result, id + ".right_closures", what + ": closures between views at most 1 m apart",
            right, std::max<std::size_t>(1, right + wrong));
   const std::string file = "f11_" + name + ".png";
-  write_plot(options.out / file, maps, 2);
-  result.pictures.push_back(
-      {file, "Paths of 60 m with two loops in " + name + ", laid over the truth"});
+  add_plot(result, options.out, file,
+           "Paths of 60 m with two loops in " + name + ", laid over the truth", maps, 2);
 }
 
 void reproduce_mapped_recordings(const MappingReproductionOptions& options, Executor& executor,
                                  Reproduction& result) {
-  const auto is_there = [&](const char* name) {
-    return !options.data.empty() && std::filesystem::is_directory(options.data / name);
-  };
-  if (is_there("sussex_route")) {
+  if (has_data(options.data, "sussex_route")) {
     const auto route = read_recording(options.data / "sussex_route", {}, executor);
     const auto mapped = map_recording(route.recording, {.mapping = {.close_loops = false}});
-    report(result, "f11.sussex.rms",
-           "sussex_route, 7 m outdoors: position error (rms), views alone, one scale",
-           rms_m(mapped.estimate, mapped.truth, true), "m");
-    report(result, "f11.sussex.shape", "sussex_route: shape difference",
-           shape_error(mapped.estimate, mapped.truth), "");
-    write_plot(
-        options.out / "f11_sussex_route.png",
-        MapPlot{.title = "sussex_route",
-                .layers = {{.label = "tracker", .colour = "#777777", .lines = {mapped.truth}},
-                           {.label = "visual odometry",
-                            .colour = "#1f77b4",
-                            .lines = {laid_over(mapped.estimate, mapped.truth)}}}});
-    result.pictures.push_back(
-        {"f11_sussex_route.png", "A route outdoors, laid over the tracker's"});
+    add_row(result, "f11.sussex.rms",
+            "sussex_route, 7 m outdoors: position error (rms), views alone, one scale",
+            rms_m(mapped.estimate, mapped.truth, true), "m");
+    add_row(result, "f11.sussex.shape", "sussex_route: shape difference",
+            shape_error(mapped.estimate, mapped.truth), "");
+    add_plot(result, options.out, "f11_sussex_route.png",
+             "A route outdoors, laid over the tracker's",
+             MapPlot{.title = "sussex_route",
+                     .layers = {{.label = "tracker", .colour = "#777777", .lines = {mapped.truth}},
+                                {.label = "visual odometry",
+                                 .colour = "#1f77b4",
+                                 .lines = {laid_over(mapped.estimate, mapped.truth)}}}});
   }
-  if (is_there("indoor_walk_360")) map_indoor_walk(options, executor, result);
+  if (has_data(options.data, "indoor_walk_360")) map_indoor_walk(options, executor, result);
 }
 
 void measure_large_maps(const MappingReproductionOptions& options, Executor& executor,
@@ -450,25 +427,25 @@ void measure_large_maps(const MappingReproductionOptions& options, Executor& exe
     const auto mapped = map_recording(recording, {.most_nodes = views});
     const std::string id = "f11.large." + std::to_string(views);
     const std::string what = "map of " + std::to_string(views) + " views";
-    report(result, id + ".step",
-           what + ": time of a view, mean, all optimisation shared among them",
-           1e3 * mapped.mean_step_s, "ms",
-           views == 10'000 ? std::optional(at_most(20.0)) : std::nullopt);
-    report(result, id + ".longest", what + ": longest time of a view", 1e3 * mapped.longest_step_s,
-           "ms");
-    report(result, id + ".finish", what + ": the last optimisation of the whole",
-           1e3 * mapped.finish_s, "ms");
+    add_row(result, id + ".step",
+            what + ": time of a view, mean, all optimisation shared among them",
+            1e3 * mapped.mean_step_s, "ms",
+            views == 10'000 ? std::optional(at_most(20.0)) : std::nullopt);
+    add_row(result, id + ".longest", what + ": longest time of a view", 1e3 * mapped.longest_step_s,
+            "ms");
+    add_row(result, id + ".finish", what + ": the last optimisation of the whole",
+            1e3 * mapped.finish_s, "ms");
     const double bytes = static_cast<double>(
         mapped.map.nodes.size() *
             (static_cast<std::size_t>(2 * recording.views.front().rows() * components) +
              sizeof(MapNode) + sizeof(PassedNode)) +
         mapped.map.edges.size() * (sizeof(MapEdge) + sizeof(PoseEdge)));
-    report(result, id + ".memory", what + ": packed signatures, nodes and edges", 1e-6 * bytes,
-           "MB");
-    report(result, id + ".shape", what + ": shape difference",
-           shape_error(mapped.estimate, mapped.truth), "");
-    report(result, id + ".wrong", what + ": closures between views more than 1 m apart",
-           static_cast<double>(mapped.wrong_closures), "closures");
+    add_row(result, id + ".memory", what + ": packed signatures, nodes and edges", 1e-6 * bytes,
+            "MB");
+    add_row(result, id + ".shape", what + ": shape difference",
+            shape_error(mapped.estimate, mapped.truth), "");
+    add_row(result, id + ".wrong", what + ": closures between views more than 1 m apart",
+            static_cast<double>(mapped.wrong_closures), "closures");
   }
 }
 

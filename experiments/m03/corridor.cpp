@@ -213,11 +213,10 @@ void reproduce_corridor(const TrackingReproductionOptions& options, Executor& ex
   }
   add_confidently_wrong(result, "m03.corridor.wrong", "corridor", runs, at_most(0.0));
   if (reached > 0) {
-    add_rate(
-        result, "m03.corridor.right_after",
-        "corridor: runs whose heaviest mode is within 0.5 m of the truth at the first distinct "
-        "place or one of the two images after it",
-        right, reached, at_least(0.99));
+    add_rate(result, "m03.corridor.right_after",
+             "corridor: runs whose heaviest mode is within 0.5 m of the truth at the first "
+             "distinct place or one of the two images after it",
+             right, reached, at_least(0.99));
     add_rate(result, "m03.corridor.right_for_good",
              "corridor: the same, and at all images from the fourth to the tenth", right_for_good,
              reached);
@@ -228,13 +227,12 @@ void reproduce_corridor(const TrackingReproductionOptions& options, Executor& ex
   const std::size_t last = shown.runs.front().steps.size() - 1;
   const std::size_t first = std::min(corridors.first_distinct.front().value_or(last), last);
   const std::array<std::size_t, 4> steps{0, first / 2, first, std::min(first + 2, last)};
-  write_plot(options.out / "corridor.png",
-             particle_maps(*shown.place, corridors.things, shown.runs.front(), setting,
-                           seed_of_corridor, steps, "Corridor"),
-             2);
-  result.pictures.push_back({"corridor.png",
-                             "A corridor of identical doors: the particles keep to places that "
-                             "look alike until something that stands only once comes into view."});
+  add_plot(result, options.out, "corridor.png",
+           "A corridor of identical doors: the particles keep to places that look alike until "
+           "something that stands only once comes into view.",
+           particle_maps(*shown.place, corridors.things, shown.runs.front(), setting,
+                         seed_of_corridor, steps, "Corridor"),
+           2);
 }
 
 }  // namespace panonav

@@ -81,11 +81,6 @@ SingleImages sum_of(std::span<const RunSet> sets) {
   return sum;
 }
 
-void add_point(Series& series, double x, std::size_t successes, std::size_t trials) {
-  const Proportion rate = success_rate(successes, trials);
-  series.add(x, rate.value, rate.low, rate.high);
-}
-
 }  // namespace
 
 void reproduce_garden(const TrackingReproductionOptions& options, Executor& executor,
@@ -117,36 +112,34 @@ void reproduce_garden(const TrackingReproductionOptions& options, Executor& exec
         rows("light_" + shown(lights[l]), "light " + shown(lights[l]) + " times that of the memory",
              gardens.constant[l]);
     const SingleImages single = sum_of(gardens.constant[l]);
-    add_point(right, lights[l], single.right, single.asked);
-    add_point(near, lights[l], single.near, single.asked);
-    add_point(success, lights[l], localised_within(runs, garden_spacing_m, 10), runs.size());
-    add_point(first, lights[l], localised_within(runs, garden_spacing_m, 1), runs.size());
-    const auto counts = capped_images(runs, garden_spacing_m);
-    const auto interval = mean_interval(counts, 1);
-    needed.add(lights[l], mean(counts), interval.first, interval.second);
+    add_point(right, lights[l], success_rate(single.right, single.asked));
+    add_point(near, lights[l], success_rate(single.near, single.asked));
+    const auto share_within = [&](int images) {
+      return success_rate(localised_within(runs, garden_spacing_m, images), runs.size());
+    };
+    add_point(success, lights[l], share_within(10));
+    add_point(first, lights[l], share_within(1));
+    add_point(needed, lights[l], mean_figure(capped_images(runs, garden_spacing_m)));
   }
   (void)rows("light_changing", "light that changes at each image between 0.50 and 2.00",
              gardens.changing);
-  write_plot(options.out / "garden_success.png",
-             LinePlot{.title = "Garden: localisation against brightness",
-                      .x_label = "light, times that of the memory",
-                      .y_label = "share",
-                      .series = {right, near, first, success},
-                      .log_x = true,
-                      .x_range = std::pair{0.4, 2.5},
-                      .y_range = std::pair{0.0, 1.02}});
-  write_plot(options.out / "garden_images.png",
-             LinePlot{.title = "Garden: mean number of images until localised",
-                      .x_label = "light, times that of the memory",
-                      .y_label = "images",
-                      .series = {needed},
-                      .log_x = true,
-                      .x_range = std::pair{0.4, 2.5},
-                      .y_range = std::pair{0.0, 15.0}});
-  result.pictures.push_back(
-      {"garden_success.png",
-       "Outdoors in other light than memorised: single images, and the filter."});
-  result.pictures.push_back({"garden_images.png", "Images until localised against brightness."});
+  add_plot(result, options.out, "garden_success.png",
+           "Outdoors in other light than memorised: single images, and the filter.",
+           LinePlot{.title = "Garden: localisation against brightness",
+                    .x_label = "light, times that of the memory",
+                    .y_label = "share",
+                    .series = {right, near, first, success},
+                    .log_x = true,
+                    .x_range = std::pair{0.4, 2.5},
+                    .y_range = std::pair{0.0, 1.02}});
+  add_plot(result, options.out, "garden_images.png", "Images until localised against brightness.",
+           LinePlot{.title = "Garden: mean number of images until localised",
+                    .x_label = "light, times that of the memory",
+                    .y_label = "images",
+                    .series = {needed},
+                    .log_x = true,
+                    .x_range = std::pair{0.4, 2.5},
+                    .y_range = std::pair{0.0, 15.0}});
 }
 
 }  // namespace panonav

@@ -86,17 +86,13 @@ void ratio_row(const Rule& rule, const std::vector<double>& with,
                const std::vector<double>& without, Reproduction& result) {
   std::vector<double> saved;
   for (std::size_t i = 0; i < with.size(); ++i) saved.push_back(with[i] / mean(without));
-  result.rows.push_back(
-      {.id = "m03.global.hard.ratio." + rule.id,
-       .what = "global localisation on hard: mean number of images with " + rule.name +
-               ", over that with nothing redrawn (" + std::to_string(m03_most_images) +
-               " for runs that need more)",
-       .published =
-           rule.redraw == Redraw::topological ? std::optional(std::pair{0.5, 0.6}) : std::nullopt,
-       .ours = mean(saved),
-       .interval = mean_interval(saved, 1),
-       .unit = "",
-       .target = rule.redraw == Redraw::uniform ? std::nullopt : std::optional(at_most(0.5))});
+  add_row(result, "m03.global.hard.ratio." + rule.id,
+          "global localisation on hard: mean number of images with " + rule.name +
+              ", over that with nothing redrawn (" + std::to_string(m03_most_images) +
+              " for runs that need more)",
+          mean_figure(saved), "",
+          rule.redraw == Redraw::uniform ? std::nullopt : std::optional(at_most(0.5)),
+          rule.redraw == Redraw::topological ? std::optional(std::pair{0.5, 0.6}) : std::nullopt);
 }
 
 }  // namespace
@@ -132,20 +128,18 @@ void reproduce_global_localisation(const TrackingReproductionOptions& options,
       x += 0.08 * static_cast<double>(curves.series.size() - 1);
     }
   }
-  write_plot(options.out / "global_error.png", curves);
-  result.pictures.push_back({"global_error.png",
-                             "Error of the heaviest mode over the images, from no knowledge of "
-                             "position and heading, for four rules of redrawing."});
+  add_plot(result, options.out, "global_error.png",
+           "Error of the heaviest mode over the images, from no knowledge of position and heading, "
+           "for four rules of redrawing.",
+           curves);
   const std::array<std::size_t, 3> steps{0, 2, 8};
   const OfficeRuns& shown = offices.front();
-  write_plot(
-      options.out / "fig07_global_localisation.png",
-      particle_maps(*shown.hard.place, shown.furniture, shown.hard.runs.front(),
-                    compass_setting(Redraw::none), seed_of_hard, steps, "Global localisation"),
-      3);
-  result.pictures.push_back({"fig07_global_localisation.png",
-                             "Global localisation with as many particles as references and "
-                             "nothing redrawn, heading unknown, hard ([M03] figure 7, 1 to 3)."});
+  add_plot(result, options.out, "fig07_global_localisation.png",
+           "Global localisation with as many particles as references and nothing redrawn, heading "
+           "unknown, hard ([M03] figure 7, 1 to 3).",
+           particle_maps(*shown.hard.place, shown.furniture, shown.hard.runs.front(),
+                         compass_setting(Redraw::none), seed_of_hard, steps, "Global localisation"),
+           3);
 }
 
 }  // namespace panonav

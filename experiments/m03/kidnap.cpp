@@ -56,14 +56,10 @@ void reproduce_kidnapping(const TrackingReproductionOptions& options,
       for (std::size_t i = 0; i < images.size(); ++i) {
         difference.push_back(images[i] - topological[i]);
       }
-      result.rows.push_back({.id = row + ".images_less",
-                             .what = "kidnapped, hard: images with our rule less those with the "
-                                     "paper's redraw (mean, same runs)",
-                             .published = std::nullopt,
-                             .ours = mean(difference),
-                             .interval = mean_interval(difference, 1),
-                             .unit = "images",
-                             .target = at_most(0.0)});
+      add_row(result, row + ".images_less",
+              "kidnapped, hard: images with our rule less those with the paper's redraw (mean, "
+              "same runs)",
+              mean_figure(difference), "images", at_most(0.0));
     }
     curves.series.push_back(error_over_images(name, runs, m03_most_images, first_after));
     for (double& x : curves.series.back().x) {
@@ -77,16 +73,13 @@ void reproduce_kidnapping(const TrackingReproductionOptions& options,
       maps.push_back(std::move(map));
     }
   }
-  write_plot(options.out / "kidnapped_error.png", curves);
-  result.pictures.push_back({"kidnapped_error.png",
-                             "Error of the heaviest mode after the robot was carried at least "
-                             "1 m away."});
+  add_plot(result, options.out, "kidnapped_error.png",
+           "Error of the heaviest mode after the robot was carried at least 1 m away.", curves);
   if (maps.empty()) return;
-  write_plot(options.out / "fig08_kidnapped.png", maps, 3);
-  result.pictures.push_back({"fig08_kidnapped.png",
-                             "The kidnapped robot 1, 3 and 6 images after it was carried away: "
-                             "redrawn anywhere ([M03] figure 8), around the best matches "
-                             "([M03] figure 9), and by our rule."});
+  add_plot(result, options.out, "fig08_kidnapped.png",
+           "The kidnapped robot 1, 3 and 6 images after it was carried away: redrawn anywhere "
+           "([M03] figure 8), around the best matches ([M03] figure 9), and by our rule.",
+           maps, 3);
 }
 
 }  // namespace panonav

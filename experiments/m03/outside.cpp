@@ -214,21 +214,18 @@ void reproduce_leaving(const TrackingReproductionOptions& options, const std::st
     if (reports.asked[b] == 0) continue;
     for (const auto& [series, counts] :
          {std::pair{&lost_series, &reports.lost}, {&sure_series, &reports.localised}}) {
-      const Proportion rate = success_rate((*counts)[b], reports.asked[b]);
-      series->x.push_back((static_cast<double>(b) + 0.5) * bin_m);
-      series->y.push_back(rate.value);
-      series->y_low.push_back(rate.low);
-      series->y_high.push_back(rate.high);
+      add_point(*series, (static_cast<double>(b) + 0.5) * bin_m,
+                success_rate((*counts)[b], reports.asked[b]));
     }
   }
   const std::string file = "leaving_" + name + ".png";
-  write_plot(options.out / file, LinePlot{.title = "Leaving the memorised half of " + name,
-                                          .x_label = "way to the nearest reference [m]",
-                                          .y_label = "share of the images",
-                                          .series = {lost_series, sure_series},
-                                          .y_range = std::pair{0.0, 1.02}});
-  result.pictures.push_back(
-      {file, "What the filter says of itself, by how far the robot is from all references."});
+  add_plot(result, options.out, file,
+           "What the filter says of itself, by how far the robot is from all references.",
+           LinePlot{.title = "Leaving the memorised half of " + name,
+                    .x_label = "way to the nearest reference [m]",
+                    .y_label = "share of the images",
+                    .series = {lost_series, sure_series},
+                    .y_range = std::pair{0.0, 1.02}});
 }
 
 }  // namespace panonav

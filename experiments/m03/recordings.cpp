@@ -109,13 +109,12 @@ void reproduce_recorded_route(const TrackingReproductionOptions& options, Execut
     const std::vector<RunSet> sets{make_run_set(compass ? with_headings : plain, runs, executor)};
     setting.options.compass = compass;
     const auto tracked = track_sets(sets, setting, seed_of_route, executor);
-    add_rows(
-        result, std::string("m03.sussex_route.") + (compass ? "compass" : "no_compass"),
-        std::string("route outdoors (sussex_route), even images memorised, stretches of 20 odd "
-                    "images 12 cm apart, which overlap, ") +
-            (compass ? "memory with headings along the path, compass on"
-                     : "memory without headings"),
-        0.25, sets, tracked);
+    add_rows(result, std::string("m03.sussex_route.") + (compass ? "compass" : "no_compass"),
+             std::string("route outdoors (sussex_route), even images memorised, stretches of 20 "
+                         "odd images 12 cm apart, which overlap, ") +
+                 (compass ? "memory with headings along the path, compass on"
+                          : "memory without headings"),
+             0.25, sets, tracked);
   }
 }
 

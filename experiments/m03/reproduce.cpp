@@ -6,6 +6,7 @@
 
 #include "experiments/m03/experiments.hpp"
 #include "experiments/reproduction_stages.hpp"
+#include "experiments/runs/worlds.hpp"
 #include "panonav/core/error.hpp"
 
 namespace panonav {
@@ -36,9 +37,7 @@ Reproduction reproduce_m03(const TrackingReproductionOptions& options, Executor&
   const auto wanted = [&](std::string_view part) {
     return options.only.empty() || options.only == part;
   };
-  std::error_code error;
-  std::filesystem::create_directories(options.out, error);
-  if (error) throw FileError(options.out.string(), "cannot be made: " + error.message());
+  make_folder(options.out);
 
   Reproduction result;
   std::vector<OfficeRuns> offices;
@@ -69,17 +68,13 @@ Reproduction reproduce_m03(const TrackingReproductionOptions& options, Executor&
     stages.push_back({"leaving the " + scene, 5.0 * options.scenes,
                       [&, scene] { reproduce_leaving(options, scene, executor, result); }});
   }
-  // What is not there is left out, so that any part of the data will do.
-  const auto is_there = [&](const std::filesystem::path& folder) {
-    return !options.data.empty() && std::filesystem::is_directory(options.data / folder);
-  };
-  for (const std::string world : {"small_warehouse", "small_house"}) {
-    if (!wanted("worlds") || !is_there(std::filesystem::path("scenes") / world)) continue;
+  for (const std::string& world : worlds_in(options.data)) {
+    if (!wanted("worlds")) break;
     stages.push_back(
         {world, 50.0, [&, world] { reproduce_gazebo_world(options, world, executor, result); }});
   }
   const auto recording = [&](const std::string& name, auto experiment) {
-    if (!wanted("recordings") || !is_there(name)) return;
+    if (!wanted("recordings") || !has_data(options.data, name)) return;
     stages.push_back({name, 10.0, [&, experiment] { experiment(options, executor, result); }});
   };
   recording("sussex_route", reproduce_recorded_route);

@@ -127,44 +127,6 @@ std::vector<double> errors_after(std::span<const TrackedRun> runs, std::size_t i
   return errors;
 }
 
-void add_rate(Reproduction& result, const std::string& id, const std::string& what,
-              std::size_t successes, std::size_t trials, std::optional<Target> target) {
-  const Proportion rate = success_rate(successes, trials);
-  result.rows.push_back({.id = id,
-                         .what = what,
-                         .published = std::nullopt,
-                         .ours = rate.value,
-                         .interval = std::pair{rate.low, rate.high},
-                         .unit = "",
-                         .target = target,
-                         .over = "of " + std::to_string(trials)});
-}
-
-void add_median(Reproduction& result, const std::string& id, const std::string& what,
-                const std::string& unit, std::span<const double> values,
-                std::optional<Target> target, std::optional<std::pair<double, double>> published) {
-  result.rows.push_back({.id = id,
-                         .what = what,
-                         .published = published,
-                         .ours = median(values),
-                         .interval = median_interval(values, 1),
-                         .unit = unit,
-                         .target = target,
-                         .over = "median of " + std::to_string(values.size())});
-}
-
-void add_mean(Reproduction& result, const std::string& id, const std::string& what,
-              const std::string& unit, std::span<const double> values) {
-  result.rows.push_back({.id = id,
-                         .what = what,
-                         .published = std::nullopt,
-                         .ours = mean(values),
-                         .interval = mean_interval(values, 1),
-                         .unit = unit,
-                         .target = std::nullopt,
-                         .over = "mean of " + std::to_string(values.size())});
-}
-
 void add_confidently_wrong(Reproduction& result, const std::string& id, const std::string& what,
                            std::span<const TrackedRun> runs, std::optional<Target> target) {
   std::size_t images = 0;
@@ -177,13 +139,6 @@ void add_confidently_wrong(Reproduction& result, const std::string& id, const st
   }
   add_rate(result, id, what + ": images at which it says localised and is off by more than 1 m",
            wrong, images, target);
-}
-
-Target at_most(double value) {
-  return {Comparison::at_most, value};
-}
-Target at_least(double value) {
-  return {Comparison::at_least, value};
 }
 
 std::vector<MapPlot> particle_maps(const TrackingPlace& place, std::span<const MapLayer> furniture,
@@ -236,8 +191,9 @@ Series error_over_images(const std::string& label, std::span<const TrackedRun> r
   for (std::size_t n = 1; n <= images; ++n) {
     const auto errors = errors_after(runs, n, first_step);
     if (errors.empty()) break;
-    series.add(static_cast<double>(n), median(errors), quantile(errors, 0.05),
-               quantile(errors, 0.95));
+    series.add(static_cast<double>(n), median(errors));
+    series.y_low.push_back(quantile(errors, 0.05));
+    series.y_high.push_back(quantile(errors, 0.95));
   }
   return series;
 }

@@ -7,11 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "experiments/reproduction.hpp"
+#include "experiments/rows.hpp"
 #include "experiments/runs/tracking_filter.hpp"
 #include "experiments/runs/tracking_run.hpp"
 #include "panonav/core/executor.hpp"
-#include "reporting/plot.hpp"
 
 namespace panonav {
 
@@ -65,26 +64,11 @@ void tell_single_images(ResultRow& row, std::span<const RunSet> sets);
 [[nodiscard]] std::vector<double> errors_after(std::span<const TrackedRun> runs, std::size_t images,
                                                std::size_t first_step = 0);
 
-/// A row of a rate with its Wilson interval.
-void add_rate(Reproduction& result, const std::string& id, const std::string& what,
-              std::size_t successes, std::size_t trials,
-              std::optional<Target> target = std::nullopt);
-/// A row of a median with its bootstrap interval.
-void add_median(Reproduction& result, const std::string& id, const std::string& what,
-                const std::string& unit, std::span<const double> values,
-                std::optional<Target> target = std::nullopt,
-                std::optional<std::pair<double, double>> published = std::nullopt);
-/// The same of a mean.
-void add_mean(Reproduction& result, const std::string& id, const std::string& what,
-              const std::string& unit, std::span<const double> values);
 /// How often the filter says "localised" while it is wrong by more than `m03_wrong_m`, over all
 /// images.
 void add_confidently_wrong(Reproduction& result, const std::string& id, const std::string& what,
                            std::span<const TrackedRun> runs,
                            std::optional<Target> target = std::nullopt);
-
-[[nodiscard]] Target at_most(double value);
-[[nodiscard]] Target at_least(double value);
 
 /// A filter's particles over a run, as in [M03] figures 7 to 9: panels at the chosen steps.
 [[nodiscard]] std::vector<MapPlot> particle_maps(const TrackingPlace& place,

@@ -19,11 +19,8 @@ struct Curve {
 };
 
 void add_point(Curve& curve, double x, std::span<const TrackedRun> runs) {
-  const Proportion rate = success_rate(localised_within(runs, m03_spacing_m, 10), runs.size());
-  curve.success.add(x, rate.value, rate.low, rate.high);
-  const auto images = capped_images(runs, m03_spacing_m);
-  const auto interval = mean_interval(images, 1);
-  curve.images.add(x, mean(images), interval.first, interval.second);
+  add_point(curve.success, x, success_rate(localised_within(runs, m03_spacing_m, 10), runs.size()));
+  add_point(curve.images, x, mean_figure(capped_images(runs, m03_spacing_m)));
 }
 
 void add_rows(Reproduction& result, const std::string& id, const std::string& what,
@@ -53,10 +50,8 @@ void write(const TrackingReproductionOptions& options, const std::string& file,
     success.series.push_back(curve.success);
     images.series.push_back(curve.images);
   }
-  write_plot(options.out / (file + "_success.png"), success);
-  write_plot(options.out / (file + "_images.png"), images);
-  result.pictures.push_back({file + "_success.png", title + ": success."});
-  result.pictures.push_back({file + "_images.png", title + ": images."});
+  add_plot(result, options.out, file + "_success.png", title + ": success.", success);
+  add_plot(result, options.out, file + "_images.png", title + ": images.", images);
 }
 
 std::string shown(double factor) {

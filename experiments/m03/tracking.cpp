@@ -53,11 +53,10 @@ void reproduce_position_tracking(const TrackingReproductionOptions& options,
         {Redraw::none, "none", "nothing redrawn"}}) {
     const auto runs = track_sets(sets, large_error_setting(redraw), seed_of_tracking, executor);
     const std::string row = std::string("m03.tracking.hard.") + id;
-    const std::string what =
-        std::string(
-            "tracking through 2 m without images, odometry off by 20 % of the distance "
-            "and 10 degrees a metre, hard, ") +
-        name;
+    const std::string what = std::string(
+                                 "tracking through 2 m without images, odometry off by 20 % of the "
+                                 "distance and 10 degrees a metre, hard, ") +
+                             name;
     // Only runs that knew the place before: others have nothing to keep.
     std::vector<TrackedRun> known;
     for (const TrackedRun& run : runs) {
@@ -75,9 +74,7 @@ void reproduce_position_tracking(const TrackingReproductionOptions& options,
              redraw == Redraw::none ? std::nullopt : std::optional(at_least(0.99)));
     tell_single_images(result.rows.back(), sets);
     add_rate(result, row + ".back_2_for_good",
-             what +
-                 ": error below 25 cm within 2 images and "
-                 "from then on",
+             what + ": error below 25 cm within 2 images and from then on",
              localised_within(known, m03_spacing_m, 2, first_after), known.size());
     add_median(result, row + ".error_1", what + ": error at the first image after", "m",
                errors_after(known, 1, first_after));
@@ -87,19 +84,17 @@ void reproduce_position_tracking(const TrackingReproductionOptions& options,
       x += 0.05 * static_cast<double>(curves.series.size() - 1);
     }
   }
-  write_plot(options.out / "tracking_error.png", curves);
-  result.pictures.push_back(
-      {"tracking_error.png", "Error of the heaviest mode after 2 m of dead reckoning."});
+  add_plot(result, options.out, "tracking_error.png",
+           "Error of the heaviest mode after 2 m of dead reckoning.", curves);
   if (sets.front().runs.empty()) return;
   const std::array<std::size_t, 3> steps{images_before - 1, first_after - 1, first_after};
-  write_plot(
-      options.out / "fig07_position_tracking.png",
+  add_plot(
+      result, options.out, "fig07_position_tracking.png",
+      "Position tracking: before, at the end of, and one image after 2 m without images ([M03] "
+      "figure 7, 4 to 6).",
       particle_maps(*sets.front().place, offices.front().furniture, sets.front().runs.front(),
                     large_error_setting(Redraw::explained), seed_of_tracking, steps, "Tracking"),
       3);
-  result.pictures.push_back({"fig07_position_tracking.png",
-                             "Position tracking: before, at the end of, and one image after 2 m "
-                             "without images ([M03] figure 7, 4 to 6)."});
 }
 
 }  // namespace panonav

@@ -1,13 +1,11 @@
 // Global localisation in Gazebo worlds.
 
-#include <filesystem>
 #include <string>
 #include <vector>
 
 #include "experiments/m03/experiments.hpp"
+#include "experiments/runs/worlds.hpp"
 #include "panonav/core/statistics.hpp"
-#include "panonav/io/image_file.hpp"
-#include "panonav/simulation/load_gazebo.hpp"
 
 namespace panonav {
 
@@ -21,16 +19,13 @@ constexpr int images = 20;
 
 void reproduce_gazebo_world(const TrackingReproductionOptions& options, const std::string& name,
                             Executor& executor, Reproduction& result) {
-  GazeboOptions reading;
-  reading.textures.read = [](const std::filesystem::path& path) { return read_image(path); };
-  const PlaceRecording place = record_place(
-      load_gazebo(options.data / "scenes" / name / "worlds" / (name + ".world"), reading),
-      {.seed = options.seed,
-       .spacing_m = world_spacing_m,
-       .queries = 1,
-       .rows = options.rows,
-       .columns = options.columns / 2},
-      executor);
+  const PlaceRecording place = record_place(read_world(options.data, name),
+                                            {.seed = options.seed,
+                                             .spacing_m = world_spacing_m,
+                                             .queries = 1,
+                                             .rows = options.rows,
+                                             .columns = options.columns / 2},
+                                            executor);
   const auto remembered = remember_for_tracking(place, executor);
   RunCondition noisy = clean_condition();
   noisy.id = "noisy";

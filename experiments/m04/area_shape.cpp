@@ -246,11 +246,10 @@ class AreaShape final : public Experiment {
   void report(const std::filesystem::path& folder, Reproduction& result) const override {
     require(!scenes_.empty(), "places", 0.0, ">= 1");
     if (!shown_.empty()) {
-      write_plot(folder / "fig10_areas_at_places.png", shown_, 2);
-      result.pictures.push_back(
-          {"fig10_areas_at_places.png",
-           "Areas after 3 components at places of one office, with its furniture seen from above "
-           "([M04] figure 10)."});
+      add_plot(result, folder, "fig10_areas_at_places.png",
+               "Areas after 3 components at places of one office, with its furniture seen from "
+               "above ([M04] figure 10).",
+               shown_, 2);
     }
     std::vector<std::size_t> all(scenes_.size());
     std::iota(all.begin(), all.end(), std::size_t{0});
@@ -269,12 +268,11 @@ class AreaShape final : public Experiment {
         }
       }
     }
-    write_plot(folder / "fig10_shape_against_surroundings.png", plot);
-    result.pictures.push_back(
-        {"fig10_shape_against_surroundings.png",
-         "The open question of figure 10: how much farther or less far the area reaches in a "
-         "direction than in other offices, by how the surroundings there differ from those in "
-         "other offices."});
+    add_plot(result, folder, "fig10_shape_against_surroundings.png",
+             "The open question of figure 10: how much farther or less far the area reaches in a "
+             "direction than in other offices, by how the surroundings there differ from those in "
+             "other offices.",
+             plot);
   }
 
  private:
@@ -298,24 +296,19 @@ class AreaShape final : public Experiment {
       }
       shuffled.push_back(correlation(residuals, all, partners));
     }
-    result.rows.push_back({.id = id,
-                           .what = "figure 10, left open by the authors: rank correlation over " +
-                                   std::to_string(all.size()) + " offices, " + components +
-                                   " components, of the " + relation.what,
-                           .published = std::nullopt,
-                           .ours = correlation(residuals, all, all),
-                           .interval = std::pair{quantile(drawn, 0.025), quantile(drawn, 0.975)},
-                           .unit = "",
-                           .target = std::nullopt});
-    result.rows.push_back(
-        {.id = id + ".by_chance",
-         .what = "figure 10: the same with the surroundings of another office "
-                 "at the same place (median of 500 shuffles)",
-         .published = std::nullopt,
-         .ours = median(shuffled),
-         .interval = std::pair{quantile(shuffled, 0.025), quantile(shuffled, 0.975)},
-         .unit = "",
-         .target = std::nullopt});
+    add_row(result, id,
+            "figure 10, left open by the authors: rank correlation over " +
+                std::to_string(all.size()) + " offices, " + components + " components, of the " +
+                relation.what,
+            Figure(correlation(residuals, all, all),
+                   std::pair{quantile(drawn, 0.025), quantile(drawn, 0.975)}),
+            "");
+    add_row(
+        result, id + ".by_chance",
+        "figure 10: the same with the surroundings of another office at the same place (median of "
+        "500 shuffles)",
+        Figure(median(shuffled), std::pair{quantile(shuffled, 0.025), quantile(shuffled, 0.975)}),
+        "");
   }
 
   // Mean residual of the area in each tenth of the residuals of the surroundings.
@@ -339,7 +332,9 @@ class AreaShape final : public Experiment {
       }
       if (values.empty()) continue;
       const auto interval = mean_interval(values, 1);
-      series.add(static_cast<double>(t + 1), mean(values), interval.first, interval.second);
+      series.add(static_cast<double>(t + 1), mean(values));
+      series.y_low.push_back(interval.first);
+      series.y_high.push_back(interval.second);
     }
     return series;
   }

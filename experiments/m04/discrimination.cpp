@@ -7,6 +7,7 @@
 
 #include "experiments/m04/experiment.hpp"
 #include "experiments/m04/support.hpp"
+#include "experiments/runs/make_each.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/signature/dissimilarity.hpp"
 #include "reporting/plot.hpp"
@@ -68,11 +69,8 @@ class Discrimination final : public Experiment {
     for (std::size_t condition = 0; condition < kConditions; ++condition) {
       const auto views = queries_under(place, view_conditions()[condition], executor);
       const auto queries = signatures_of(views, kComponents.back(), executor);
-      std::vector<std::array<std::vector<double>, kCounts>> values(queries.size());
-      executor.for_chunks(values.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
-        for (std::size_t q = begin; q < end; ++q) {
-          values[q] = dissimilarities(queries[q], references);
-        }
+      auto values = make_each(executor, queries.size(), [&](std::size_t q) {
+        return dissimilarities(queries[q], references);
       });
       std::array<double, kCounts> right{};
       const auto n = static_cast<double>(queries.size());
@@ -112,55 +110,44 @@ class Discrimination final : public Experiment {
       const std::string& id = view_conditions()[condition].id;
       for (std::size_t c = 0; c < kCounts; ++c) {
         const Proportion found = success_rate(found_[condition][c], trials_);
-        result.rows.push_back(
-            {.id = "m04.fig6." + id + ".found_" + text(c),
-             .what = "figure 6: nearest reference found with " + text(c) + " components, " + name,
-             .published = std::nullopt,
-             .ours = found.value,
-             .interval = interval_of(found),
-             .unit = "",
-             .target = std::nullopt});
+        add_row(result, "m04.fig6." + id + ".found_" + text(c),
+                "figure 6: nearest reference found with " + text(c) + " components, " + name, found,
+                "");
       }
       for (const std::size_t more : {kFifteen + 1, kFifteen + 2}) {
         add_difference(condition, "fifteen_against_" + text(more),
-                       "15 components less that with " + text(more), more,
-                       Target{Comparison::at_least, -0.02}, result);
+                       "15 components less that with " + text(more), more, at_least(-0.02), result);
         if (id == "hidden") result.rows.back().reason = reason_of_disturbance();
       }
       add_difference(condition, "fifteen_against_2", "15 components less that with 2", 0,
-                     Target{Comparison::at_least, 0.0}, result);
-      result.rows.push_back({.id = "m04.fig6." + id + ".error_15",
-                             .what = "figure 6: distance to the reference found, 15 components, 25 "
-                                     "cm grid (median), " +
-                                     name,
-                             .published = std::nullopt,
-                             .ours = median(errors_m_[condition][kFifteen]),
-                             .interval = median_interval(errors_m_[condition][kFifteen], 1),
-                             .unit = "m",
-                             .target = Target{Comparison::at_most, 0.177}});
+                     at_least(0.0), result);
+      add_row(
+          result, "m04.fig6." + id + ".error_15",
+          "figure 6: distance to the reference found, 15 components, 25 cm grid (median), " + name,
+          median_figure(errors_m_[condition][kFifteen]), "m", at_most(0.177));
     }
     for (std::size_t c = 0; c < kCounts; ++c) {
-      add_mean("sharpness_" + text(c),
-               "figure 6: fall of similarity from the right reference to its neighbours, " +
-                   text(c) + " components (share of the whole range; more is sharper)",
-               sharpness_by_scene_[c], std::nullopt, result);
-      add_mean("contrast_" + text(c),
-               "figure 6: dissimilarity at the right reference over that of a typical one, " +
-                   text(c) + " components (less is better)",
-               contrast_by_scene_[c], std::nullopt, result);
+      add_row(result, "m04.fig6.sharpness_" + text(c),
+              "figure 6: fall of similarity from the right reference to its neighbours, " +
+                  text(c) + " components (share of the whole range; more is sharper)",
+              mean_figure(sharpness_by_scene_[c]), "");
+      add_row(result, "m04.fig6.contrast_" + text(c),
+              "figure 6: dissimilarity at the right reference over that of a typical one, " +
+                  text(c) + " components (less is better)",
+              mean_figure(contrast_by_scene_[c]), "");
     }
     constexpr std::array kBandNames{"0 and 1", "2 to 14", "15 to 49", "50 to 255"};
     for (std::size_t band = 0; band < kBands; ++band) {
       if (disturbance_[band].empty()) continue;
-      add_mean("hidden.disturbance_" + std::to_string(band + 1),
-               std::string("figure 6: what hiding 10 % of the azimuths changes in components ") +
-                   kBandNames[band] + ", over what a step of 25 cm changes there",
-               disturbance_[band], std::nullopt, result);
+      add_row(result, "m04.fig6.hidden.disturbance_" + std::to_string(band + 1),
+              std::string("figure 6: what hiding 10 % of the azimuths changes in components ") +
+                  kBandNames[band] + ", over what a step of 25 cm changes there",
+              mean_figure(disturbance_[band]), "");
     }
-    add_mean("sharpness_fifteen_against_2",
-             "figure 6: sharpness with 15 components less that with 2",
-             difference(sharpness_by_scene_[kFifteen], sharpness_by_scene_[0]),
-             Target{Comparison::at_least, 0.0}, result);
+    add_row(result, "m04.fig6.sharpness_fifteen_against_2",
+            "figure 6: sharpness with 15 components less that with 2",
+            mean_figure(difference(sharpness_by_scene_[kFifteen], sharpness_by_scene_[0])), "",
+            at_least(0.0));
   }
 
  private:
@@ -173,30 +160,14 @@ class Discrimination final : public Experiment {
     return result;
   }
 
-  static void add_mean(const std::string& id, std::string what, const std::vector<double>& values,
-                       std::optional<Target> target, Reproduction& result) {
-    result.rows.push_back({.id = "m04.fig6." + id,
-                           .what = std::move(what),
-                           .published = std::nullopt,
-                           .ours = mean(values),
-                           .interval = mean_interval(values, 1),
-                           .unit = "",
-                           .target = target});
-  }
-
   // Differences are paired: the same queries in the same scenes.
   void add_difference(std::size_t condition, const std::string& id, const std::string& what,
                       std::size_t other, Target target, Reproduction& result) const {
     const auto values =
         difference(success_by_scene_[condition][kFifteen], success_by_scene_[condition][other]);
-    result.rows.push_back(
-        {.id = "m04.fig6." + view_conditions()[condition].id + "." + id,
-         .what = "figure 6: share found with " + what + ", " + view_conditions()[condition].name,
-         .published = std::nullopt,
-         .ours = mean(values),
-         .interval = mean_interval(values, 1),
-         .unit = "",
-         .target = target});
+    add_row(result, "m04.fig6." + view_conditions()[condition].id + "." + id,
+            "figure 6: share found with " + what + ", " + view_conditions()[condition].name,
+            mean_figure(values), "", target);
   }
 
   // Why more components help with azimuths hidden, where the measured disturbance says so.
@@ -263,15 +234,16 @@ class Discrimination final : public Experiment {
   }
 
   void draw(const std::filesystem::path& folder, Reproduction& result) const {
-    write_plot(folder / "fig06_similarity_profile.png",
-               {.title = "Similarity of one view to the references along a row of the grid ([M04] "
-                         "figure 6)",
-                .x_label = "x of the reference [m]",
-                .y_label = "similarity (0 .. 1000)",
-                .series = profile_});
-    result.pictures.push_back({"fig06_similarity_profile.png",
-                               "With 2 components the peak is broad; from 15 on it is narrow and "
-                               "stands at the true position."});
+    add_plot(
+        result, folder, "fig06_similarity_profile.png",
+        "With 2 components the peak is broad; from 15 on it is narrow and stands at the true "
+        "position.",
+        LinePlot{
+            .title =
+                "Similarity of one view to the references along a row of the grid ([M04] figure 6)",
+            .x_label = "x of the reference [m]",
+            .y_label = "similarity (0 .. 1000)",
+            .series = profile_});
     LinePlot rates{.title = "Nearest reference found, by number of components",
                    .x_label = "number of components",
                    .y_label = "share of queries",
@@ -283,15 +255,16 @@ class Discrimination final : public Experiment {
       for (std::size_t c = 0; c < kCounts; ++c) {
         const Proportion found = success_rate(found_[condition][c], trials_);
         // Moved a little apart, so that error bars do not hide each other.
-        line.add(kComponents[c] * (1.0 + 0.03 * static_cast<double>(condition)), found.value,
-                 found.low, found.high);
+        line.add(kComponents[c] * (1.0 + 0.03 * static_cast<double>(condition)), found.value);
+        line.y_low.push_back(found.low);
+        line.y_high.push_back(found.high);
       }
       rates.series.push_back(std::move(line));
     }
-    write_plot(folder / "fig06_success.png", rates);
-    result.pictures.push_back({"fig06_success.png",
-                               "How often the most similar reference is the nearest one: clean "
-                               "views, views with people around, and a noisy camera."});
+    add_plot(result, folder, "fig06_success.png",
+             "How often the most similar reference is the nearest one: clean views, views with "
+             "people around, and a noisy camera.",
+             rates);
   }
 
   std::size_t trials_ = 0;

@@ -170,36 +170,37 @@ class DistanceCurve final : public Experiment {
     for (std::size_t bin = 0; bin < shared; bin += distance_of(bin) < 0.299 ? 1 : 5) {
       std::vector<double> here;
       for (const Curve& curve : curves_) here.push_back(curve[bin]);
-      const auto interval = mean_interval(here, 1);
-      average.add(distance_of(bin), mean(here), interval.first, interval.second);
+      add_point(average, distance_of(bin), mean_figure(here));
     }
     LinePlot plot{.title = "Dissimilarity against distance ([M04] figure 7)",
                   .x_label = "distance between the views [m]",
                   .y_label = "dissimilarity (1: level of far views)",
                   .series = single_};
     plot.series.push_back(average);
-    write_plot(folder / "fig07_dissimilarity_distance.png", plot);
-    result.pictures.push_back(
-        {"fig07_dissimilarity_distance.png",
-         "Dissimilarity from one view, as the robot drives away from it (thin), and the mean over "
-         "all pairs of views of all scenes with its 95 % interval: steep and straight at first, "
-         "then bent, then level."});
-    add_row("noise",
-            "figure 7: dissimilarity of two pictures of one place, as a share of far views", "",
-            noise_, result);
-    add_row("linear_range",
+    add_plot(result, folder, "fig07_dissimilarity_distance.png",
+             "Dissimilarity from one view, as the robot drives away from it (thin), and the mean "
+             "over all pairs of views of all scenes with its 95 % interval: steep and straight at "
+             "first, then bent, then level.",
+             plot);
+    add_row(result, "m04.fig7.noise",
+            "figure 7: dissimilarity of two pictures of one place, as a share of far views",
+            mean_figure(noise_), "");
+    add_row(result, "m04.fig7.linear_range",
             "figure 7: linear range: largest distance up to which the curve stays within 2 % of "
             "the level of far views of one straight line (mean over scenes)",
-            "m", linear_m_, result);
-    add_row("half", "figure 7: distance at half the level of far views (mean over scenes)", "m",
-            half_m_, result);
-    add_row("saturation", "figure 7: distance at 95 % of the level of far views (mean over scenes)",
-            "m", saturation_m_, result);
-    add_row("at_25_cm", "figure 7: dissimilarity 25 cm away, as a share of far views", "", at_grid_,
-            result);
-    add_row("rise_after_saturation",
-            "figure 7: level at 3 .. 4 m over that at 2 .. 3 m (1: fully saturated)", "", rise_,
-            result);
+            mean_figure(linear_m_), "m");
+    add_row(result, "m04.fig7.half",
+            "figure 7: distance at half the level of far views (mean over scenes)",
+            mean_figure(half_m_), "m");
+    add_row(result, "m04.fig7.saturation",
+            "figure 7: distance at 95 % of the level of far views (mean over scenes)",
+            mean_figure(saturation_m_), "m");
+    add_row(result, "m04.fig7.at_25_cm",
+            "figure 7: dissimilarity 25 cm away, as a share of far views", mean_figure(at_grid_),
+            "");
+    add_row(result, "m04.fig7.rise_after_saturation",
+            "figure 7: level at 3 .. 4 m over that at 2 .. 3 m (1: fully saturated)",
+            mean_figure(rise_), "");
   }
 
  private:
@@ -207,17 +208,6 @@ class DistanceCurve final : public Experiment {
   static constexpr std::size_t kAgain = 10;  // one view in so many is taken twice
   static constexpr std::size_t kShown = 5;
   static constexpr double kTolerance = 0.02;
-
-  static void add_row(const std::string& id, std::string what, std::string unit,
-                      const std::vector<double>& values, Reproduction& result) {
-    result.rows.push_back({.id = "m04.fig7." + id,
-                           .what = std::move(what),
-                           .published = std::nullopt,
-                           .ours = mean(values),
-                           .interval = mean_interval(values, 1),
-                           .unit = std::move(unit),
-                           .target = std::nullopt});
-  }
 
   std::vector<Curve> curves_;
   std::vector<Series> single_;
@@ -250,18 +240,14 @@ class SimilaritySurface final : public Experiment {
 
   void report(const std::filesystem::path& folder, Reproduction& result) const override {
     require(map_.has_value(), "queries", 0.0, ">= 1");
-    write_plot(folder / "fig08_similarity_surface.png", *map_);
-    result.pictures.push_back({"fig08_similarity_surface.png",
-                               "Similarity is highest around the place where the view was taken "
-                               "and falls on all sides."});
-    result.rows.push_back({.id = "m04.fig8.monotony",
-                           .what = "figure 8: rank correlation of similarity with nearness over "
-                                   "all references (1: it falls on all sides; median)",
-                           .published = std::nullopt,
-                           .ours = median(correlations_),
-                           .interval = median_interval(correlations_, 1),
-                           .unit = "",
-                           .target = std::nullopt});
+    add_plot(
+        result, folder, "fig08_similarity_surface.png",
+        "Similarity is highest around the place where the view was taken and falls on all sides.",
+        *map_);
+    add_row(result, "m04.fig8.monotony",
+            "figure 8: rank correlation of similarity with nearness over all references (1: it "
+            "falls on all sides; median)",
+            median_figure(correlations_), "");
   }
 
  private:
@@ -274,10 +260,10 @@ class SimilaritySurface final : public Experiment {
       low = {std::min(low.x_m, p.x_m), std::min(low.y_m, p.y_m)};
       high = {std::max(high.x_m, p.x_m), std::max(high.y_m, p.y_m)};
     }
-    HeatMap map{.title =
-                    "Similarity at every reference view; cross: where the view was taken "
-                    "([M04] figure 8)",
-                .value_label = "similarity (0 .. 1000)"};
+    HeatMap map{
+        .title =
+            "Similarity at every reference view; cross: where the view was taken ([M04] figure 8)",
+        .value_label = "similarity (0 .. 1000)"};
     map.spacing_m = place.spacing_m;
     map.first_cell = low;
     map.columns = static_cast<int>(std::lround((high.x_m - low.x_m) / map.spacing_m)) + 1;

@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "experiments/reproduction.hpp"
+#include "experiments/rows.hpp"
 #include "experiments/runs/place_recording.hpp"
 #include "panonav/core/executor.hpp"
 

@@ -88,69 +88,44 @@ class HierarchicalAreas final : public Experiment {
 
   void report(const std::filesystem::path& folder, Reproduction& result) const override {
     require(trials_ >= 1, "queries", 0.0, ">= 1");
-    write_plot(folder / "fig09_hierarchical_areas.png", shown_, 2);
-    result.pictures.push_back({"fig09_hierarchical_areas.png",
-                               "With more components the area where the robot may be shrinks "
-                               "around it ([M04] figure 9)."});
+    add_plot(
+        result, folder, "fig09_hierarchical_areas.png",
+        "With more components the area where the robot may be shrinks around it ([M04] figure 9).",
+        shown_, 2);
     LinePlot curve{.title = "Area where the robot may be, by number of components",
                    .x_label = "number of components compared",
                    .y_label = "area [m^2]",
                    .series = {Series{.label = "median of all queries"}}};
     for (std::size_t m = 0; m < kLevels; ++m) {
-      const auto interval = median_interval(areas_m2_[m], 1);
-      curve.series[0].add(static_cast<double>(m + 1), median(areas_m2_[m]), interval.first,
-                          interval.second);
+      add_point(curve.series[0], static_cast<double>(m + 1), median_figure(areas_m2_[m]));
     }
-    write_plot(folder / "fig09_area_curve.png", curve);
-    result.pictures.push_back(
-        {"fig09_area_curve.png", "The median area over all queries and scenes."});
+    add_plot(result, folder, "fig09_area_curve.png", "The median area over all queries and scenes.",
+             curve);
     for (const std::size_t m : {std::size_t{1}, std::size_t{3}, kLevels}) {
       const std::string text = std::to_string(m);
-      add_median("area_" + text,
-                 "figure 9: area where the robot may be after " + text +
-                     (m == 1 ? " component (median)" : " components (median)"),
-                 "m^2", areas_m2_[m - 1], result);
+      add_row(result, "m04.fig9.area_" + text,
+              "figure 9: area where the robot may be after " + text +
+                  (m == 1 ? " component (median)" : " components (median)"),
+              median_figure(areas_m2_[m - 1]), "m^2");
       const Proportion holds = success_rate(holding_[m - 1], trials_);
-      result.rows.push_back(
-          {.id = "m04.fig9.holds_truth_" + text,
-           .what = "figure 9: the area holds the cell of the nearest reference, " + text +
-                   (m == 1 ? " component" : " components"),
-           .published = std::nullopt,
-           .ours = holds.value,
-           .interval = interval_of(holds),
-           .unit = "",
-           .target = std::nullopt});
+      add_row(result, "m04.fig9.holds_truth_" + text,
+              "figure 9: the area holds the cell of the nearest reference, " + text +
+                  (m == 1 ? " component" : " components"),
+              holds, "");
     }
     const Proportion nested = success_rate(nested_, trials_);
-    result.rows.push_back({.id = "m04.fig9.nested",
-                           .what = "figure 9: queries whose areas only ever shrink, each within "
-                                   "the one before",
-                           .published = std::pair{1.0, 1.0},
-                           .ours = nested.value,
-                           .interval = interval_of(nested),
-                           .unit = "",
-                           .target = Target{Comparison::at_least, 1.0}});
-    add_median("components_for_50_cm",
-               "figure 9: components compared until the place is known to 0.5 m (median)", "",
-               components_needed_, result);
-    add_median("bytes_for_50_cm",
-               "figure 9: bytes read until then, as a share of all magnitudes of the memory "
-               "(median)",
-               "", bytes_shares_, result);
+    add_row(result, "m04.fig9.nested",
+            "figure 9: queries whose areas only ever shrink, each within the one before", nested,
+            "", at_least(1.0), std::pair{1.0, 1.0});
+    add_row(result, "m04.fig9.components_for_50_cm",
+            "figure 9: components compared until the place is known to 0.5 m (median)",
+            median_figure(components_needed_), "");
+    add_row(result, "m04.fig9.bytes_for_50_cm",
+            "figure 9: bytes read until then, as a share of all magnitudes of the memory (median)",
+            median_figure(bytes_shares_), "");
   }
 
  private:
-  static void add_median(const std::string& id, std::string what, std::string unit,
-                         const std::vector<double>& values, Reproduction& result) {
-    result.rows.push_back({.id = "m04.fig9." + id,
-                           .what = std::move(what),
-                           .published = std::nullopt,
-                           .ours = median(values),
-                           .interval = median_interval(values, 1),
-                           .unit = std::move(unit),
-                           .target = std::nullopt});
-  }
-
   std::size_t trials_ = 0;
   std::size_t nested_ = 0;
   std::array<std::vector<double>, kLevels> areas_m2_;

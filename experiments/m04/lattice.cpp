@@ -43,30 +43,19 @@ struct Arrangements {
   }
 };
 
-void add_row(std::string id, std::string what, std::string unit, const std::vector<double>& values,
-             std::optional<Target> target, Reproduction& result) {
-  result.rows.push_back({.id = std::move(id),
-                         .what = std::move(what),
-                         .published = std::nullopt,
-                         .ours = median(values),
-                         .interval = median_interval(values, 1),
-                         .unit = std::move(unit),
-                         .target = target});
-}
-
 void add_rows(const std::string& id, const std::string& what, const Arrangements& measured,
               bool judged, Reproduction& result) {
-  const auto target = [&](Comparison comparison, double value) {
-    return judged ? std::optional(Target{comparison, value}) : std::nullopt;
+  const auto judge = [&](const Target& target) {
+    return judged ? std::optional(target) : std::nullopt;
   };
-  add_row(id + ".shape", what + ": shape difference mu (median over scenes)", "", measured.shape,
-          target(Comparison::at_most, 0.02), result);
-  add_row(id + ".four_of_eight",
-          what + ": inner views with their four grid neighbours among their eight nearest", "",
-          measured.four_of_eight, target(Comparison::at_least, 1.0), result);
-  add_row(id + ".border_pull",
+  add_row(result, id + ".shape", what + ": shape difference mu (median over scenes)",
+          median_figure(measured.shape), "", judge(at_most(0.02)));
+  add_row(result, id + ".four_of_eight",
+          what + ": inner views with their four grid neighbours among their eight nearest",
+          median_figure(measured.four_of_eight), "", judge(at_least(1.0)));
+  add_row(result, id + ".border_pull",
           what + ": how far views on the border lie inwards, laid over the true ones in equal size",
-          "spacings", measured.border_pull, std::nullopt, result);
+          median_figure(measured.border_pull), "spacings");
 }
 
 MapPlot map_of(const std::string& title, const ViewGrid& grid, std::span<const Point2> positions) {
@@ -103,27 +92,22 @@ class LatticeExperiment {
              false, result);
     add_rows("m04.fig15.small_room", "10 x 8 views at 30 cm in a room of 4 x 3.5 m, phases",
              small_room_, false, result);
-    result.rows.push_back(
-        {.id = "m04.fig15.turn_error",
-         .what = "section 3.4: error of the turn between neighbours 30 cm apart (median over "
-                 "scenes of the median; published: about 10 %)",
-         .published = std::pair{18.0, 36.0},
-         .ours = median(turn_error_deg_),
-         .interval = median_interval(turn_error_deg_, 1),
-         .unit = "deg",
-         .target = Target{Comparison::at_most, 2.0}});
+    add_row(result, "m04.fig15.turn_error",
+            "section 3.4: error of the turn between neighbours 30 cm apart (median over scenes of "
+            "the median; published: about 10 %)",
+            median_figure(turn_error_deg_), "deg", at_most(2.0), std::pair{18.0, 36.0});
     for (std::size_t i = 0; i < error_.size(); ++i) {
       add_row(
-          "m04.fig12.error_" + std::to_string(i),
+          result, "m04.fig12.error_" + std::to_string(i),
           "figure 12: error of a distance read as " + to_text(kErrorsAt[i]) + " spacings of 30 cm",
-          "spacings", error_[i], std::nullopt, result);
+          median_figure(error_[i]), "spacings");
     }
-    add_row("m04.fig12.range", "figure 12: largest distance at which views correlate (x_1)",
-            "spacings", range_, std::nullopt, result);
-    add_rows("m04.fig17",
-             "figure 17: 540 x 540 cm zigzag at 60 cm in the periodic hall, coarse motion and "
-             "phases",
-             coarse_, true, result);
+    add_row(result, "m04.fig12.range", "figure 12: largest distance at which views correlate (x_1)",
+            median_figure(range_), "spacings");
+    add_rows(
+        "m04.fig17",
+        "figure 17: 540 x 540 cm zigzag at 60 cm in the periodic hall, coarse motion and phases",
+        coarse_, true, result);
     add_rows("m04.fig17.without_phases", "figure 17: the same without phases",
              coarse_without_phases_, false, result);
     add_rows("m04.fig17.plain", "figure 17: the same by dissimilarity alone: it folds", folded_,
@@ -134,8 +118,8 @@ class LatticeExperiment {
       add_rows("m04.fig17.fine.without_phases", "figure 17 at 30 cm, without phases",
                fine_without_phases_, false, result);
     }
-    add_row("m04.lattice.time", "section 3: time to arrange 80 views, phases", "ms", time_ms_,
-            std::nullopt, result);
+    add_row(result, "m04.lattice.time", "section 3: time to arrange 80 views, phases",
+            median_figure(time_ms_), "ms");
     result.pictures.insert(result.pictures.end(), pictures_.begin(), pictures_.end());
   }
 

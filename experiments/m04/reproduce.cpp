@@ -3,6 +3,7 @@
 
 #include "experiments/m04/experiment.hpp"
 #include "experiments/navigation/experiments.hpp"
+#include "experiments/reproduction_stages.hpp"
 #include "panonav/core/error.hpp"
 
 namespace panonav {
@@ -37,9 +38,7 @@ Reproduction reproduce_m04(const ReproductionOptions& options, Executor& executo
   require(options.mission_scenes >= 1, "mission_scenes", options.mission_scenes, ">= 1");
   require(options.missions >= options.mission_scenes, "missions", options.missions,
           ">= mission_scenes");
-  std::error_code error;
-  std::filesystem::create_directories(options.out, error);
-  if (error) throw FileError(options.out.string(), "cannot be made: " + error.message());
+  make_folder(options.out);
 
   std::vector<std::unique_ptr<Experiment>> experiments;
   experiments.push_back(rotational_invariance_experiment());

@@ -12,6 +12,7 @@
 #include "experiments/baselines/rivals.hpp"
 #include "experiments/m04/experiment.hpp"
 #include "experiments/m04/support.hpp"
+#include "experiments/runs/make_each.hpp"
 #include "panonav/core/error.hpp"
 #include "reporting/plot.hpp"
 
@@ -77,13 +78,10 @@ class Rivals final : public Experiment {
       if (condition == 0) trials_ += queries.size();
       for (std::size_t r = 0; r < kRivals; ++r) {
         std::vector<std::size_t> found(queries.size());
-        std::vector<double> seconds(queries.size());
-        executor.for_chunks(found.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
-          for (std::size_t q = begin; q < end; ++q) {
-            const double start = thread_seconds();
-            found[q] = recognisers[r]->nearest(queries[q]);
-            seconds[q] = thread_seconds() - start;
-          }
+        auto seconds = make_each(executor, queries.size(), [&](std::size_t q) {
+          const double start = thread_seconds();
+          found[q] = recognisers[r]->nearest(queries[q]);
+          return thread_seconds() - start;
         });
         for (std::size_t q = 0; q < found.size(); ++q) {
           const Point2 position = views[q].pose.position();
@@ -112,34 +110,28 @@ class Rivals final : public Experiment {
       for (std::size_t r = 0; r < kRivals; ++r) {
         const Proportion exact = success_rate(found_[condition][r], trials_);
         const Proportion near = success_rate(near_[condition][r], trials_);
-        marks.add(static_cast<double>(r) + 0.12 * (static_cast<double>(condition) - 1.5),
-                  exact.value, exact.low, exact.high);
+        add_point(marks, static_cast<double>(r) + 0.12 * (static_cast<double>(condition) - 1.5),
+                  exact);
         const std::string& name = conditions[condition].name;
-        add_row(r, conditions[condition].id + ".found", "nearest reference found, " + name,
-                exact.value, "", interval_of(exact), result);
-        add_row(r, conditions[condition].id + ".near",
-                "a reference within one spacing found, " + name, near.value, "", interval_of(near),
-                result);
+        add_rival_row(r, conditions[condition].id + ".found", "nearest reference found, " + name,
+                      exact, "", result);
+        add_rival_row(r, conditions[condition].id + ".near",
+                      "a reference within one spacing found, " + name, near, "", result);
       }
       plot.series.push_back(std::move(marks));
     }
     for (std::size_t r = 0; r < kRivals; ++r) {
-      add_row(r, "bytes", "bytes a view", bytes_[r], "B", std::nullopt, result);
-      add_row(r, "time", "processor time a query, image to answer (median)",
-              median(milliseconds_[r]), "ms", std::nullopt, result);
+      add_rival_row(r, "bytes", "bytes a view", bytes_[r], "B", result);
+      add_rival_row(r, "time", "processor time a query, image to answer (median)",
+                    median(milliseconds_[r]), "ms", result);
     }
-    result.rows.push_back({.id = "m04.rivals.colourfulness",
-                           .what = "rivals: difference between the colour channels of a pixel "
-                                   "(mean; 0: grey, 1: pure colours)",
-                           .published = std::nullopt,
-                           .ours = mean(colourfulness_),
-                           .interval = mean_interval(colourfulness_, 1),
-                           .unit = "",
-                           .target = std::nullopt});
-    write_plot(folder / "rivals.png", plot);
-    result.pictures.push_back(
-        {"rivals.png",
-         "The Fourier signature beside what the paper argues against, on the same views."});
+    add_row(result, "m04.rivals.colourfulness",
+            "rivals: difference between the colour channels of a pixel (mean; 0: grey, 1: pure "
+            "colours)",
+            mean_figure(colourfulness_), "");
+    add_plot(result, folder, "rivals.png",
+             "The Fourier signature beside what the paper argues against, on the same views.",
+             plot);
   }
 
  private:
@@ -153,35 +145,22 @@ class Rivals final : public Experiment {
     const Camera camera{.model = EquirectangularModel{place.rendering.elevations.bottom_rad,
                                                       place.rendering.elevations.top_rad},
                         .image_size = {place.rendering.columns, place.rendering.rows}};
-    std::vector<std::optional<RivalView>> slots(views.size());
-    executor.for_chunks(views.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
+    return make_each(executor, views.size(), [&](std::size_t i) {
       Executor here(1);
-      for (std::size_t i = begin; i < end; ++i) {
-        const Radiance light =
-            in_colour.render_image({.pose = views[i].pose, .height_m = place.scene.camera_height_m},
-                                   camera, place.rendering.rays_per_axis, here);
-        slots[i] = RivalView{views[i].panorama,
-                             apply_sensor(light, camera, sensor, place.seed * 100003U + noise + i)};
-      }
+      const Radiance light =
+          in_colour.render_image({.pose = views[i].pose, .height_m = place.scene.camera_height_m},
+                                 camera, place.rendering.rays_per_axis, here);
+      return RivalView{views[i].panorama,
+                       apply_sensor(light, camera, sensor, place.seed * 100003U + noise + i)};
     });
-    std::vector<RivalView> result;
-    result.reserve(slots.size());
-    for (auto& slot : slots) result.push_back(std::move(*slot));
-    return result;
   }
 
-  void add_row(std::size_t rival, const std::string& key, const std::string& what, double value,
-               std::string unit, std::optional<std::pair<double, double>> interval,
-               Reproduction& result) const {
+  void add_rival_row(std::size_t rival, const std::string& key, const std::string& what,
+                     const Figure& ours, const std::string& unit, Reproduction& result) const {
     std::string id = names_[rival];
     std::ranges::replace(id, ' ', '_');
-    result.rows.push_back({.id = "m04.rivals." + id + "." + key,
-                           .what = "rivals: " + names_[rival] + ", " + what,
-                           .published = std::nullopt,
-                           .ours = value,
-                           .interval = interval,
-                           .unit = std::move(unit),
-                           .target = std::nullopt});
+    add_row(result, "m04.rivals." + id + "." + key, "rivals: " + names_[rival] + ", " + what, ours,
+            unit);
   }
 
   std::size_t trials_ = 0;

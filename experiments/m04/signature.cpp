@@ -91,31 +91,17 @@ class RotationalInvariance final : public Experiment {
   }
 
   void report(const std::filesystem::path&, Reproduction& result) const override {
-    result.rows.push_back(
-        {.id = "m04.fig4.turn_against_step",
-         .what = "figure 4: dissimilarity after a turn on the spot, as a share of that to the next "
-                 "reference 25 cm away (median)",
-         .published = std::nullopt,
-         .ours = median(ratios_),
-         .interval = median_interval(ratios_, 1),
-         .unit = "",
-         .target = Target{Comparison::at_most, 0.5}});
-    result.rows.push_back({.id = "m04.fig4.heading_error",
-                           .what = "figure 4: error of the turn read from the phases (median)",
-                           .published = std::nullopt,
-                           .ours = median(heading_errors_deg_),
-                           .interval = median_interval(heading_errors_deg_, 1),
-                           .unit = "deg",
-                           .target = Target{Comparison::at_most, 1.0}});
-    result.rows.push_back(
-        {.id = "m04.heading_error_apart",
-         .what = "section 3.4: error of the heading between views 25 cm apart, as a share of the "
-                 "difference in heading (median)",
-         .published = std::pair{0.1, 0.1},
-         .ours = median(relative_errors_),
-         .interval = median_interval(relative_errors_, 1),
-         .unit = "",
-         .target = Target{Comparison::at_most, 0.1}});
+    add_row(result, "m04.fig4.turn_against_step",
+            "figure 4: dissimilarity after a turn on the spot, as a share of that to the next "
+            "reference 25 cm away (median)",
+            median_figure(ratios_), "", at_most(0.5));
+    add_row(result, "m04.fig4.heading_error",
+            "figure 4: error of the turn read from the phases (median)",
+            median_figure(heading_errors_deg_), "deg", at_most(1.0));
+    add_row(result, "m04.heading_error_apart",
+            "section 3.4: error of the heading between views 25 cm apart, as a share of the "
+            "difference in heading (median)",
+            median_figure(relative_errors_), "", at_most(0.1), std::pair{0.1, 0.1});
   }
 
  private:
@@ -160,26 +146,14 @@ class PowerSpectrum final : public Experiment {
       average.add(k, total_[static_cast<std::size_t>(k)] / static_cast<double>(shares_.size()));
     }
     plot.series = {single, average};
-    write_plot(folder / "fig05_power_spectrum.png", plot);
-    result.pictures.push_back(
-        {"fig05_power_spectrum.png",
-         "Power falls steeply with frequency: the first 15 components hold most of it."});
-    result.rows.push_back(
-        {.id = "m04.fig5.share_15",
-         .what = "figure 5: share of the power (without k = 0) in the first 15 components (median)",
-         .published = std::nullopt,
-         .ours = median(shares_),
-         .interval = median_interval(shares_, 1),
-         .unit = "",
-         .target = Target{Comparison::at_least, 0.5}});
-    result.rows.push_back(
-        {.id = "m04.fig5.slope",
-         .what = "slope of the power spectrum, k = 1 .. 30 ([S06] reports about 1.8)",
-         .published = std::pair{1.8, 1.8},
-         .ours = -spectrum_slope(total_, kShown),
-         .interval = std::nullopt,
-         .unit = "",
-         .target = std::nullopt});
+    add_plot(result, folder, "fig05_power_spectrum.png",
+             "Power falls steeply with frequency: the first 15 components hold most of it.", plot);
+    add_row(result, "m04.fig5.share_15",
+            "figure 5: share of the power (without k = 0) in the first 15 components (median)",
+            median_figure(shares_), "", at_least(0.5));
+    add_row(result, "m04.fig5.slope",
+            "slope of the power spectrum, k = 1 .. 30 ([S06] reports about 1.8)",
+            -spectrum_slope(total_, kShown), "", std::nullopt, std::pair{1.8, 1.8});
   }
 
  private:
@@ -197,13 +171,8 @@ void reproduce_memory_table(Reproduction& result) {
   const Panorama cylinder(80, 512, std::nullopt);
   const PackedSignature packed = pack(compute_signature(cylinder, 15), 1.0F);
   const auto row = [&](std::string id, std::string what, double published, double bits) {
-    result.rows.push_back({.id = "m04." + id,
-                           .what = std::move(what),
-                           .published = std::pair{published, published},
-                           .ours = bits / 1000.0,
-                           .interval = std::nullopt,
-                           .unit = "kbit",
-                           .target = Target{Comparison::at_most, published * 1.015}});
+    add_row(result, "m04." + id, what, bits / 1000.0, "kbit",
+            Target{Comparison::at_most, published * 1.015}, std::pair{published, published});
   };
   row("table1.raw", "[M03] table 1: raw colour image, 640 x 480", 7300.0,
       8.0 * static_cast<double>(raw.pixels().size()));

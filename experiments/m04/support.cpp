@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "experiments/runs/make_each.hpp"
 #include "panonav/core/error.hpp"
 
 namespace panonav {
@@ -24,16 +25,8 @@ std::vector<PlacedView> queries_under(const PlaceRecording& place, const ViewCon
 
 std::vector<FourierSignature> signatures_of(const std::vector<PlacedView>& views, int components,
                                             Executor& executor) {
-  std::vector<std::optional<FourierSignature>> slots(views.size());
-  executor.for_chunks(views.size(), 4, [&](std::size_t begin, std::size_t end, std::size_t) {
-    for (std::size_t i = begin; i < end; ++i) {
-      slots[i] = compute_signature(views[i].panorama, components);
-    }
-  });
-  std::vector<FourierSignature> result;
-  result.reserve(slots.size());
-  for (auto& slot : slots) result.push_back(std::move(*slot));
-  return result;
+  return make_each(executor, views.size(),
+                   [&](std::size_t i) { return compute_signature(views[i].panorama, components); });
 }
 
 std::vector<double> dissimilarity_by_component(const FourierSignature& a,
@@ -54,10 +47,6 @@ std::vector<double> dissimilarity_by_component(const FourierSignature& a,
 
 std::size_t index_of_smallest(std::span<const double> values) {
   return static_cast<std::size_t>(std::ranges::min_element(values) - values.begin());
-}
-
-std::pair<double, double> interval_of(const Proportion& proportion) {
-  return {proportion.low, proportion.high};
 }
 
 VisualMemory memory_of(const std::vector<PlacedView>& views,

@@ -43,8 +43,6 @@ struct ViewCondition {
 /// Index of the smallest value, the first of equals.
 [[nodiscard]] std::size_t index_of_smallest(std::span<const double> values);
 
-[[nodiscard]] std::pair<double, double> interval_of(const Proportion& proportion);
-
 /// A memory of posed views, in their order, packed so that the largest magnitude just fits.
 [[nodiscard]] VisualMemory memory_of(const std::vector<PlacedView>& views,
                                      const std::vector<FourierSignature>& signatures);

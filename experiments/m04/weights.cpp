@@ -38,55 +38,39 @@ class WeightsOfComponents final : public Experiment {
             static_cast<double>(margins_[equal].size()), ">= 2");
     Series line{.label = "mean of " + std::to_string(margins_[equal].size()) + " scenes"};
     for (std::size_t k = 0; k < weights_.size(); ++k) {
-      const auto interval = mean_interval(weights_[k], 1);
-      line.add(static_cast<double>(k), mean(weights_[k]), interval.first, interval.second);
+      add_point(line, static_cast<double>(k), mean_figure(weights_[k]));
     }
     const Series ones{.label = "equal weights",
                       .x = {0.0, static_cast<double>(weights_.size() - 1)},
                       .y = {1.0, 1.0},
                       .style = SeriesStyle::lines};
-    write_plot(folder / "eq06_weights.png",
-               {.title = "Weights of the components, learnt from memories with poses ([M04] eq. 6)",
-                .x_label = "component k [cycles per turn]",
-                .y_label = "weight (mean 1)",
-                .series = {line, ones}});
-    result.pictures.push_back(
-        {"eq06_weights.png", "How much each component should count, learnt in each scene."});
+    add_plot(
+        result, folder, "eq06_weights.png",
+        "How much each component should count, learnt in each scene.",
+        LinePlot{
+            .title = "Weights of the components, learnt from memories with poses ([M04] eq. 6)",
+            .x_label = "component k [cycles per turn]",
+            .y_label = "weight (mean 1)",
+            .series = {line, ones}});
     for (std::size_t condition = 0; condition < kConditions; ++condition) {
       const ViewCondition& under = view_conditions()[condition];
       for (const std::size_t w : {equal, learnt}) {
         const Proportion found = success_rate(found_[condition][w], trials_);
         const std::string name = w == equal ? "equal weights" : "weights learnt in another scene";
-        result.rows.push_back(
-            {.id = "m04.eq6." + under.id + "." + (w == equal ? "equal" : "learnt"),
-             .what = "eq. 6: nearest reference found with " + name + ", " + under.name,
-             .published = std::nullopt,
-             .ours = found.value,
-             .interval = interval_of(found),
-             .unit = "",
-             .target = std::nullopt});
+        add_row(result, "m04.eq6." + under.id + "." + (w == equal ? "equal" : "learnt"),
+                "eq. 6: nearest reference found with " + name + ", " + under.name, found, "");
       }
-      result.rows.push_back({.id = "m04.eq6." + under.id + ".gain",
-                             .what = "eq. 6: share found with learnt weights less that with equal "
-                                     "ones (same queries), " +
-                                     under.name,
-                             .published = std::nullopt,
-                             .ours = mean(gain_[condition]),
-                             .interval = mean_interval(gain_[condition], 1),
-                             .unit = "",
-                             .target = std::nullopt});
+      add_row(result, "m04.eq6." + under.id + ".gain",
+              "eq. 6: share found with learnt weights less that with equal ones (same queries), " +
+                  under.name,
+              mean_figure(gain_[condition]), "");
     }
     for (const std::size_t w : {equal, learnt}) {
-      result.rows.push_back(
-          {.id = std::string("m04.eq6.margin.") + (w == equal ? "equal" : "learnt"),
-           .what = std::string("eq. 6: margin between near and far views over its deviation, left "
-                               "out of the learning, ") +
-                   (w == equal ? "equal weights" : "learnt weights") + " (mean over scenes)",
-           .published = std::nullopt,
-           .ours = mean(margins_[w]),
-           .interval = mean_interval(margins_[w], 1),
-           .unit = "",
-           .target = std::nullopt});
+      add_row(result, std::string("m04.eq6.margin.") + (w == equal ? "equal" : "learnt"),
+              std::string("eq. 6: margin between near and far views over its deviation, left out "
+                          "of the learning, ") +
+                  (w == equal ? "equal weights" : "learnt weights") + " (mean over scenes)",
+              mean_figure(margins_[w]), "");
     }
   }
 

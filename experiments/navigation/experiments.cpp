@@ -1,4 +1,5 @@
 #include "experiments/navigation/experiments.hpp"
+#include "experiments/runs/make_each.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,17 +12,15 @@
 #include <utility>
 #include <vector>
 
-#include "experiments/m03/support.hpp"
+#include "experiments/rows.hpp"
 #include "experiments/runs/mapping_run.hpp"
 #include "experiments/runs/mission.hpp"
 #include "experiments/runs/mission_picture.hpp"
-#include "experiments/s06/support.hpp"
+#include "experiments/runs/worlds.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
-#include "panonav/io/image_file.hpp"
 #include "panonav/motion/path.hpp"
 #include "panonav/route/route_place.hpp"
-#include "panonav/simulation/load_gazebo.hpp"
 #include "panonav/simulation/recording.hpp"
 #include "panonav/simulation/scenes.hpp"
 #include "panonav/simulation/screen.hpp"
@@ -124,9 +123,7 @@ Scene scene_of(const NavigationReproductionOptions& options, const std::string& 
                const SceneVariation& variation) {
   const auto names = scene_names();
   if (std::ranges::find(names, name) != names.end()) return make_scene(name, variation);
-  GazeboOptions reading;
-  reading.textures.read = [](const std::filesystem::path& path) { return read_image(path); };
-  Scene scene = load_gazebo(options.data / "scenes" / name / "worlds" / (name + ".world"), reading);
+  Scene scene = read_world(options.data, name);
   if (variation.light != 1.0) scale_light(scene, variation.light);
   return scene;
 }
@@ -289,17 +286,14 @@ void reproduce_tours(const NavigationReproductionOptions& options, Executor& exe
         place, remembered, {.count = tours * goals_a_tour, .beside_m = beside_drive_m},
         Random(seed, 12).next());
     for (Kind& kind : kinds) {
-      std::vector<std::vector<MissionRun>> runs(static_cast<std::size_t>(tours));
-      executor.for_chunks(runs.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
-        for (std::size_t t = begin; t < end; ++t) {
-          std::vector<ViewId> goals;
-          for (std::size_t k = 0; k < goals_a_tour; ++k) {
-            goals.push_back(missions[t * goals_a_tour + k].goal);
-          }
-          Navigator navigator(source, planner, kind.options.navigator);
-          runs[t] = run_tour(place, remembered, navigator, missions[t * goals_a_tour].start, goals,
-                             kind.options, Random(seed, 200 + t).next());
+      auto runs = make_each(executor, static_cast<std::size_t>(tours), [&](std::size_t t) {
+        std::vector<ViewId> goals;
+        for (std::size_t k = 0; k < goals_a_tour; ++k) {
+          goals.push_back(missions[t * goals_a_tour + k].goal);
         }
+        Navigator navigator(source, planner, kind.options.navigator);
+        return run_tour(place, remembered, navigator, missions[t * goals_a_tour].start, goals,
+                        kind.options, Random(seed, 200 + t).next());
       });
       for (const auto& tour : runs) kind.measures.add(tour, 0.5 * remembered.spacing_m);
     }
@@ -307,10 +301,10 @@ void reproduce_tours(const NavigationReproductionOptions& options, Executor& exe
   for (const Kind& kind : kinds) {
     report("navigation." + kind.id, "loop, tours of five goals, " + kind.what, kind.measures,
            std::nullopt, std::nullopt, result);
-    report_figure(result, "navigation." + kind.id + ".read",
-                  "loop, tours of five goals, " + kind.what +
-                      ": read of signatures and index by a look, mean",
-                  1e-3 * kind.measures.bytes_a_look(), "kB");
+    add_row(result, "navigation." + kind.id + ".read",
+            "loop, tours of five goals, " + kind.what +
+                ": read of signatures and index by a look, mean",
+            1e-3 * kind.measures.bytes_a_look(), "kB");
   }
 }
 
@@ -421,8 +415,8 @@ void reproduce_blocked_missions(const NavigationReproductionOptions& options, Ex
            shut.ends[NavigationState::arrived], shut.runs);
   add_median(result, "navigation.shut.looks", what + " on both sides: looks until told", "",
              shut.looks);
-  report_figure(result, "navigation.shut.most_looks", what + " on both sides: looks, most",
-                *std::ranges::max_element(shut.looks), "");
+  add_row(result, "navigation.shut.most_looks", what + " on both sides: looks, most",
+          *std::ranges::max_element(shut.looks), "");
 }
 
 }  // namespace panonav

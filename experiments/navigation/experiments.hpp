@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "experiments/reproduction.hpp"
+#include "experiments/rows.hpp"
 #include "panonav/core/executor.hpp"
 
 namespace panonav {

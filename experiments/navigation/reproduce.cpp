@@ -1,11 +1,12 @@
-#include <filesystem>
+#include <algorithm>
+#include <iterator>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include "experiments/navigation/experiments.hpp"
 #include "experiments/reproduction.hpp"
 #include "experiments/reproduction_stages.hpp"
+#include "experiments/runs/worlds.hpp"
 #include "panonav/core/error.hpp"
 
 namespace panonav {
@@ -20,17 +21,11 @@ Reproduction reproduce_navigation(const NavigationReproductionOptions& options, 
                                   const ReproductionProgress& progress) {
   require(options.scenes >= 2, "scenes", options.scenes, ">= 2");
   require(options.runs >= options.scenes, "runs", options.runs, ">= scenes");
-  std::error_code error;
-  std::filesystem::create_directories(options.out, error);
-  if (error) throw FileError(options.out.string(), "cannot be made: " + error.message());
+  make_folder(options.out);
   Reproduction result;
   std::vector<ReproductionStage> stages;
   std::vector<std::string> drives{"loop", "corridor"};
-  for (const std::string world : {"small_warehouse", "small_house"}) {
-    if (!options.data.empty() && std::filesystem::is_directory(options.data / "scenes" / world)) {
-      drives.push_back(world);
-    }
-  }
+  std::ranges::copy(worlds_in(options.data), std::back_inserter(drives));
   for (const std::string& scene : drives) {
     stages.push_back({"missions in " + scene, 6.0,
                       [&, scene] { reproduce_drive_missions(options, scene, executor, result); }});

@@ -4,6 +4,7 @@
 #include <numbers>
 #include <utility>
 
+#include "experiments/runs/make_each.hpp"
 #include "experiments/runs/simulated_robot.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
@@ -111,15 +112,11 @@ std::vector<HomingTask> random_homing_tasks(const HomingPlace& place, int count,
 std::vector<HomingRun> run_home(const HomingPlace& place, const std::vector<HomingTask>& tasks,
                                 const HomingRunOptions& options, std::uint64_t seed,
                                 Executor& executor) {
-  std::vector<HomingRun> runs(tasks.size());
-  executor.for_chunks(tasks.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
-    for (std::size_t i = begin; i < end; ++i) {
-      std::uint64_t task_seed = Random(seed, i).next();
-      const HomingView home = take_homing_view(place, tasks[i].goal, task_seed);
-      runs[i] = run_home(place, home, tasks[i].goal, tasks[i].start, options, task_seed + 1);
-    }
+  return make_each(executor, tasks.size(), [&](std::size_t i) {
+    const std::uint64_t task_seed = Random(seed, i).next();
+    const HomingView home = take_homing_view(place, tasks[i].goal, task_seed);
+    return run_home(place, home, tasks[i].goal, tasks[i].start, options, task_seed + 1);
   });
-  return runs;
 }
 
 }  // namespace panonav

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "experiments/runs/make_each.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/mapping/map_measures.hpp"
@@ -75,14 +76,9 @@ MappingRecording record_for_mapping(const PlaceRecording& place, std::vector<Pos
                                     Executor& executor) {
   MappingRecording recording;
   recording.wheels = simulate_odometry(poses, wheels, seed);
-  std::vector<std::optional<FourierSignature>> views(poses.size());
-  executor.for_chunks(poses.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
-    for (std::size_t i = begin; i < end; ++i) {
-      views[i] =
-          compute_signature(preprocess(take_view(place, poses[i], seed + i), {}), components);
-    }
+  recording.views = make_each(executor, poses.size(), [&](std::size_t i) {
+    return compute_signature(preprocess(take_view(place, poses[i], seed + i), {}), components);
   });
-  for (auto& view : views) recording.views.push_back(std::move(*view));
   recording.truth = std::move(poses);
   return recording;
 }

@@ -1,4 +1,5 @@
 #include "experiments/runs/mission.hpp"
+#include "experiments/runs/make_each.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -30,15 +31,8 @@ constexpr double line_spacing_m = 0.1;
 
 std::vector<FourierSignature> see_all(const MissionPlace& place, const std::vector<Pose2>& poses,
                                       std::uint64_t seed, Executor& executor) {
-  std::vector<std::optional<FourierSignature>> seen(poses.size());
-  executor.for_chunks(poses.size(), 4, [&](std::size_t begin, std::size_t end, std::size_t) {
-    for (std::size_t i = begin; i < end; ++i) {
-      seen[i] = see(place, poses[i], Random(seed, i).next());
-    }
-  });
-  std::vector<FourierSignature> views;
-  for (auto& view : seen) views.push_back(std::move(*view));
-  return views;
+  return make_each(executor, poses.size(),
+                   [&](std::size_t i) { return see(place, poses[i], Random(seed, i).next()); });
 }
 
 // Without views; packs so that the largest magnitude of these just fits.
@@ -81,11 +75,8 @@ RoutePanorama record_route(const MissionPlace& place, const std::vector<Pose2>& 
                        interpolate(last.mapped, next.mapped, share)});
     }
   }
-  std::vector<std::vector<float>> lines(stops.size());
-  executor.for_chunks(lines.size(), 8, [&](std::size_t begin, std::size_t end, std::size_t) {
-    for (std::size_t i = begin; i < end; ++i) {
-      lines[i] = place.line(stops[i].truth, Random(seed, i).next());
-    }
+  auto lines = make_each(executor, stops.size(), [&](std::size_t i) {
+    return place.line(stops[i].truth, Random(seed, i).next());
   });
   RoutePanorama route(static_cast<int>(lines.front().size()));
   for (std::size_t i = 0; i < lines.size(); ++i) {
@@ -437,18 +428,13 @@ std::vector<MissionRun> run_missions(const MissionPlace& place, const Remembered
                                      const std::vector<Mission>& missions,
                                      const MissionOptions& options, std::uint64_t seed,
                                      Executor& executor) {
-  std::vector<MissionRun> runs(missions.size());
   const AreaPlanner planner(remembered.graph, options.planner);
   const MemoryViewSource source(remembered.memory);
-  executor.for_chunks(missions.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
-    for (std::size_t i = begin; i < end; ++i) {
-      Navigator navigator(source, planner, options.navigator);
-      navigator.set_routes(remembered.routes);
-      runs[i] =
-          run_mission(place, remembered, navigator, missions[i], options, Random(seed, i).next());
-    }
+  return make_each(executor, missions.size(), [&](std::size_t i) {
+    Navigator navigator(source, planner, options.navigator);
+    navigator.set_routes(remembered.routes);
+    return run_mission(place, remembered, navigator, missions[i], options, Random(seed, i).next());
   });
-  return runs;
 }
 
 std::vector<Mission> random_missions(const MissionPlace& place, const RememberedPlace& remembered,

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 
+#include "experiments/runs/tracking_run.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/simulation/recording.hpp"
 
@@ -13,40 +14,24 @@ namespace panonav {
 
 namespace {
 
-constexpr int components = 15;           // [M04]
-constexpr std::size_t first_views = 32;  // of which a memory learns its full scale
+/// A recorded place in a memory, with what answers queries, as the command's defaults have it.
+/// Neither copied nor moved: the localiser looks at the memory.
+class AskedPlace {
+ public:
+  AskedPlace(const PlaceRecording& place, Executor& executor)
+      : memory_(memory_of_references(place, executor)), localiser_(memory_) {}
+  AskedPlace(const AskedPlace&) = delete;
+  AskedPlace& operator=(const AskedPlace&) = delete;
 
-FourierSignature signature_of(const Panorama& view) {
-  return compute_signature(preprocess(view, {}), components);
-}
-
-std::vector<FourierSignature> signatures_of_all(const std::vector<PlacedView>& views,
-                                                Executor& executor) {
-  std::vector<std::optional<FourierSignature>> slots(views.size());
-  executor.for_chunks(views.size(), 8, [&](std::size_t begin, std::size_t end, std::size_t) {
-    for (std::size_t i = begin; i < end; ++i) slots[i] = signature_of(views[i].panorama);
-  });
-  std::vector<FourierSignature> signatures;
-  for (auto& slot : slots) signatures.push_back(std::move(*slot));
-  return signatures;
-}
-
-VisualMemory remember(const PlaceRecording& place, Executor& executor) {
-  const auto signatures = signatures_of_all(place.references, executor);
-  float full_scale = 0.0F;
-  for (std::size_t i = 0; i < std::min(first_views, signatures.size()); ++i) {
-    const auto structure =
-        signatures[i].magnitudes().subspan(static_cast<std::size_t>(signatures[i].rows()));
-    full_scale = std::max(full_scale, *std::ranges::max_element(structure));
+  [[nodiscard]] const VisualMemory& memory() const noexcept { return memory_; }
+  [[nodiscard]] Localisation ask(const Panorama& view) const {
+    return localiser_.localise(signature_for(view, memory_));
   }
-  VisualMemory memory(signatures.at(0).shape(), full_scale, signatures[0].elevations());
-  for (std::size_t i = 0; i < signatures.size(); ++i) {
-    const Pose2& pose = place.references[i].pose;
-    memory.append(signatures[i],
-                  {std::to_string(i), ReferencePose{pose.x_m, pose.y_m, pose.heading_rad}, {}});
-  }
-  return memory;
-}
+
+ private:
+  VisualMemory memory_;
+  Localiser localiser_;
+};
 
 // Places in steps of the grid; rounding, as positions are not exact multiples.
 bool is_neighbour(Point2 a, Point2 b, double spacing_m) {
@@ -70,17 +55,10 @@ std::vector<PlaceCondition> place_conditions() {
   return conditions;
 }
 
-RememberedPlace::RememberedPlace(const PlaceRecording& place, Executor& executor)
-    : memory_(remember(place, executor)), localiser_(memory_) {}
-
-Localisation RememberedPlace::ask(const Panorama& view) const {
-  return localiser_.localise(pack(signature_of(view), memory_.full_scale()));
-}
-
 std::vector<PlaceResult> run_place_experiment(const PlaceRecording& place,
                                               const std::vector<PlaceCondition>& conditions,
                                               Executor& executor) {
-  const RememberedPlace remembered(place, executor);
+  const AskedPlace remembered(place, executor);
   std::vector<PlaceResult> results;
   std::uint64_t seed = place.seed * 1000003U;
   for (const PlaceCondition& condition : conditions) {
@@ -135,7 +113,7 @@ std::vector<RecognitionRate> recognition_rates(const std::vector<PlaceRecording>
   std::vector<RecognitionRate> own;
   std::vector<RecognitionRate> others;
   for (const PlaceRecording& place : places) {
-    const RememberedPlace remembered(place, executor);
+    const AskedPlace remembered(place, executor);
     for (const PlaceRecording& asked : places) {
       std::vector<std::uint8_t> known(asked.queries.size());
       executor.for_chunks(known.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {

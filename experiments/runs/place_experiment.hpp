@@ -22,23 +22,6 @@ struct PlaceCondition {
 /// tilt.
 [[nodiscard]] std::vector<PlaceCondition> place_conditions();
 
-/// A recorded place in a memory, with everything that answers queries, all as the command's
-/// defaults have it. Neither copied nor moved: the localiser looks at the memory.
-class RememberedPlace {
- public:
-  RememberedPlace(const PlaceRecording& place, Executor& executor);
-  RememberedPlace(const RememberedPlace&) = delete;
-  RememberedPlace& operator=(const RememberedPlace&) = delete;
-
-  [[nodiscard]] const VisualMemory& memory() const noexcept { return memory_; }
-  [[nodiscard]] const Localiser& localiser() const noexcept { return localiser_; }
-  [[nodiscard]] Localisation ask(const Panorama& view) const;
-
- private:
-  VisualMemory memory_;
-  Localiser localiser_;
-};
-
 /// How one condition went.
 struct PlaceResult {
   std::string condition;

@@ -3,6 +3,7 @@
 #include <optional>
 #include <utility>
 
+#include "experiments/runs/make_each.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/simulation/scenes.hpp"
@@ -36,17 +37,9 @@ Panorama take_view(const PlaceRecording& place, const Pose2& pose, std::uint64_t
 std::vector<PlacedView> take_views(const PlaceRecording& place, const PanoramaRendering& rendering,
                                    const std::vector<Pose2>& poses, std::uint64_t first_seed,
                                    const SensorOptions& sensor, Executor& executor) {
-  std::vector<std::optional<PlacedView>> slots(poses.size());
-  executor.for_chunks(poses.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
-    for (std::size_t i = begin; i < end; ++i) {
-      slots[i] =
-          PlacedView{poses[i], take_view(place, rendering, poses[i], first_seed + i, sensor)};
-    }
+  return make_each(executor, poses.size(), [&](std::size_t i) {
+    return PlacedView{poses[i], take_view(place, rendering, poses[i], first_seed + i, sensor)};
   });
-  std::vector<PlacedView> views;
-  views.reserve(slots.size());
-  for (auto& slot : slots) views.push_back(std::move(*slot));
-  return views;
 }
 
 std::vector<PlacedView> retake_queries(const PlaceRecording& place, const SensorOptions& sensor,

@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 
+#include "experiments/runs/make_each.hpp"
 #include "panonav/geometry/angles.hpp"
 
 namespace panonav {
@@ -85,11 +86,9 @@ TrackedRun track_run(const TrackingPlace& place, const TrackingRun& run,
 std::vector<TrackedRun> track_runs(const TrackingPlace& place, std::span<const TrackingRun> runs,
                                    const FilterSetting& setting, std::uint64_t first_seed,
                                    Executor& executor) {
-  std::vector<TrackedRun> tracked(runs.size());
-  executor.for_chunks(runs.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
-    tracked[i] = track_run(place, runs[i], setting, first_seed + i);
+  return make_each(executor, runs.size(), [&](std::size_t i) {
+    return track_run(place, runs[i], setting, first_seed + i);
   });
-  return tracked;
 }
 
 std::optional<int> images_until_localised(const TrackedRun& run, double radius_m,

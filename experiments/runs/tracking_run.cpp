@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "experiments/runs/make_each.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/motion/odometry.hpp"
@@ -45,31 +46,28 @@ std::vector<Point2> TrackingPlace::reference_positions() const {
   return positions;
 }
 
-std::shared_ptr<const TrackingPlace> remember_views(std::span<const ReferencePose> poses,
-                                                    std::span<const Panorama* const> views,
-                                                    double spacing_m, Executor& executor) {
+VisualMemory memory_of_views(std::span<const ReferencePose> poses,
+                             std::span<const Panorama* const> views, Executor& executor) {
   require(!views.empty() && views.size() == poses.size(), "reference views",
           static_cast<double>(views.size()), ">= 1, as many as poses");
-  std::vector<std::optional<FourierSignature>> signatures(views.size());
-  executor.for_chunks(views.size(), 8, [&](std::size_t begin, std::size_t end, std::size_t) {
-    for (std::size_t i = begin; i < end; ++i) signatures[i] = signature_of(*views[i]);
-  });
+  const auto signatures =
+      make_each(executor, views.size(), [&](std::size_t i) { return signature_of(*views[i]); });
   // As the command does: of the first views, without component 0, which says how bright they are.
   float full_scale = 0.0F;
   for (std::size_t i = 0; i < std::min(first_views, signatures.size()); ++i) {
-    const auto rows = static_cast<std::size_t>(signatures[i]->rows());
-    const auto structure = signatures[i]->magnitudes().subspan(rows);
+    const auto rows = static_cast<std::size_t>(signatures[i].rows());
+    const auto structure = signatures[i].magnitudes().subspan(rows);
     full_scale = std::max(full_scale, *std::ranges::max_element(structure));
   }
-  VisualMemory memory(signatures[0]->shape(), full_scale, signatures[0]->elevations());
+  VisualMemory memory(signatures[0].shape(), full_scale, signatures[0].elevations());
   for (std::size_t i = 0; i < signatures.size(); ++i) {
-    memory.append(*signatures[i], {std::to_string(i), poses[i], {}});
+    memory.append(signatures[i], {std::to_string(i), poses[i], {}});
   }
-  return std::make_shared<const TrackingPlace>(std::move(memory), spacing_m);
+  return memory;
 }
 
-std::shared_ptr<const TrackingPlace> remember_for_tracking(
-    const PlaceRecording& place, Executor& executor, const std::function<bool(Point2)>& kept) {
+VisualMemory memory_of_references(const PlaceRecording& place, Executor& executor,
+                                  const std::function<bool(Point2)>& kept) {
   std::vector<ReferencePose> poses;
   std::vector<const Panorama*> views;
   for (const PlacedView& view : place.references) {
@@ -77,7 +75,19 @@ std::shared_ptr<const TrackingPlace> remember_for_tracking(
     poses.push_back({view.pose.x_m, view.pose.y_m, view.pose.heading_rad});
     views.push_back(&view.panorama);
   }
-  return remember_views(poses, views, place.spacing_m, executor);
+  return memory_of_views(poses, views, executor);
+}
+
+std::shared_ptr<const TrackingPlace> remember_views(std::span<const ReferencePose> poses,
+                                                    std::span<const Panorama* const> views,
+                                                    double spacing_m, Executor& executor) {
+  return std::make_shared<const TrackingPlace>(memory_of_views(poses, views, executor), spacing_m);
+}
+
+std::shared_ptr<const TrackingPlace> remember_for_tracking(
+    const PlaceRecording& place, Executor& executor, const std::function<bool(Point2)>& kept) {
+  return std::make_shared<const TrackingPlace>(memory_of_references(place, executor, kept),
+                                               place.spacing_m);
 }
 
 PackedSignature signature_for(const Panorama& panorama, const VisualMemory& memory) {

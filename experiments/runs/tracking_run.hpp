@@ -48,14 +48,20 @@ class TrackingPlace {
   Localiser localiser_;
 };
 
-/// Views as a memory, as the command's defaults have it. `spacing_m` as TrackingPlace. Throws
-/// ContractError on numbers of poses and views that differ, or no view.
+/// Views as a memory, as the command's defaults have it. Throws ContractError on numbers of poses
+/// and views that differ, or no view.
+[[nodiscard]] VisualMemory memory_of_views(std::span<const ReferencePose> poses,
+                                           std::span<const Panorama* const> views,
+                                           Executor& executor);
+/// The same of the references of a recorded place; `kept` chooses which of them; empty: all.
+[[nodiscard]] VisualMemory memory_of_references(const PlaceRecording& place, Executor& executor,
+                                                const std::function<bool(Point2)>& kept = nullptr);
+
+/// The same with all that localises in them. `spacing_m` as TrackingPlace.
 [[nodiscard]] std::shared_ptr<const TrackingPlace> remember_views(
     std::span<const ReferencePose> poses, std::span<const Panorama* const> views, double spacing_m,
     Executor& executor);
 
-/// The same of the references of a recorded place.
-/// `kept` chooses which of them; empty: all.
 [[nodiscard]] std::shared_ptr<const TrackingPlace> remember_for_tracking(
     const PlaceRecording& place, Executor& executor,
     const std::function<bool(Point2)>& kept = nullptr);

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "experiments/m03/support.hpp"
+#include "experiments/rows.hpp"
 #include "experiments/s06/support.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
@@ -60,13 +60,8 @@ void compare_catchment_areas(std::span<const CatchmentAreas> arenas, std::uint64
                          std::optional<std::pair<double, double>> published = std::nullopt) {
       std::vector<double> values;
       for (const auto& areas : arenas) values.push_back(figure(areas));
-      result.rows.push_back({.id = "s06." + name + "_" + id,
-                             .what = what + within,
-                             .published = published,
-                             .ours = mean(values),
-                             .interval = mean_interval(values, seed),
-                             .unit = unit,
-                             .target = target});
+      add_row(result, "s06." + name + "_" + id, what + within, mean_figure(values, seed), unit,
+              target, published);
     };
     const auto ratio = [&](const std::string& name, const std::string& what,
                            const std::string& above, const std::string& below) {
@@ -116,14 +111,14 @@ void report_variant(const std::string& id, const std::string& what, const Catchm
   for (std::size_t i = 0; i < s06_accepted_m.size(); ++i) {
     const std::string within = ", runs that end within " + centimetres(s06_accepted_m[i]);
     const double own = areas.at(own_strategy().label)[i];
-    report_figure(result,
-                  "s06." + id + ".own_against_expected_images_" + centimetres_id(s06_accepted_m[i]),
-                  what + ": mean catchment area, our rule over expected images" + within,
-                  own / areas.at(expected_image_strategy().label)[i], "");
-    report_figure(result,
-                  "s06." + id + ".own_against_coarse_to_fine_" + centimetres_id(s06_accepted_m[i]),
-                  what + ": mean catchment area, our rule over " + coarse_to_fine + within,
-                  own / areas.at(coarse_to_fine)[i], "");
+    add_row(result,
+            "s06." + id + ".own_against_expected_images_" + centimetres_id(s06_accepted_m[i]),
+            what + ": mean catchment area, our rule over expected images" + within,
+            own / areas.at(expected_image_strategy().label)[i], "");
+    add_row(result,
+            "s06." + id + ".own_against_coarse_to_fine_" + centimetres_id(s06_accepted_m[i]),
+            what + ": mean catchment area, our rule over " + coarse_to_fine + within,
+            own / areas.at(coarse_to_fine)[i], "");
   }
 }
 
@@ -173,13 +168,13 @@ void reproduce_snapshot_bytes(ArenaSurveys& surveys, Reproduction& result) {
     }
     chosen = std::move(best);
   }
-  report_figure(result, "s06.bytes.three_anywhere",
-                "places from which one of three snapshots of K = 3 (72 bytes together) is reached, "
-                "over those of one image of 72 bytes by expected images; places chosen at random",
-                mean_three / mean_image, "");
-  report_figure(result, "s06.bytes.three_chosen",
-                "the same, both at the best places (three: one after the other)",
-                size(chosen) / best_image, "");
+  add_row(result, "s06.bytes.three_anywhere",
+          "places from which one of three snapshots of K = 3 (72 bytes together) is reached, over "
+          "those of one image of 72 bytes by expected images; places chosen at random",
+          mean_three / mean_image, "");
+  add_row(result, "s06.bytes.three_chosen",
+          "the same, both at the best places (three: one after the other)",
+          size(chosen) / best_image, "");
 }
 
 void measure_homing_times(const Arena& arena, Reproduction& result) {
@@ -229,12 +224,8 @@ void measure_homing_times(const Arena& arena, Reproduction& result) {
   const auto add = [&](const std::string& id, const std::string& what, double value,
                        const std::string& unit, std::optional<Target> target,
                        std::optional<std::pair<double, double>> by_authors) {
-    result.rows.push_back({.id = "s06.time." + id,
-                           .what = what,
-                           .published = by_authors,
-                           .ours = used ? value : std::numeric_limits<double>::quiet_NaN(),
-                           .unit = unit,
-                           .target = target});
+    add_row(result, "s06.time." + id, what, used ? value : std::numeric_limits<double>::quiet_NaN(),
+            unit, target, by_authors);
   };
   add("home_vector", "one home vector from coefficients, K = 5, no iteration (published: 700 MHz)",
       vector_us, "us", at_most(1.0), std::pair(1000.0, 1000.0));

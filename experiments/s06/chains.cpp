@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "experiments/m03/support.hpp"
+#include "experiments/rows.hpp"
 #include "experiments/runs/chain_run.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/simulation/scenes.hpp"

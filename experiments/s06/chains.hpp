@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string>
 
-#include "experiments/reproduction.hpp"
+#include "experiments/rows.hpp"
 #include "experiments/runs/homing_run.hpp"
 #include "panonav/core/executor.hpp"
 

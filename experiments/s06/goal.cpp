@@ -182,15 +182,13 @@ void reproduce_goal_figures(ArenaSurveys& surveys, const std::filesystem::path& 
 
   const auto at_five = of.differences(5);
   const auto ends_five = of.final_distances_of(published_strategy({5}));
-  write_plot(
-      folder / "figure_09_vectors.png",
+  add_plot(
+      result, folder, "figure_09_vectors.png",
+      "[S06] figure 9: home vectors to one goal (strokes from the dots), the darker the less alike "
+      "the views. Other valleys lead astray.",
       map_of("Home vectors, K = 5; orange: catchment area at 10 cm",
              of.shaded(at_five, difference_limits), of.vectors(published_homing(5, s06_iterations)),
              of.border(within(ends_five, reached_m)), of.goal_mark(), of.most_alike(at_five)));
-  result.pictures.push_back({"figure_09_vectors.png",
-                             "[S06] figure 9: home vectors to one goal (strokes from the dots), "
-                             "the darker the less alike "
-                             "the views. Other valleys lead astray."});
 
   std::vector<MapPlot> panels;
   LinePlot along_x{.title = "Image difference along x through the goal",
@@ -212,30 +210,31 @@ void reproduce_goal_figures(ArenaSurveys& surveys, const std::filesystem::path& 
     along_x.series.push_back(transect(arena, of.position(), differences, true, k));
     along_y.series.push_back(transect(arena, of.position(), differences, false, k));
   }
-  write_plot(folder / "figure_14_stages.png", panels, 2);
-  result.pictures.push_back(
-      {"figure_14_stages.png",
-       "[S06] figure 14: the same goal with K = 2, 4 and 10. Left: image difference and home "
-       "vectors; right: how far from the goal runs end that start there."});
+  add_plot(result, folder, "figure_14_stages.png",
+           "[S06] figure 14: the same goal with K = 2, 4 and 10. Left: image difference and home "
+           "vectors; right: how far from the goal runs end that start there.",
+           panels, 2);
 
   const auto staged = of.final_distances_of(published_strategy({2, 4, 10}));
   const auto own = of.final_distances_of(own_strategy());
   const auto images = of.final_distances_of(expected_image_strategy());
-  write_plot(folder / "figure_15_areas.png",
-             {map_of("K = 2, 4, 10", of.shaded(staged, distance_limits),
-                     of.border(within(staged, reached_m)), of.goal_mark()),
-              map_of("our rule", of.shaded(own, distance_limits), of.border(within(own, reached_m)),
-                     of.goal_mark()),
-              map_of("expected images", of.shaded(images, distance_limits),
-                     of.border(within(images, reached_m)), of.goal_mark())},
-             3);
-  result.pictures.push_back(
-      {"figure_15_areas.png",
-       "[S06] figure 15: where runs to this goal end, coarse to fine, by our rule and by expected "
-       "images. Yellow: at the goal; dark: beyond 40 cm; orange: the area within 10 cm."});
+  add_plot(
+      result, folder, "figure_15_areas.png",
+      "[S06] figure 15: where runs to this goal end, coarse to fine, by our rule and by expected "
+      "images. Yellow: at the goal; dark: beyond 40 cm; orange: the area within 10 cm.",
+      std::vector<MapPlot>{map_of("K = 2, 4, 10", of.shaded(staged, distance_limits),
+                                  of.border(within(staged, reached_m)), of.goal_mark()),
+                           map_of("our rule", of.shaded(own, distance_limits),
+                                  of.border(within(own, reached_m)), of.goal_mark()),
+                           map_of("expected images", of.shaded(images, distance_limits),
+                                  of.border(within(images, reached_m)), of.goal_mark())},
+      3);
 
-  write_plot(folder / "figure_16_transect_x.png", along_x);
-  write_plot(folder / "figure_16_transect_y.png", along_y);
+  add_plot(result, folder, "figure_16_transect_x.png",
+           "[S06] figure 16, left: the image difference along a line through the goal. More "
+           "frequencies, a narrower valley.",
+           along_x);
+  add_plot(result, folder, "figure_16_transect_y.png", "The same across.", along_y);
   const auto surface = of.differences(10);
   HeatMap map{.title = "Image difference to the goal (cross), K = 10",
               .value_label = "share of the energy of both views",
@@ -252,14 +251,8 @@ void reproduce_goal_figures(ArenaSurveys& surveys, const std::filesystem::path& 
     const auto row = static_cast<std::size_t>(std::lround(at.y_m / map.spacing_m));
     map.values.at(row * static_cast<std::size_t>(map.columns) + column) = surface[p];
   }
-  write_plot(folder / "figure_16_surface.png", map);
-  result.pictures.push_back(
-      {"figure_16_transect_x.png",
-       "[S06] figure 16, left: the image difference along a line through the goal. More "
-       "frequencies, a narrower valley."});
-  result.pictures.push_back({"figure_16_transect_y.png", "The same across."});
-  result.pictures.push_back(
-      {"figure_16_surface.png", "[S06] figure 16, right: the image difference over the arena."});
+  add_plot(result, folder, "figure_16_surface.png",
+           "[S06] figure 16, right: the image difference over the arena.", map);
 }
 
 }  // namespace panonav

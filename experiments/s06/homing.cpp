@@ -3,7 +3,7 @@
 #include <array>
 #include <cmath>
 
-#include "experiments/m03/support.hpp"
+#include "experiments/rows.hpp"
 #include "experiments/s06/support.hpp"
 #include "reporting/plot.hpp"
 
@@ -39,10 +39,10 @@ void draw_homeward(ArenaSurveys& surveys, const std::filesystem::path& folder, E
   by_highest.series.push_back(
       homeward_series("expected images", surveys.expected_images(), spacing_m));
   by_highest.series.push_back(homeward_series("our rule, K = 10", surveys.own(10), spacing_m));
-  write_plot(folder / "figure_10_homeward.png", by_highest);
-  result.pictures.push_back({"figure_10_homeward.png",
-                             "[S06] figure 10a: how far home vectors point home, by the distance: "
-                             "few frequencies from afar, many close by."});
+  add_plot(result, folder, "figure_10_homeward.png",
+           "[S06] figure 10a: how far home vectors point home, by the distance: few frequencies "
+           "from afar, many close by.",
+           by_highest);
 
   LinePlot by_iterations = homeward_plot("Iterations, K = 2 and K = 10");
   for (const int highest : {2, 10}) {
@@ -55,9 +55,8 @@ void draw_homeward(ArenaSurveys& surveys, const std::filesystem::path& folder, E
       by_iterations.series.push_back(homeward_series(label, survey, spacing_m));
     }
   }
-  write_plot(folder / "figure_10_iterations.png", by_iterations);
-  result.pictures.push_back(
-      {"figure_10_iterations.png", "[S06] figure 10b: the same with iterations."});
+  add_plot(result, folder, "figure_10_iterations.png",
+           "[S06] figure 10b: the same with iterations.", by_iterations);
 
   for (const double away_m : {0.1, 0.2, 0.4}) {
     const auto at = [&](const HomingSurvey& survey) {
@@ -67,9 +66,8 @@ void draw_homeward(ArenaSurveys& surveys, const std::filesystem::path& folder, E
       return std::nan("");
     };
     const auto add = [&](const std::string& name, const std::string& what, double value) {
-      report_figure(result, "s06.homeward." + name + "_" + centimetres_id(away_m),
-                    "average homeward component at " + centimetres(away_m) + ", " + what, value,
-                    "");
+      add_row(result, "s06.homeward." + name + "_" + centimetres_id(away_m),
+              "average homeward component at " + centimetres(away_m) + ", " + what, value, "");
     };
     add("k2", "K = 2, no iteration", at(surveys.published(2, 0)));
     add("k10", "K = 10, no iteration", at(surveys.published(10, 0)));
@@ -122,10 +120,8 @@ void draw_areas(ArenaSurveys& surveys, const std::filesystem::path& folder, Repr
   }
   single.series.push_back(area_series(surveys, expected_image_strategy()));
   single.series.push_back(no_run(surveys.expected_images()));
-  write_plot(folder / "figure_11_areas.png", single);
-  result.pictures.push_back(
-      {"figure_11_areas.png",
-       "[S06] figure 11: mean number of places from which runs end near the goal."});
+  add_plot(result, folder, "figure_11_areas.png",
+           "[S06] figure 11: mean number of places from which runs end near the goal.", single);
 
   LinePlot staged = area_plot("Catchment area, K rising in stages");
   const std::vector<std::vector<int>> sequences{{2}, {2, 4}, {2, 4, 10}, {1, 2, 4, 10}, {10, 4, 2}};
@@ -134,10 +130,10 @@ void draw_areas(ArenaSurveys& surveys, const std::filesystem::path& folder, Repr
   }
   staged.series.push_back(area_series(surveys, expected_image_strategy()));
   staged.series.push_back(area_series(surveys, own_strategy()));
-  write_plot(folder / "figure_13_stages.png", staged);
-  result.pictures.push_back({"figure_13_stages.png",
-                             "[S06] figure 13: the same when more frequencies count where homing "
-                             "stops, and our rule in its stages."});
+  add_plot(result, folder, "figure_13_stages.png",
+           "[S06] figure 13: the same when more frequencies count where homing stops, and our rule "
+           "in its stages.",
+           staged);
 }
 
 // Figure 12.
@@ -161,10 +157,9 @@ void draw_iterations(ArenaSurveys& surveys, const std::filesystem::path& folder,
     }
     plot.series.push_back(std::move(series));
   }
-  write_plot(folder / "figure_12_iterations.png", plot);
-  result.pictures.push_back({"figure_12_iterations.png",
-                             "[S06] figure 12: mean catchment area by the number of solutions of "
-                             "each home vector."});
+  add_plot(result, folder, "figure_12_iterations.png",
+           "[S06] figure 12: mean catchment area by the number of solutions of each home vector.",
+           plot);
 }
 
 }  // namespace

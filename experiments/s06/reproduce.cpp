@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "experiments/reproduction_stages.hpp"
+#include "experiments/runs/worlds.hpp"
 #include "experiments/s06/chains.hpp"
 #include "experiments/s06/support.hpp"
 #include "experiments/s06/worlds.hpp"
@@ -30,9 +31,7 @@ Reproduction reproduce_s06(const HomingReproductionOptions& options, Executor& e
   require(options.starts >= 1, "starts", options.starts, ">= 1");
   require(options.spacing_m >= 0.01 && options.spacing_m <= 0.1, "spacing_m", options.spacing_m,
           "0.01 .. 0.1");
-  std::error_code error;
-  std::filesystem::create_directories(options.out, error);
-  if (error) throw FileError(options.out.string(), "cannot be made: " + error.message());
+  make_folder(options.out);
 
   Reproduction result;
   std::vector<ReproductionStage> stages;
@@ -48,9 +47,9 @@ Reproduction reproduce_s06(const HomingReproductionOptions& options, Executor& e
   stages.push_back({"arena 1", 6.0, [&] {
                       first = record_arena(first_options, executor);
                       surveys = std::make_unique<ArenaSurveys>(*first, every, executor);
-                      report_figure(result, "s06.places", "free places of the first arena",
-                                    static_cast<double>(first->homes.views.size()), "places",
-                                    std::pair(1250.0, 1250.0));
+                      add_row(result, "s06.places", "free places of the first arena",
+                              static_cast<double>(first->homes.views.size()), "places",
+                              std::nullopt, std::pair(1250.0, 1250.0));
                       measure_homing_times(*first, result);
                     }});
   stages.push_back(
@@ -102,10 +101,7 @@ Reproduction reproduce_s06(const HomingReproductionOptions& options, Executor& e
                       reproduce_snapshot_chains(options.seed, (options.starts + 99) / 100, executor,
                                                 result);
                     }});
-  for (const std::string name : {"small_warehouse", "small_house"}) {
-    if (options.data.empty() || !std::filesystem::is_directory(options.data / "scenes" / name)) {
-      continue;
-    }
+  for (const std::string& name : worlds_in(options.data)) {
     stages.push_back({name, 0.1 * options.starts, [&, name] {
                         reproduce_homing_in_world(options.data, name, options.out, options.seed,
                                                   options.starts, executor, result);

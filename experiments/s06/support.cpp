@@ -1,7 +1,5 @@
 #include "experiments/s06/support.hpp"
 
-#include <cmath>
-
 namespace panonav {
 
 namespace {
@@ -39,29 +37,23 @@ ArenaSurveys::ArenaSurveys(const Arena& arena, std::size_t goals_every, Executor
       executor_(executor),
       expected_image_homing_(s06_columns) {}
 
-const HomingSurvey& ArenaSurveys::published(int highest, int iterations) {
-  const std::string key = "published " + std::to_string(highest) + " " + std::to_string(iterations);
+template <typename Rule>
+const HomingSurvey& ArenaSurveys::survey(const std::string& key, const Rule& rule) {
   const auto at = surveys_.find(key);
   if (at != surveys_.end()) return at->second;
-  return surveys_
-      .emplace(key, survey_arena(arena_, published_homing(highest, iterations), executor_, every_))
-      .first->second;
+  return surveys_.emplace(key, survey_arena(arena_, rule, executor_, every_)).first->second;
+}
+
+const HomingSurvey& ArenaSurveys::published(int highest, int iterations) {
+  const std::string key = "published " + std::to_string(highest) + " " + std::to_string(iterations);
+  return survey(key, published_homing(highest, iterations));
 }
 
 const HomingSurvey& ArenaSurveys::own(int highest) {
-  const std::string key = "own " + std::to_string(highest);
-  const auto at = surveys_.find(key);
-  if (at != surveys_.end()) return at->second;
-  return surveys_
-      .emplace(key,
-               survey_arena(arena_, FourierHomingOptions{.highest = highest}, executor_, every_))
-      .first->second;
+  return survey("own " + std::to_string(highest), FourierHomingOptions{.highest = highest});
 }
 
 const HomingSurvey& ArenaSurveys::own_again(int highest) {
-  const std::string key = "own again " + std::to_string(highest);
-  const auto at = surveys_.find(key);
-  if (at != surveys_.end()) return at->second;
   const FourierHomingOptions coarse{.highest = highest, .displacement_search = false};
   const FourierHomingOptions fine{.highest = own_highest, .displacement_search = false};
   const auto rule = [&](std::size_t goal, std::size_t place) {
@@ -70,16 +62,11 @@ const HomingSurvey& ArenaSurveys::own_again(int highest) {
     const bool alike = image_difference(home, current, own_highest) < s06_alike;
     return home_vector_unchecked(home, current, alike ? fine : coarse);
   };
-  return surveys_.emplace(key, survey_arena(arena_, HomingRule(rule), executor_, every_))
-      .first->second;
+  return survey("own again " + std::to_string(highest), HomingRule(rule));
 }
 
 const HomingSurvey& ArenaSurveys::expected_images() {
-  const auto at = surveys_.find("expected images");
-  if (at != surveys_.end()) return at->second;
-  return surveys_
-      .emplace("expected images", survey_arena(arena_, expected_image_homing_, executor_, every_))
-      .first->second;
+  return survey("expected images", expected_image_homing_);
 }
 
 std::vector<const HomingSurvey*> ArenaSurveys::stages(const HomingStrategy& strategy) {
@@ -109,28 +96,6 @@ std::vector<double> ArenaSurveys::areas(const HomingStrategy& strategy,
   const auto stages_of_it = stages(strategy);
   return mean_catchment_areas(final_distances(stages_of_it, survey_options(arena_), executor_),
                               stages_of_it[0]->goals.size(), accepted_m);
-}
-
-void report_figure(Reproduction& result, const std::string& id, const std::string& what,
-                   double ours, const std::string& unit,
-                   std::optional<std::pair<double, double>> published) {
-  result.rows.push_back(
-      {.id = id, .what = what, .published = published, .ours = ours, .unit = unit});
-}
-
-std::string centimetres(double distance_m) {
-  const auto millimetres = std::lround(1000.0 * distance_m);
-  const auto whole = std::to_string(millimetres / 10);
-  return (millimetres % 10 == 0 ? whole : whole + "." + std::to_string(millimetres % 10)) + " cm";
-}
-
-std::string centimetres_id(double distance_m) {
-  std::string text = centimetres(distance_m);
-  for (char& c : text) {
-    if (c == '.') c = '_';
-  }
-  text.erase(text.size() - 3, 1);
-  return text;
 }
 
 }  // namespace panonav

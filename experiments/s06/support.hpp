@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "experiments/reproduction.hpp"
+#include "experiments/rows.hpp"
 #include "experiments/runs/homing_survey.hpp"
 #include "experiments/s06/arena.hpp"
 #include "panonav/core/executor.hpp"
@@ -62,21 +62,15 @@ class ArenaSurveys {
                                           std::span<const double> accepted_m);
 
  private:
+  template <typename Rule>
+  [[nodiscard]] const HomingSurvey& survey(const std::string& key, const Rule& rule);
+
   const Arena& arena_;
   std::size_t every_;
   Executor& executor_;
   ExpectedImageHoming expected_image_homing_;
   std::map<std::string, HomingSurvey> surveys_;
 };
-
-/// A row without target.
-void report_figure(Reproduction& result, const std::string& id, const std::string& what,
-                   double ours, const std::string& unit,
-                   std::optional<std::pair<double, double>> published = std::nullopt);
-/// "2.5 cm".
-[[nodiscard]] std::string centimetres(double distance_m);
-/// "2_5cm", for row names.
-[[nodiscard]] std::string centimetres_id(double distance_m);
 
 // The experiments; each appends rows and writes pictures into `folder`.
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "experiments/m03/support.hpp"
+#include "experiments/rows.hpp"
 #include "experiments/s06/support.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
@@ -80,11 +80,10 @@ void draw_correlation(const Arena& arena, const std::filesystem::path& folder,
     }
     terms.series.push_back(std::move(series));
   }
-  write_plot(folder / "figure_03_correlation.png", terms);
-  result.pictures.push_back(
-      {"figure_03_correlation.png",
-       "[S06] figure 3a: the first five terms of the correlation of two views "
-       "from one place, and the whole. Only the whole has one clear maximum."});
+  add_plot(result, folder, "figure_03_correlation.png",
+           "[S06] figure 3a: the first five terms of the correlation of two views from one place, "
+           "and the whole. Only the whole has one clear maximum.",
+           terms);
 
   LinePlot maxima{.title = "Turn at the largest correlation",
                   .x_label = "highest frequency K",
@@ -96,11 +95,10 @@ void draw_correlation(const Arena& arena, const std::filesystem::path& folder,
     series.add(highest, degrees(angle_difference(static_cast<double>(turn[0]), truth)));
   }
   maxima.series.push_back(std::move(series));
-  write_plot(folder / "figure_03_maximum.png", maxima);
-  result.pictures.push_back(
-      {"figure_03_maximum.png",
-       "[S06] figure 3b: the turn of the same two views by their first K frequencies, less the "
-       "truth."});
+  add_plot(result, folder, "figure_03_maximum.png",
+           "[S06] figure 3b: the turn of the same two views by their first K frequencies, less the "
+           "truth.",
+           maxima);
 }
 
 // Figure 6.
@@ -140,25 +138,23 @@ void draw_spectrum(const Arena& arena, const std::filesystem::path& folder, Repr
     xx += (log_k[i] - mean_k) * (log_k[i] - mean_k);
   }
   const double slope = -xy / xx;
-  report_figure(result, "s06.spectrum.slope",
-                "power falls with frequency to the power of minus this, k = 1 .. 15", slope, "",
-                std::pair(1.8, 1.8));
+  add_row(result, "s06.spectrum.slope",
+          "power falls with frequency to the power of minus this, k = 1 .. 15", slope, "",
+          std::nullopt, std::pair(1.8, 1.8));
   Series line{.label = "slope " + std::to_string(std::round(100.0 * slope) / 100.0).substr(0, 4),
               .style = SeriesStyle::lines};
   for (int k = 1; k <= top; ++k) {
     line.add(k, std::exp(mean_log - slope * (std::log(k) - mean_k)));
   }
   series.label = "mean and standard deviation";
-  write_plot(folder / "figure_06_spectrum.png",
-             LinePlot{.title = "Power spectrum of all views of the arena",
-                      .x_label = "frequency k",
-                      .y_label = "squared amplitude",
-                      .series = {std::move(series), std::move(line)},
-                      .log_x = true,
-                      .log_y = true});
-  result.pictures.push_back({"figure_06_spectrum.png",
-                             "[S06] figure 6: mean power of the views; a straight line is a "
-                             "power law."});
+  add_plot(result, folder, "figure_06_spectrum.png",
+           "[S06] figure 6: mean power of the views; a straight line is a power law.",
+           LinePlot{.title = "Power spectrum of all views of the arena",
+                    .x_label = "frequency k",
+                    .y_label = "squared amplitude",
+                    .series = {std::move(series), std::move(line)},
+                    .log_x = true,
+                    .log_y = true});
 }
 
 struct Sums {
@@ -268,16 +264,14 @@ void draw_changes(const Arena& arena, const std::filesystem::path& folder, Execu
     changes.series.push_back(std::move(change));
     if (s < shown.size()) phases.series.push_back(std::move(phase));
   }
-  write_plot(folder / "figure_07_coefficients.png", changes);
-  write_plot(folder / "figure_07_phases.png", phases);
-  result.pictures.push_back(
-      {"figure_07_coefficients.png",
-       "[S06] figure 7a: change of coefficients with the distance, all pairs of places. It grows "
-       "with the square of the distance farther out where frequencies are low."});
-  result.pictures.push_back(
-      {"figure_07_phases.png",
-       "[S06] figure 7b: change of phases. High frequencies soon have nothing to do with each "
-       "other."});
+  add_plot(result, folder, "figure_07_coefficients.png",
+           "[S06] figure 7a: change of coefficients with the distance, all pairs of places. It "
+           "grows with the square of the distance farther out where frequencies are low.",
+           changes);
+  add_plot(result, folder, "figure_07_phases.png",
+           "[S06] figure 7b: change of phases. High frequencies soon have nothing to do with each "
+           "other.",
+           phases);
 }
 
 // Figure 8.
@@ -350,18 +344,14 @@ void draw_headings(const Arena& arena, const std::filesystem::path& folder, Exec
     }
     plot.series.push_back(std::move(series));
   }
-  write_plot(folder / "figure_08_headings.png", plot);
-  result.pictures.push_back({"figure_08_headings.png",
-                             "[S06] figure 8: error of the heading that the phases tell, by the "
-                             "distance of the two views; all pairs, random headings."});
-  result.rows.push_back({.id = "s06.heading.at_goal",
-                         .what = "error of the heading at no distance, K = 15, 72 pixels",
-                         .published = std::pair(1.5, 1.5),
-                         .ours = deviation(sums[4], 0),
-                         .unit = "deg",
-                         .target = at_most(0.2)});
-  report_figure(result, "s06.heading.at_goal_whole_pixels",
-                "the same by all shifts of whole pixels", deviation(whole[0], 0), "deg");
+  add_plot(result, folder, "figure_08_headings.png",
+           "[S06] figure 8: error of the heading that the phases tell, by the distance of the two "
+           "views; all pairs, random headings.",
+           plot);
+  add_row(result, "s06.heading.at_goal", "error of the heading at no distance, K = 15, 72 pixels",
+          deviation(sums[4], 0), "deg", at_most(0.2), std::pair(1.5, 1.5));
+  add_row(result, "s06.heading.at_goal_whole_pixels", "the same by all shifts of whole pixels",
+          deviation(whole[0], 0), "deg");
 }
 
 }  // namespace
@@ -386,11 +376,11 @@ void reproduce_heading_with_pose_noise(const Arena& arena, Reproduction& result)
     sines += std::sin(error);
   }
   const double length = std::hypot(cosines, sines) / static_cast<double>(places);
-  report_figure(result, "s06.heading.at_goal_pose_noise",
-                "error of the heading at no distance with the tracker's noise (3 mm, 2 degrees in "
-                "each recording)",
-                degrees(std::sqrt(std::max(0.0, -2.0 * std::log(length)))), "deg",
-                std::pair(1.5, 1.5));
+  add_row(result, "s06.heading.at_goal_pose_noise",
+          "error of the heading at no distance with the tracker's noise (3 mm, 2 degrees in each "
+          "recording)",
+          degrees(std::sqrt(std::max(0.0, -2.0 * std::log(length)))), "deg", std::nullopt,
+          std::pair(1.5, 1.5));
 }
 
 }  // namespace panonav

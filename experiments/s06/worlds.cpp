@@ -8,22 +8,17 @@
 #include <numbers>
 #include <vector>
 
-#include "experiments/m03/support.hpp"
+#include "experiments/rows.hpp"
 #include "experiments/runs/surroundings.hpp"
+#include "experiments/runs/worlds.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/positions.hpp"
-#include "panonav/io/image_file.hpp"
-#include "panonav/simulation/load_gazebo.hpp"
 #include "panonav/simulation/scenes.hpp"
 #include "reporting/plot.hpp"
 
 namespace panonav {
 
 namespace {
-
-std::string centimetres(double metres) {
-  return std::to_string(static_cast<int>(std::lround(100.0 * metres))) + " cm";
-}
 
 std::size_t successes(const std::vector<HomingRun>& runs) {
   return static_cast<std::size_t>(std::count_if(runs.begin(), runs.end(), [](const HomingRun& run) {
@@ -83,9 +78,7 @@ void add_noticed(Reproduction& result, const std::string& id, const std::string&
   }
   if (elsewhere == 0) return;
   add_rate(result, id,
-           what +
-               ": ends farther than 10 cm from home that the robot knows not to be "
-               "home",
+           what + ": ends farther than 10 cm from home that the robot knows not to be home",
            noticed, elsewhere);
 }
 
@@ -103,7 +96,7 @@ struct Ends {
 
 std::string reason_of_failure(const HomingRun& run) {
   if (run.succeeds(homing_success_m)) return "";
-  const std::string where = centimetres(run.end_distance_m) + " off";
+  const std::string where = std::to_string(std::lround(100.0 * run.end_distance_m)) + " cm off";
   switch (run.end) {
     case HomingRunEnd::blocked:
       return "an obstacle stopped it, " + where;
@@ -125,10 +118,7 @@ std::string reason_of_failure(const HomingRun& run) {
 void reproduce_homing_in_world(const std::filesystem::path& data, const std::string& name,
                                const std::filesystem::path& out, std::uint64_t seed, int starts,
                                Executor& executor, Reproduction& reproduction) {
-  GazeboOptions reading;
-  reading.textures.read = [](const std::filesystem::path& path) { return read_image(path); };
-  const HomingPlace place = make_homing_place(
-      load_gazebo(data / "scenes" / name / "worlds" / (name + ".world"), reading), {}, executor);
+  const HomingPlace place = make_homing_place(read_world(data, name), {}, executor);
   const auto tasks = random_homing_tasks(place, starts, homing_start_radius_m, seed);
   const auto runs = run_home(place, tasks, {}, seed, executor);
 
@@ -171,15 +161,14 @@ void reproduce_homing_in_world(const std::filesystem::path& data, const std::str
   add_other(".stopped_by_obstacles", "the first obstacle ends a run", stopping);
 
   const std::string prefix = "s06_world_" + name;
-  write_plot(out / (prefix + ".png"), map_of_all(place, runs, name));
-  reproduction.pictures.push_back(
-      {prefix + ".png", "Homing runs in " + name + " from starts within 1.5 m of random goals"});
+  add_plot(reproduction, out, prefix + ".png",
+           "Homing runs in " + name + " from starts within 1.5 m of random goals",
+           map_of_all(place, runs, name));
   for (std::size_t i = 0; i < runs.size(); ++i) {
     if (runs[i].succeeds(homing_success_m)) continue;
     const MapPlot map = map_of_failure(place, runs[i], i);
     const std::string file = prefix + "_failure_" + std::to_string(i) + ".png";
-    write_plot(out / file, map);
-    reproduction.pictures.push_back({file, name + ", " + map.title});
+    add_plot(reproduction, out, file, name + ", " + map.title, map);
   }
 }
 
@@ -225,25 +214,15 @@ void reproduce_homing_in_scenes(std::uint64_t seed, int starts, Executor& execut
     ends.add(flat);
   }
   if (!ends.at_home.empty()) {
-    reproduction.rows.push_back({.id = "s06.difference.at_home",
-                                 .what = "difference of the views where a run ends within 10 cm of "
-                                         "home: 99 % quantile of " +
-                                         std::to_string(ends.at_home.size()),
-                                 .published = std::nullopt,
-                                 .ours = quantile(ends.at_home, 0.99),
-                                 .interval = std::nullopt,
-                                 .unit = "",
-                                 .target = std::nullopt});
+    add_row(reproduction, "s06.difference.at_home",
+            "difference of the views where a run ends within 10 cm of home: 99 % quantile of " +
+                std::to_string(ends.at_home.size()),
+            quantile(ends.at_home, 0.99), "");
   }
   if (!ends.elsewhere.empty()) {
-    reproduction.rows.push_back({.id = "s06.difference.elsewhere",
-                                 .what = "the same farther from home: 1 % quantile of " +
-                                         std::to_string(ends.elsewhere.size()),
-                                 .published = std::nullopt,
-                                 .ours = quantile(ends.elsewhere, 0.01),
-                                 .interval = std::nullopt,
-                                 .unit = "",
-                                 .target = std::nullopt});
+    add_row(reproduction, "s06.difference.elsewhere",
+            "the same farther from home: 1 % quantile of " + std::to_string(ends.elsewhere.size()),
+            quantile(ends.elsewhere, 0.01), "");
   }
 }
 

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "experiments/reproduction.hpp"
+#include "experiments/rows.hpp"
 #include "experiments/runs/homing_run.hpp"
 #include "panonav/core/executor.hpp"
 

@@ -9,9 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "experiments/m03/support.hpp"
-#include "experiments/reproduction.hpp"
-#include "experiments/s06/support.hpp"
+#include "experiments/rows.hpp"
+#include "experiments/runs/make_each.hpp"
 #include "experiments/y03/experiments.hpp"
 #include "experiments/y03/figures.hpp"
 #include "experiments/y03/lab.hpp"
@@ -93,21 +92,12 @@ void report(Reproduction& result, std::uint64_t seed, const std::string& id,
   };
   std::vector<std::size_t> all(errors.images_cm.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
-  result.rows.push_back({.id = "y03." + id + ".error",
-                         .what = what + ": mean error of the position",
-                         .published = pair(published),
-                         .ours = mean(errors.mean_cm),
-                         .interval = mean_interval(errors.mean_cm, seed),
-                         .unit = "cm",
-                         .target = target,
-                         .over = "mean of " + std::to_string(errors.mean_cm.size()) + " variants"});
-  result.rows.push_back({.id = "y03." + id + ".sigma",
-                         .what = what + ": standard deviation of the error, all images",
-                         .published = pair(published_sigma),
-                         .ours = deviation(errors.images_cm, all),
-                         .interval = deviation_interval(errors.images_cm, seed),
-                         .unit = "cm",
-                         .target = sigma_target});
+  add_row(result, "y03." + id + ".error", what + ": mean error of the position",
+          mean_figure(errors.mean_cm, seed), "cm", target, pair(published))
+      .over = "mean of " + std::to_string(errors.mean_cm.size()) + " variants";
+  add_row(result, "y03." + id + ".sigma", what + ": standard deviation of the error, all images",
+          Figure(deviation(errors.images_cm, all), deviation_interval(errors.images_cm, seed)),
+          "cm", sigma_target, pair(published_sigma));
   std::size_t images = 0;
   for (const auto& one : errors.images_cm) images += one.size();
   add_rate(result, "y03." + id + ".missed", what + ": images without an answer", errors.missed,
@@ -172,8 +162,7 @@ Series error_series(const std::string& label, const std::vector<double>& x,
                     const std::vector<std::vector<double>>& means_cm, std::uint64_t seed) {
   Series series{.label = label};
   for (std::size_t i = 0; i < x.size(); ++i) {
-    const auto interval = mean_interval(means_cm[i], seed);
-    series.add(x[i], mean(means_cm[i]), interval.first, interval.second);
+    add_point(series, x[i], mean_figure(means_cm[i], seed));
   }
   return series;
 }
@@ -204,11 +193,8 @@ void reproduce_lab_drives(const RouteReproductionOptions& options, Executor& exe
                                       i < options.swept ? lateral_offsets_m : std::vector<double>{},
                                       executor));
     }
-    std::vector<Variant> variants(labs.size());
-    executor.for_chunks(labs.size(), 1, [&](std::size_t from, std::size_t to, std::size_t) {
-      for (std::size_t i = from; i < to; ++i) {
-        variants[i] = examine(labs[i], begin + static_cast<int>(i) < options.swept);
-      }
+    auto variants = make_each(executor, labs.size(), [&](std::size_t i) {
+      return examine(labs[i], begin + static_cast<int>(i) < options.swept);
     });
     for (std::size_t i = 0; i < labs.size(); ++i) {
       const Variant& variant = variants[i];
@@ -252,12 +238,8 @@ void reproduce_lab_drives(const RouteReproductionOptions& options, Executor& exe
   const std::string drive = "5 m route, a line every 2 cm, driven at 30 degrees to it";
   report(result, seed, "straight.fit", drive + ", direct fit", fit, at_most(0.5), 1.98,
          at_most(0.3), 1.0);
-  result.rows.push_back({.id = "y03.straight.fit.heading",
-                         .what = drive + ", direct fit: mean error of the heading",
-                         .ours = mean(fit.heading_deg),
-                         .interval = mean_interval(fit.heading_deg, seed),
-                         .unit = "deg",
-                         .target = at_most(0.1)});
+  add_row(result, "y03.straight.fit.heading", drive + ", direct fit: mean error of the heading",
+          mean_figure(fit.heading_deg, seed), "deg", at_most(0.1));
   report(result, seed, "straight.contours", drive + ", dual contours as published", contours,
          std::nullopt, 1.98, std::nullopt, 1.0);
   add_mean(result, "y03.changed.share", "directions that show something else after things moved",
@@ -283,9 +265,8 @@ void reproduce_lab_drives(const RouteReproductionOptions& options, Executor& exe
   report(result, seed, "scale.fit", "recorded with 1 % error of the odometry's scale, direct fit",
          wrong_scale, at_most(3.0), std::nullopt);
   add_median(result, "y03.goal.error",
-             "closed loop (100, 0) to (200, -50) to (300, 0) cm: error at "
-             "the goal",
-             "cm", goal_cm, at_most(2.0), std::pair(4.0, 4.0));
+             "closed loop (100, 0) to (200, -50) to (300, 0) cm: error at the goal", "cm", goal_cm,
+             at_most(2.0), std::pair(4.0, 4.0));
   add_rate(result, "y03.goal.arrived", "closed loop: the robot says that it arrived", arrived,
            goal_cm.size());
   add_median(result, "y03.time", "from horizon line to pose, one core, direct fit", "ms", fit_ms,
@@ -312,14 +293,13 @@ void reproduce_lab_drives(const RouteReproductionOptions& options, Executor& exe
                         const std::string& caption) {
     LinePlot plot{.title = title, .x_label = x_label, .y_label = "mean error [cm]"};
     plot.series.push_back(error_series(label, x, means(errors), seed));
-    write_plot(options.out / file, plot);
-    result.pictures.push_back({file, caption});
+    add_plot(result, options.out, file, caption, plot);
     for (std::size_t i = 0; i < x.size(); ++i) {
-      report_figure(result,
-                    "y03.sweep." + file.substr(0, file.find('.')) + "." +
-                        std::to_string(std::lround(x[i])) + "cm",
-                    title + ": " + std::to_string(std::lround(x[i])) + " cm",
-                    mean(errors[i].mean_cm), "cm");
+      add_row(result,
+              "y03.sweep." + file.substr(0, file.find('.')) + "." +
+                  std::to_string(std::lround(x[i])) + "cm",
+              title + ": " + std::to_string(std::lround(x[i])) + " cm", mean(errors[i].mean_cm),
+              "cm");
     }
   };
   draw("spacing.png", "Way between the lines, direct fit", "way between lines [cm]", spacings_cm,

@@ -65,12 +65,10 @@ PicturePlot panorama_plot(const LabRoute& lab, const std::string& title) {
 void draw_route_panorama(const LabRoute& lab, const std::filesystem::path& folder,
                          Reproduction& result) {
   const std::string file = "figure_03_route_panorama.png";
-  write_plot(folder / file,
-             panorama_plot(lab, "Route panorama: each row is the horizon at one place"));
-  result.pictures.push_back(
-      {file,
-       "The route panorama of the straight path [Y03 figure 3], the start at the bottom. "
-       "Things ahead and behind keep their place, things beside the path wander by."});
+  add_plot(result, folder, file,
+           "The route panorama of the straight path [Y03 figure 3], the start at the bottom. "
+           "Things ahead and behind keep their place, things beside the path wander by.",
+           panorama_plot(lab, "Route panorama: each row is the horizon at one place"));
 }
 
 void draw_virtual_view(const LabRoute& lab, const LineDrive& beside,
@@ -101,11 +99,10 @@ void draw_virtual_view(const LabRoute& lab, const LineDrive& beside,
   const std::string where = std::to_string(std::lround(100.0 * in_path.y_m)) +
                             " cm to the left of the path, " +
                             std::to_string(std::lround(100.0 * in_path.x_m)) + " cm along it";
-  write_plot(folder / "figure_05_curve.png", plot);
-  result.pictures.push_back(
-      {"figure_05_curve.png",
-       "Eq. 5 for a viewpoint " + where +
-           " [Y03 figure 5]: along this curve the route panorama holds what is seen there."});
+  add_plot(result, folder, "figure_05_curve.png",
+           "Eq. 5 for a viewpoint " + where +
+               " [Y03 figure 5]: along this curve the route panorama holds what is seen there.",
+           plot);
   const auto shown = RouteLines(lab.route).synthesise(pose);
   Series truth{.label = "seen there", .style = SeriesStyle::lines};
   Series made{.label = "synthesised from the route panorama", .style = SeriesStyle::points};
@@ -116,16 +113,14 @@ void draw_virtual_view(const LabRoute& lab, const LineDrive& beside,
     if (!std::isfinite(shown[c])) continue;
     made.add(azimuth, static_cast<double>(shown[c]));
   }
-  write_plot(folder / "figure_05_lines.png",
-             LinePlot{.title = "The horizon " + where,
-                      .x_label = "azimuth from straight ahead [degrees], left positive",
-                      .y_label = "brightness",
-                      .series = {truth, made},
-                      .x_range = std::pair(-180.0, 180.0)});
-  result.pictures.push_back({"figure_05_lines.png",
-                             "The line synthesised at that viewpoint, where no picture was taken, "
-                             "and the one that a camera sees there. Ahead and behind, the lines "
-                             "of sight do not cross the path."});
+  add_plot(result, folder, "figure_05_lines.png",
+           "The line synthesised at that viewpoint, where no picture was taken, and the one that a "
+           "camera sees there. Ahead and behind, the lines of sight do not cross the path.",
+           LinePlot{.title = "The horizon " + where,
+                    .x_label = "azimuth from straight ahead [degrees], left positive",
+                    .y_label = "brightness",
+                    .series = {truth, made},
+                    .x_range = std::pair(-180.0, 180.0)});
 }
 
 void draw_drives(const LabRoute& lab, const LocalisedDrives& drives,
@@ -139,15 +134,14 @@ void draw_drives(const LabRoute& lab, const LocalisedDrives& drives,
          line_layer("direct fit", "#1f77b4", in_path_frame(lab, fit.poses))}};
   };
   const std::string file = "figure_09_drives.png";
-  write_plot(folder / file,
-             {panel("scene as memorised", lab.across, drives.fit, drives.contours),
-              panel("things moved, a tenth of what is seen", lab.across_changed, drives.changed_fit,
-                    drives.changed_contours)},
-             1);
-  result.pictures.push_back(
-      {file,
-       "A robot crosses the memorised path at 30 degrees [Y03 figure 9]; metres. The direct fit "
-       "lies on the true drive."});
+  add_plot(
+      result, folder, file,
+      "A robot crosses the memorised path at 30 degrees [Y03 figure 9]; metres. The direct fit "
+      "lies on the true drive.",
+      std::vector<MapPlot>{panel("scene as memorised", lab.across, drives.fit, drives.contours),
+                           panel("things moved, a tenth of what is seen", lab.across_changed,
+                                 drives.changed_fit, drives.changed_contours)},
+      1);
   const auto series = [](const std::string& label, const DriveErrors& errors) {
     Series line{.label = label, .style = SeriesStyle::lines};
     for (std::size_t i = 0; i < errors.position_m.size(); ++i) {
@@ -156,15 +150,14 @@ void draw_drives(const LabRoute& lab, const LocalisedDrives& drives,
     return line;
   };
   const std::string errors_file = "figure_09_errors.png";
-  write_plot(folder / errors_file,
-             LinePlot{.title = "How far off along these drives",
-                      .x_label = "image, 5 cm apart",
-                      .y_label = "error of the position [cm]",
-                      .series = {series("contours", drives.contours),
-                                 series("contours, things moved", drives.changed_contours),
-                                 series("direct fit", drives.fit),
-                                 series("direct fit, things moved", drives.changed_fit)}});
-  result.pictures.push_back({errors_file, "The errors of these drives, image by image."});
+  add_plot(result, folder, errors_file, "The errors of these drives, image by image.",
+           LinePlot{.title = "How far off along these drives",
+                    .x_label = "image, 5 cm apart",
+                    .y_label = "error of the position [cm]",
+                    .series = {series("contours", drives.contours),
+                               series("contours, things moved", drives.changed_contours),
+                               series("direct fit", drives.fit),
+                               series("direct fit, things moved", drives.changed_fit)}});
 }
 
 void draw_goal_run(const LabRoute& lab, const GoalRun& run, const std::filesystem::path& folder,
@@ -172,14 +165,12 @@ void draw_goal_run(const LabRoute& lab, const GoalRun& run, const std::filesyste
   MapLayer goals{.label = "start, sub-goal and goal", .colour = "#2ca02c"};
   for (const Point2 point : goal_run_points()) goals.squares.push_back(point);
   const std::string file = "figure_10_goal.png";
-  write_plot(folder / file,
-             MapPlot{"To a goal over a sub-goal off the path: metres",
-                     {path_layer(lab), line_layer("true", "#000000", in_path_frame(lab, run.truth)),
-                      line_layer("estimate", "#d62728", in_path_frame(lab, run.estimate)), goals}});
-  result.pictures.push_back(
-      {file,
-       "Closed loop under proportional control [Y03 figure 10]; the estimate lies on the true "
-       "drive."});
+  add_plot(result, folder, file,
+           "Closed loop under proportional control [Y03 figure 10]; the estimate lies on the true "
+           "drive.",
+           MapPlot{"To a goal over a sub-goal off the path: metres",
+                   {path_layer(lab), line_layer("true", "#000000", in_path_frame(lab, run.truth)),
+                    line_layer("estimate", "#d62728", in_path_frame(lab, run.estimate)), goals}});
 }
 
 }  // namespace panonav

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "experiments/reproduction.hpp"
+#include "experiments/rows.hpp"
 #include "experiments/y03/lab.hpp"
 
 namespace panonav {

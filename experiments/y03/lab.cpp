@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "experiments/runs/line_camera.hpp"
+#include "experiments/runs/make_each.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
@@ -31,13 +32,9 @@ std::vector<std::vector<float>> take_lines(const Renderer& renderer,
                                            const std::vector<Pose2>& poses,
                                            const LineCamera& camera, std::uint64_t seed,
                                            Executor& executor) {
-  std::vector<std::vector<float>> lines(poses.size());
-  executor.for_chunks(poses.size(), 4, [&](std::size_t begin, std::size_t end, std::size_t) {
-    for (std::size_t i = begin; i < end; ++i) {
-      lines[i] = take_line(renderer, poses[i], camera, Random(seed, i).next());
-    }
+  return make_each(executor, poses.size(), [&](std::size_t i) {
+    return take_line(renderer, poses[i], camera, Random(seed, i).next());
   });
-  return lines;
 }
 
 LineDrive take_drive(const Renderer& renderer, std::vector<Pose2> poses, const LineCamera& camera,

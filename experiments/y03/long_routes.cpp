@@ -3,14 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "experiments/m03/support.hpp"
+#include "experiments/rows.hpp"
+#include "experiments/runs/make_each.hpp"
 #include "experiments/runs/surroundings.hpp"
-#include "experiments/s06/support.hpp"
+#include "experiments/runs/worlds.hpp"
 #include "experiments/y03/experiments.hpp"
 #include "experiments/y03/routes.hpp"
 #include "panonav/core/error.hpp"
@@ -18,13 +20,11 @@
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/positions.hpp"
 #include "panonav/io/dataset.hpp"
-#include "panonav/io/image_file.hpp"
 #include "panonav/io/panorama_reader.hpp"
 #include "panonav/motion/headed_path.hpp"
 #include "panonav/route/horizon_line.hpp"
 #include "panonav/route/route_place.hpp"
 #include "panonav/route/route_tracker.hpp"
-#include "panonav/simulation/load_gazebo.hpp"
 #include "panonav/simulation/scenes.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "reporting/plot.hpp"
@@ -66,19 +66,7 @@ MapPlot map_of(const RouteScene& place, const RepeatedRoute& repeated) {
   const FreeSpace& space = *place.free_space;
   MapPlot map{.title = place.name + ": x and y in metres",
               .layers = {obstacle_layer(space, space.low(), space.high(), 0.1)}};
-  map.layers.push_back(
-      {.label = "remembered route", .colour = "#000000", .lines = {positions_of(repeated.way)}});
-  MapLayer forward{.label = "driven forward", .colour = "#1f77b4"};
-  MapLayer back{.label = "driven back", .colour = "#2ca02c"};
-  MapLayer starts{.label = "starts, 0.3 m off", .colour = "#d62728"};
-  MapLayer lost{.label = "lost", .colour = "#d62728"};
-  for (std::size_t i = 0; i < repeated.runs.size(); ++i) {
-    const RouteRun& run = repeated.runs[i];
-    (i % 2 == 0 ? forward : back).lines.push_back(positions_of(run.truth));
-    starts.circles.push_back(run.truth.front().position());
-    if (!run.completes()) lost.crosses.push_back(run.truth.back().position());
-  }
-  for (MapLayer* layer : {&forward, &back, &starts, &lost}) map.layers.push_back(*layer);
+  std::ranges::move(route_layers(repeated.way, repeated.runs), std::back_inserter(map.layers));
   return map;
 }
 
@@ -111,13 +99,9 @@ void report_routes(const RouteReproductionOptions& options, const std::string& n
   }
   const std::string id = "y03.route." + name;
   const std::string what = name + ", 60 m route repeated with wheels 5 % wrong, start 0.3 m off";
-  result.rows.push_back({.id = id + ".lateral",
-                         .what = what + ": distance from the route",
-                         .ours = mean(lateral_cm),
-                         .interval = mean_interval(lateral_cm, options.seed),
-                         .unit = "cm",
-                         .target = at_most(5.0),
-                         .over = "mean of " + std::to_string(runs) + " runs"});
+  add_row(result, id + ".lateral", what + ": distance from the route",
+          mean_figure(lateral_cm, options.seed), "cm", at_most(5.0))
+      .over = "mean of " + std::to_string(runs) + " runs";
   add_rate(result, id + ".completed", what + ": runs that reach the end, none lost", completed,
            runs, at_least(1.0));
   if (!lateral_back_cm.empty()) {
@@ -134,10 +118,10 @@ void report_routes(const RouteReproductionOptions& options, const std::string& n
   add_rate(result, id + ".turned_aside", what + ": steps at which something was in the way",
            turned_aside, lines);
   const std::string file = "route_" + name + ".png";
-  write_plot(options.out / file, map_of(first_place, routes.front()));
-  result.pictures.push_back(
-      {file, "A route of 60 m through " + name +
-                 ", recorded once and repeated forward and back; the driven ways lie on it."});
+  add_plot(result, options.out, file,
+           "A route of 60 m through " + name +
+               ", recorded once and repeated forward and back; the driven ways lie on it.",
+           map_of(first_place, routes.front()));
 }
 
 // Sizes on the disk, with nothing left in the write-ahead log.
@@ -179,14 +163,11 @@ void measure_file(const RouteReproductionOptions& options, const std::vector<Rep
   std::filesystem::remove(path);
   const double megabytes_per_km = 1e-3 / length_m;
   const std::string what = "memory of routes through loop, a line every 10 cm, ";
-  result.rows.push_back({.id = "y03.memory.file",
-                         .what = what + "by what a memory file grows, a kilometre",
-                         .published = std::pair(3.6, 3.6),
-                         .ours = megabytes_per_km * static_cast<double>(whole - empty),
-                         .unit = "MB",
-                         .target = at_most(3.6)});
-  report_figure(result, "y03.memory.packed", what + "packed lines and poses alone, a kilometre",
-                megabytes_per_km * static_cast<double>(stored), "MB");
+  add_row(result, "y03.memory.file", what + "by what a memory file grows, a kilometre",
+          megabytes_per_km * static_cast<double>(whole - empty), "MB", at_most(3.6),
+          std::pair(3.6, 3.6));
+  add_row(result, "y03.memory.packed", what + "packed lines and poses alone, a kilometre",
+          megabytes_per_km * static_cast<double>(stored), "MB");
 }
 
 int routes_of(const RouteReproductionOptions& options) {
@@ -211,11 +192,7 @@ void reproduce_loop_routes(const RouteReproductionOptions& options, Executor& ex
 
 void reproduce_world_routes(const RouteReproductionOptions& options, const std::string& name,
                             Executor& executor, Reproduction& result) {
-  GazeboOptions reading;
-  reading.textures.read = [](const std::filesystem::path& path) { return read_image(path); };
-  const RouteScene place = make_route_scene(
-      load_gazebo(options.data / "scenes" / name / "worlds" / (name + ".world"), reading), name,
-      executor);
+  const RouteScene place = make_route_scene(read_world(options.data, name), name, executor);
   std::vector<RepeatedRoute> routes;
   for (int i = 0; i < routes_of(options); ++i) {
     routes.push_back(repeat_one(place, std::min(runs_each, options.runs),
@@ -228,11 +205,8 @@ void reproduce_real_route(const RouteReproductionOptions& options, Executor& exe
                           Reproduction& result) {
   const Dataset dataset = read_dataset(options.data / "sussex_route");
   const PanoramaReader reader(dataset.source, {});
-  std::vector<std::vector<float>> lines(dataset.entries.size());
-  executor.for_chunks(lines.size(), 8, [&](std::size_t begin, std::size_t end, std::size_t) {
-    for (std::size_t i = begin; i < end; ++i) {
-      lines[i] = horizon_line(reader.read(dataset.entries[i].path));
-    }
+  auto lines = make_each(executor, dataset.entries.size(), [&](std::size_t i) {
+    return horizon_line(reader.read(dataset.entries[i].path));
   });
   std::vector<Point2> places;
   for (const DatasetEntry& entry : dataset.entries) {
@@ -277,12 +251,11 @@ void reproduce_real_route(const RouteReproductionOptions& options, Executor& exe
              beside_cm);
   add_rate(result, "y03.sussex.found", what + ": found on the route", along_cm.size(), asked);
   MapLayer driven{.label = "driven way", .colour = "#999999", .lines = {places}};
-  write_plot(options.out / "sussex_route.png", MapPlot{.title = "sussex_route: x and y in metres",
-                                                       .layers = {driven, right, remembered}});
-  result.pictures.push_back(
-      {"sussex_route.png",
-       "A real route outdoors: where each picture between the remembered lines "
-       "was found, without odometry."});
+  add_plot(
+      result, options.out, "sussex_route.png",
+      "A real route outdoors: where each picture between the remembered lines was found, without "
+      "odometry.",
+      MapPlot{.title = "sussex_route: x and y in metres", .layers = {driven, right, remembered}});
 }
 
 }  // namespace panonav

@@ -1,11 +1,10 @@
-#include <filesystem>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <vector>
 
 #include "experiments/reproduction.hpp"
 #include "experiments/reproduction_stages.hpp"
+#include "experiments/runs/worlds.hpp"
 #include "experiments/y03/experiments.hpp"
 #include "panonav/core/error.hpp"
 
@@ -24,9 +23,7 @@ Reproduction reproduce_y03(const RouteReproductionOptions& options, Executor& ex
   require(options.swept >= 1 && options.swept <= options.scenes, "swept", options.swept,
           "1 to scenes");
   require(options.runs >= 2, "runs", options.runs, ">= 2");
-  std::error_code error;
-  std::filesystem::create_directories(options.out, error);
-  if (error) throw FileError(options.out.string(), "cannot be made: " + error.message());
+  make_folder(options.out);
   Reproduction result;
   const double drives = 3.0 * options.scenes;
   const double routes = 3.0 * options.runs;
@@ -42,15 +39,11 @@ Reproduction reproduce_y03(const RouteReproductionOptions& options, Executor& ex
                     }});
   stages.push_back(
       {"routes through loop", routes, [&] { reproduce_loop_routes(options, executor, result); }});
-  const auto is_there = [&](const std::filesystem::path& part) {
-    return !options.data.empty() && std::filesystem::is_directory(options.data / part);
-  };
-  for (const std::string world : {"small_warehouse", "small_house"}) {
-    if (!is_there(std::filesystem::path("scenes") / world)) continue;
+  for (const std::string& world : worlds_in(options.data)) {
     stages.push_back({"routes through " + world, routes,
                       [&, world] { reproduce_world_routes(options, world, executor, result); }});
   }
-  if (is_there("sussex_route")) {
+  if (has_data(options.data, "sussex_route")) {
     stages.push_back(
         {"a real route", 1.0, [&] { reproduce_real_route(options, executor, result); }});
   }

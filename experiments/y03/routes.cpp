@@ -1,4 +1,5 @@
 #include "experiments/y03/routes.hpp"
+#include "experiments/runs/make_each.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +9,7 @@
 #include <utility>
 
 #include "experiments/runs/chain_run.hpp"
+#include "experiments/runs/simulated_robot.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
@@ -50,23 +52,11 @@ std::vector<Pose2> rounded(const std::vector<Pose2>& way, std::size_t reach) {
   return result;
 }
 
-// The robot touches nothing. Scenes name areas to drive in, too, whose borders are nothing to
-// touch.
-bool has_room(const RouteScene& place, Point2 position) {
-  return place.free_space->clearance_m(position) >= place.scene.robot_radius_m;
-}
-
-// Straight from one place to another.
+// Straight from one place to another, the robot touches nothing.
 bool reaches(const RouteScene& place, Point2 from, Point2 to) {
-  const int steps = static_cast<int>(std::ceil(distance(from, to) / 0.025));
-  for (int i = 0; i <= steps; ++i) {
-    const double share = steps == 0 ? 0.0 : static_cast<double>(i) / steps;
-    if (!has_room(place, {from.x_m + share * (to.x_m - from.x_m),
-                          from.y_m + share * (to.y_m - from.y_m)})) {
-      return false;
-    }
-  }
-  return true;
+  constexpr double fine_m = 0.025;
+  return place.free_space->clearance_m(from) >= place.scene.robot_radius_m &&
+         has_room_between(*place.free_space, place.scene.robot_radius_m, from, to, fine_m);
 }
 
 // Of a way, at the place with the least room.
@@ -124,13 +114,13 @@ std::optional<Pose2> step_past(const RouteScene& place, const Pose2& robot, cons
   if (reaches(place, robot.position(), (robot * wanted).position())) return wanted;
   const double half_m = 0.5 * std::hypot(wanted.x_m, wanted.y_m);
   constexpr int feelers_each_side = 11;
-  for (int i = 1; i <= feelers_each_side; ++i) {
-    for (const double side : {1.0, -1.0}) {
-      const Pose2 aside = Pose2{0.0, 0.0, side * i * radians(15.0)} * Pose2{half_m, 0.0, 0.0};
-      if (reaches(place, robot.position(), (robot * aside).position())) return aside;
-    }
-  }
-  return std::nullopt;
+  const auto step_along = [&](double direction_rad) {
+    return Pose2{0.0, 0.0, direction_rad} * Pose2{half_m, 0.0, 0.0};
+  };
+  const auto aside = feel_aside(0.0, feelers_each_side, 0, [&](double direction_rad) {
+    return reaches(place, robot.position(), (robot * step_along(direction_rad)).position());
+  });
+  return aside ? std::optional(step_along(aside->direction_rad)) : std::nullopt;
 }
 
 // Looking for the route: ever wider around where the robot is, 0.5 m after some 25 steps.
@@ -200,11 +190,8 @@ std::vector<Pose2> curved_route(const RouteScene& place, double length_m, double
 
 RoutePanorama record_route(const RouteScene& place, const std::vector<Pose2>& way,
                            std::uint64_t seed, Executor& executor) {
-  std::vector<std::vector<float>> lines(way.size());
-  executor.for_chunks(way.size(), 8, [&](std::size_t begin, std::size_t end, std::size_t) {
-    for (std::size_t i = begin; i < end; ++i) {
-      lines[i] = take_line(*place.renderer, way[i], place.camera, Random(seed, i).next());
-    }
+  auto lines = make_each(executor, way.size(), [&](std::size_t i) {
+    return take_line(*place.renderer, way[i], place.camera, Random(seed, i).next());
   });
   RoutePanorama route(place.camera.line.columns);
   for (std::size_t i = 0; i < way.size(); ++i) {
@@ -279,6 +266,20 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
   }
   run.end_distance_m = distance(robot.position(), path.back());
   return run;
+}
+
+std::vector<MapLayer> route_layers(std::span<const Pose2> way, std::span<const RouteRun> runs) {
+  MapLayer route{.label = "remembered route", .colour = "#000000", .lines = {positions_of(way)}};
+  MapLayer forward{.label = "driven forward", .colour = "#1f77b4"};
+  MapLayer back{.label = "driven back", .colour = "#2ca02c"};
+  MapLayer starts{.label = "starts, 0.3 m off", .colour = "#d62728"};
+  MapLayer lost{.label = "lost", .colour = "#d62728"};
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    (i % 2 == 0 ? forward : back).lines.push_back(positions_of(runs[i].truth));
+    starts.circles.push_back(runs[i].truth.front().position());
+    if (!runs[i].completes()) lost.crosses.push_back(runs[i].truth.back().position());
+  }
+  return {route, forward, back, starts, lost};
 }
 
 }  // namespace panonav

@@ -15,6 +15,7 @@
 #include "panonav/simulation/free_space.hpp"
 #include "panonav/simulation/renderer.hpp"
 #include "panonav/simulation/scene.hpp"
+#include "reporting/plot.hpp"
 
 namespace panonav {
 
@@ -78,5 +79,9 @@ struct RouteRun {
 /// a step.
 [[nodiscard]] RouteRun repeat_route(const RouteScene& place, RouteTracker tracker,
                                     const RouteRunOptions& options, std::uint64_t seed);
+
+/// The route and the robots that repeated it, every second one back, for a map.
+[[nodiscard]] std::vector<MapLayer> route_layers(std::span<const Pose2> way,
+                                                 std::span<const RouteRun> runs);
 
 }  // namespace panonav

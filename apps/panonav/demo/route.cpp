@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "panonav/core/statistics.hpp"
-#include "panonav/geometry/positions.hpp"
 #include "reporting/picture_plot.hpp"
 #include "reporting/plot.hpp"
 
@@ -14,19 +14,11 @@ namespace {
 
 void draw_runs(const FloorPlan& plan, std::span<const Pose2> way, const std::vector<RouteRun>& runs,
                const std::filesystem::path& path) {
-  MapLayer route{.label = "remembered route", .colour = "#000000", .lines = {positions_of(way)}};
-  MapLayer forward{.label = "driven forward", .colour = "#0072b2"};
-  MapLayer back{.label = "driven back", .colour = "#009e73"};
-  MapLayer starts{.label = "starts", .colour = "#e0201b"};
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    (i == 0 ? forward : back).lines.push_back(positions_of(runs[i].truth));
-    starts.circles.push_back(runs[i].truth.front().position());
-  }
-  write_plot(path, MapPlot{.title = "A route through the office, from above: x and y in metres",
-                           .layers = {MapLayer{.label = "furniture",
-                                               .colour = "#999999",
-                                               .filled_polygons = plan.boxes},
-                                      route, forward, back, starts}});
+  MapPlot map{.title = "A route through the office, from above: x and y in metres",
+              .layers = {MapLayer{
+                  .label = "furniture", .colour = "#999999", .filled_polygons = plan.boxes}}};
+  std::ranges::move(route_layers(way, runs), std::back_inserter(map.layers));
+  write_plot(path, map);
 }
 
 void draw_panorama(const RoutePanorama& route, const std::filesystem::path& path) {

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "panonav/simulation/scene.hpp"
+
+namespace panonav {
+
+// What of the folder of recordings and Gazebo worlds (docs/formats.md) is there: any part will do.
+
+/// False, too, when there is no such folder `data`.
+[[nodiscard]] bool has_data(const std::filesystem::path& data, const std::filesystem::path& part);
+/// Of the Gazebo worlds of the experiments those that are there.
+[[nodiscard]] std::vector<std::string> worlds_in(const std::filesystem::path& data);
+/// One of these. Throws FileError.
+[[nodiscard]] Scene read_world(const std::filesystem::path& data, const std::string& name);
+
+}  // namespace panonav
