@@ -127,7 +127,8 @@ TEST(ChainJoin, PlansLeadOverAChain) {
       RobotReport report;
       NavigationDecision decision;
       for (int look = 0; look < 300; ++look) {
-        decision = navigator.observe(two_rooms_signature(islands.world, robot.pose(), noise), report);
+        decision =
+            navigator.observe(two_rooms_signature(islands.world, robot.pose(), noise), report);
         if (decision.state != NavigationState::moving) break;
         report.obstacle = robot.go(decision.direction_rad, decision.advance_m);
       }

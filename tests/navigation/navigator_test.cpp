@@ -399,7 +399,8 @@ TEST(Navigator, SameCallsGiveTheSameDecisions) {
     Random noise(5);
     RobotReport report;
     for (int look = 0; look < 30; ++look) {
-      const auto decision = navigator.observe(two_rooms_signature(world, robot.pose(), noise), report);
+      const auto decision =
+          navigator.observe(two_rooms_signature(world, robot.pose(), noise), report);
       log.push_back(describe(decision));
       report.obstacle = robot.go(decision.direction_rad, decision.advance_m);
     }
@@ -416,17 +417,17 @@ TEST(Navigator, TakesThePlaceOfAnotherEstimate) {
   navigator.set_goal(remembered.memory.views().back());
   Random noise(5);
   const ViewId here = remembered.memory.views()[20];
-  const auto decision = navigator.observe(two_rooms_signature(world, remembered.pose_of(here), noise),
-                                       {.estimate = here});
+  const auto decision = navigator.observe(
+      two_rooms_signature(world, remembered.pose_of(here), noise), {.estimate = here});
   EXPECT_EQ(decision.nearest, here);
   EXPECT_TRUE(std::ranges::find(decision.events, NavigationEvent::relocalised) ==
               decision.events.end());
 }
 
-// What the way to another goal was says nothing of how far a step leads, which tells a robot when it
-// is near enough to its goal for homing.
+// What the way to another goal was says nothing of how far a step leads, which tells a robot when
+// it is near enough to its goal for homing.
 TEST(Navigator, ForgetsTheWayToTheGoalBefore) {
-  const WalledWorld world = two_rooms(2, true);
+  const ToyWorld world = two_rooms(2, true);
   const RememberedWorld remembered(world, high, spacing_m, 2);
   const MemoryViewSource source(remembered.memory);
   const AreaPlanner planner = phase_planner(remembered.memory);
@@ -461,7 +462,8 @@ TEST(Navigator, RefusesWhatItCannotDo) {
   const MemoryViewSource source(remembered.memory);
   Navigator navigator(source, phase_planner(remembered.memory));
   Random noise(1);
-  EXPECT_THROW((void)navigator.observe(two_rooms_signature(world, {1, 1, 0}, noise)), ContractError);
+  EXPECT_THROW((void)navigator.observe(two_rooms_signature(world, {1, 1, 0}, noise)),
+               ContractError);
   EXPECT_THROW(navigator.set_goal(ViewId{99999}), ContractError);
   EXPECT_THROW(Navigator(source, phase_planner(remembered.memory), {.step_m = 0.0}), OptionError);
   EXPECT_THROW(Navigator(source, phase_planner(remembered.memory), {.shortest_leg_m = 0.0}),

@@ -34,7 +34,7 @@ std::optional<std::size_t> AreaViews::area() const noexcept {
 
 void AreaViews::begin(const NavigationGraph& graph, const SubAreas& areas, std::size_t area,
                       Loading& loading) const {
-  loading = {area, {}, 0, {}};
+  loading = {.area = area};
   for (const std::size_t node : nodes_around(graph, areas.nodes.at(area), links_)) {
     loading.views.push_back(graph.view(node));
   }
@@ -44,6 +44,7 @@ void AreaViews::load(Loading& loading, std::size_t most) const {
   const std::size_t count = std::min(most, loading.views.size() - loading.loaded);
   if (count == 0) return;
   loading.parts.push_back(source_->load(std::span(loading.views).subspan(loading.loaded, count)));
+  loading.coefficients.add(loading.parts.back());
   loading.loaded += count;
 }
 
@@ -56,7 +57,6 @@ void AreaViews::enter(const NavigationGraph& graph, const SubAreas& areas, std::
   }
   ahead_ = {};
   load(here_, here_.views.size());
-  std::erase_if(coefficients_, [&](const auto& known) { return !holds(known.first.first); });
 }
 
 void AreaViews::load_ahead(const NavigationGraph& graph, const SubAreas& areas, std::size_t area,
@@ -74,29 +74,20 @@ const VisualMemory* AreaViews::part_of(ViewId view) const {
   return part.contains(view) ? &part : nullptr;
 }
 
-const VisualMemory& AreaViews::require_part_of(ViewId view) const {
+std::optional<CompassReading> AreaViews::turn_against(ViewId view, const SeenView& seen) {
   const VisualMemory* const part = part_of(view);
   require(part != nullptr, "view", static_cast<double>(view.value), "one that is loaded");
-  return *part;
-}
-
-std::optional<CompassReading> AreaViews::turn_against(ViewId view, const SeenView& seen) {
   bytes_read_ += 2 * static_cast<std::uint64_t>(seen.packed.shape.rows) * seen.components;
-  return compass(seen.packed, require_part_of(view).packed(view), {.components = seen.components});
+  return compass(seen.packed, part->packed(view), {.components = seen.components});
 }
 
 const HomingView& AreaViews::view(ViewId view, int components) {
-  const VisualMemory& part = require_part_of(view);
-  const int compared = components == 0 ? part.shape().components : components;
+  const HomingView* const held = here_.coefficients.find(view);
+  require(held != nullptr, "view", static_cast<double>(view.value), "one that is loaded");
   // Magnitudes and phases, a byte each.
-  bytes_read_ += 2 * static_cast<std::uint64_t>(part.shape().rows) * compared;
-  const auto known = coefficients_.find({view, compared});
-  if (known != coefficients_.end()) return known->second;
-  HomingView whole = homing_view(part.signature(view));
-  return coefficients_
-      .try_emplace({view, compared},
-                   components == 0 ? std::move(whole) : first_components(whole, components))
-      .first->second;
+  bytes_read_ += 2 * static_cast<std::uint64_t>(held->rows()) *
+                 (components == 0 ? held->components() : components);
+  return *held;
 }
 
 std::optional<FoundView> AreaViews::nearest(const NavigationGraph& graph,
@@ -148,7 +139,7 @@ std::optional<FoundView> search_everywhere(const ViewSource& source, const Navig
     const SearchResult found =
         memory.search(pack(view, memory.full_scale()), {.top = compared_per_area});
     for (const Match& match : found.matches) {
-      const double difference = image_difference(homing_view(memory.signature(match.view)), seen);
+      const double difference = image_difference(homing_view(memory, match.view), seen);
       if (!best || difference < best->difference) {
         best = {*graph.node_of(match.view), match.dissimilarity, difference};
       }

@@ -3,16 +3,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <optional>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "panonav/memory/view_source.hpp"
 #include "panonav/navigation/navigation_graph.hpp"
 #include "panonav/navigation/sub_areas.hpp"
 #include "panonav/relative_pose/homing_view.hpp"
+#include "panonav/relative_pose/reference_views.hpp"
 #include "panonav/signature/compass.hpp"
 
 namespace panonav {
@@ -58,8 +57,8 @@ class AreaViews {
   /// Throw ContractError on a view that is not loaded.
   /// How far the robot is turned against the view.
   [[nodiscard]] std::optional<CompassReading> turn_against(ViewId view, const SeenView& seen);
-  /// By its first components; 0: all. The coefficients are computed once and kept with the area:
-  /// valid until the next `enter`.
+  /// All its coefficients, computed when it was loaded; compared with a view of fewer components
+  /// only the common ones, `components`, count (0: all). Valid until the next `enter`.
   [[nodiscard]] const HomingView& view(ViewId view, int components = 0);
   /// The least dissimilar of those `nodes` that are loaded; empty when none is. Ties by node.
   [[nodiscard]] std::optional<FoundView> nearest(const NavigationGraph& graph,
@@ -79,19 +78,17 @@ class AreaViews {
     std::vector<ViewId> views;  // ascending
     std::size_t loaded = 0;
     std::vector<VisualMemory> parts;  // ascending, too
+    ReferenceViews coefficients;      // of all parts
   };
   void begin(const NavigationGraph& graph, const SubAreas& areas, std::size_t area,
              Loading& loading) const;
   void load(Loading& loading, std::size_t most) const;
   [[nodiscard]] const VisualMemory* part_of(ViewId view) const;
-  [[nodiscard]] const VisualMemory& require_part_of(ViewId view) const;
 
   const ViewSource* source_;
   int links_;
   Loading here_;
   Loading ahead_;
-  // Of views of `here_`, by view and number of components.
-  std::map<std::pair<ViewId, int>, HomingView> coefficients_;
   std::uint64_t bytes_read_ = 0;
 };
 
