@@ -46,7 +46,7 @@ class KeptModels : public ::testing::Test {
     return file;
   }
   [[nodiscard]] std::filesystem::path path() const { return folder_.path() / "m.panonav"; }
-  test::TemporaryFolder folder_;
+  testing::TemporaryFolder folder_;
 };
 
 TEST_F(KeptModels, ComeBackFromTheFileToTheBit) {

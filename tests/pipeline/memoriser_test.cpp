@@ -40,7 +40,7 @@ class Memorising : public ::testing::Test {
   [[nodiscard]] std::filesystem::path path(std::string_view name = "m.panonav") const {
     return folder_ / name;
   }
-  test::TemporaryFolder folder_;
+  testing::TemporaryFolder folder_;
 };
 
 TEST_F(Memorising, InBatchesOfAnySizeTheSameViewsAreStored) {
