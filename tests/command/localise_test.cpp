@@ -10,6 +10,8 @@
 #include "command_runner.hpp"
 #include "landmark_world.hpp"
 #include "panonav/core/random.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav/pipeline/place_recogniser.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -60,6 +62,30 @@ class Localise : public ::testing::Test {
 TemporaryFolder* Localise::folder_ = nullptr;
 LandmarkWorld* Localise::world_ = nullptr;
 std::vector<Pose2>* Localise::asked_ = nullptr;
+
+TEST_F(Localise, TheLibraryGivesTheCommandsAnswerToTheBit) {
+  const PlaceRecogniser recogniser(memory());
+  const auto told = answers({memory(), asked()});
+  int known = 0;
+  for (std::size_t i = 0; i < told.size(); ++i) {
+    const auto file = std::filesystem::path(asked()) / view_name(i);
+    const Place place = recogniser.localise(read_image(file));
+    EXPECT_EQ(place.known, told[i]["known"].get<bool>());
+    ASSERT_EQ(place.matches.size(), told[i]["matches"].size());
+    for (std::size_t m = 0; m < place.matches.size(); ++m) {
+      EXPECT_EQ(place.matches[m].name, told[i]["matches"][m]["file"]);
+      EXPECT_EQ(place.matches[m].column_difference,
+                told[i]["matches"][m]["column_difference"].get<double>());
+    }
+    EXPECT_EQ(place.bytes_read, told[i]["bytes_read"].get<std::uint64_t>());
+    if (!place.known) continue;
+    ++known;
+    EXPECT_EQ(place.position->x_m, told[i]["position"]["x_m"].get<double>());
+    EXPECT_EQ(place.position->y_m, told[i]["position"]["y_m"].get<double>());
+    EXPECT_EQ(place.heading_rad.value(), told[i]["heading_rad"].get<double>());
+  }
+  EXPECT_GT(known, 10);
+}
 
 TEST_F(Localise, JsonLinesHaveExactlyTheDocumentedFields) {
   const auto all = answers({memory(), asked()});

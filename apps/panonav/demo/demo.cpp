@@ -21,8 +21,9 @@
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/pipeline/memoriser.hpp"
+#include "panonav/pipeline/observation_source.hpp"
 #include "reports/report_page.hpp"
-#include "verbs/memorising.hpp"
 #include "verbs/stored_lattice.hpp"
 
 namespace panonav::command {
@@ -356,12 +357,18 @@ ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
   show_camera(*recordings, out, session, page);
 
   next_part("remembers and localises itself");
-  MemoryFile file = MemoryFile::create(
-      out / "office.panonav", header_from_first_views(recordings->memory_run, SignatureOptions{},
-                                                      PreprocessingOptions{}, session.executor()));
+  {
+    const Dataset& run = recordings->memory_run;
+    Memoriser memoriser(out / "office.panonav", {.source = run.source});
+    DatasetObservations source(run, session.executor());
+    std::vector<Observation> seen;
+    while (auto observation = source.next()) seen.push_back(std::move(*observation));
+    memoriser.add(std::move(seen), session.executor());
+    memoriser.finish(session.executor());
+  }
+  MemoryFile file = MemoryFile::open(out / "office.panonav", Access::read_write);
   const auto pipeline =
       std::make_shared<const ViewEncoder>(file.header(), recordings->memory_run.source);
-  (void)append_views(recordings->memory_run, *pipeline, true, file, session);
   const VisualMemory memory = file.load();
   const Localiser localiser(memory);
   const auto asked = ask(localiser, *pipeline, recordings->query_run, session.executor());
@@ -377,7 +384,7 @@ ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
   next_part("as accurate as needed");
   show_levels(memory, plan, shown_view(asked), wanted.spacing_m(), out, page);
   next_part("tracks itself");
-  done.track = show_track(wanted, *recordings, memory, *pipeline, plan, session, page);
+  done.track = show_track(wanted, *recordings, file, plan, session, page);
   next_part("arranges what it remembers");
   done.maps = show_maps(memory, wanted.seed, wanted.quick, out, session, page);
   store_lattice(done.maps.arranged, memory, file);

@@ -90,16 +90,18 @@ void add_part(const DemoTrack& track, double spacing_m, std::size_t carried_afte
 }  // namespace
 
 DemoTrack show_track(const DemoOptions& options, const DemoRecordings& recordings,
-                     const VisualMemory& memory, const ViewEncoder& pipeline, const FloorPlan& plan,
-                     Session& session, ReportPage& page) {
+                     const MemoryFile& file, const FloorPlan& plan, Session& session,
+                     ReportPage& page) {
   const Dataset& run = recordings.walk_run;
   const OdometryNoise odometry = simulation_of(options, 0).odometry;
-  MonteCarloLocaliser localiser(memory, {.seed = static_cast<int>(options.seed % 1000000000)},
-                                odometry);
+  Tracker tracker(file, {.filter = {.seed = static_cast<int>(options.seed % 1000000000)},
+                         .odometry = odometry,
+                         .source = run.source});
+  const VisualMemory& memory = tracker.memory();
   const std::size_t particles_kept = particles_shown(run.entries.size());
-  const std::vector<Point2> at_first = even_sample(localiser.particles(), particles_kept);
+  const std::vector<Point2> at_first = even_sample(tracker.localiser().particles(), particles_kept);
   std::vector<TrackedImage> images;
-  track(localiser, pipeline, run, {.particles_kept = particles_kept}, session.executor(),
+  track(tracker, run, {.particles_kept = particles_kept}, session.executor(),
         [&](TrackedImage&& image) { images.push_back(std::move(image)); });
   DemoTrack result = outcome_of(images, recordings.carried_after, options.spacing_m());
   const TrackBackground background{

@@ -28,7 +28,7 @@ struct DemoTrack {
 /// Tracks it by Monte-Carlo localisation and adds a part with pictures and an animation to the
 /// page. The same seed gives the same run.
 DemoTrack show_track(const DemoOptions& options, const DemoRecordings& recordings,
-                     const VisualMemory& memory, const ViewEncoder& pipeline, const FloorPlan& plan,
-                     Session& session, ReportPage& page);
+                     const MemoryFile& file, const FloorPlan& plan, Session& session,
+                     ReportPage& page);
 
 }  // namespace panonav::command

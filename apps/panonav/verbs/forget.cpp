@@ -6,8 +6,8 @@
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
-#include "panonav/storage/memory_file.hpp"
-#include "verbs/known_views.hpp"
+#include "panonav/pipeline/known_views.hpp"
+#include "panonav/pipeline/learnt_models.hpp"
 
 namespace panonav::command {
 
@@ -30,6 +30,7 @@ ExitCode forget(const ForgetArguments& wanted, Session& session) {
   }
   forget_recordings(memory);
   memory.remove(std::vector<ViewId>(views.begin(), views.end()));
+  keep_models(memory);
   const auto left = memory.info().views;
   if (session.json()) {
     session.print(

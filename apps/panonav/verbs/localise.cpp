@@ -7,10 +7,9 @@
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
-#include "panonav/localisation/hierarchical.hpp"
-#include "panonav/localisation/localiser.hpp"
-#include "panonav/pipeline/view_encoder.hpp"
-#include "panonav/storage/memory_file.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/pipeline/observation_source.hpp"
+#include "panonav/pipeline/place_recogniser.hpp"
 #include "verbs/recording.hpp"
 
 namespace panonav::command {
@@ -34,24 +33,21 @@ struct LocaliseArguments {
 struct Answer {
   std::string file;
   double turned_rad = 0.0;
-  Localisation localisation;
-  std::vector<LocalisationLevel> levels;  ///< only when asked for
+  Place place;
 };
 
 ordered_json optional_number(const std::optional<double>& value) {
   return value ? ordered_json(*value) : ordered_json();
 }
 
-ordered_json as_json(const Answer& answer, const VisualMemory& memory, bool areas) {
-  const auto& found = answer.localisation;
+ordered_json as_json(const Answer& answer, bool areas) {
+  const Place& found = answer.place;
   auto matches = ordered_json::array();
-  for (const auto& match : found.matches) {
-    const auto& compass = match.compass;
-    matches.push_back(
-        {{"file", memory.info(match.view).name},
-         {"dissimilarity", match.dissimilarity},
-         {"column_difference", match.column_difference},
-         {"heading_rad", compass ? ordered_json(compass->heading_rad) : ordered_json()}});
+  for (const PlaceMatch& match : found.matches) {
+    matches.push_back({{"file", match.name},
+                       {"dissimilarity", match.dissimilarity},
+                       {"column_difference", match.column_difference},
+                       {"heading_rad", optional_number(match.heading_rad)}});
   }
   ordered_json json{{"file", answer.file},
                     {"known", found.known},
@@ -62,13 +58,13 @@ ordered_json as_json(const Answer& answer, const VisualMemory& memory, bool area
                     {"bytes_read", found.bytes_read},
                     {"turned_rad", answer.turned_rad}};
   if (found.position) {
-    json["position"] = {{"x_m", found.position->position.x_m},
-                        {"y_m", found.position->position.y_m},
+    json["position"] = {{"x_m", found.position->x_m},
+                        {"y_m", found.position->y_m},
                         {"radius_m", optional_number(found.position->radius_m)}};
   }
   if (areas) {
     auto levels = ordered_json::array();
-    for (const auto& level : answer.levels) {
+    for (const auto& level : found.areas) {
       levels.push_back(
           {{"components", level.components},
            {"candidates", level.candidates.size()},
@@ -81,26 +77,26 @@ ordered_json as_json(const Answer& answer, const VisualMemory& memory, bool area
   return json;
 }
 
-std::string as_text(const Answer& answer, const VisualMemory& memory, Session& session) {
-  const auto& found = answer.localisation;
+std::string as_text(const Answer& answer, Session& session) {
+  const Place& found = answer.place;
   std::string line = answer.file + "  ";
   if (found.matches.empty()) return line + session.bad("nothing to compare with");
-  const auto& nearest = memory.info(found.matches.front().view).name;
+  const PlaceMatch& nearest = found.matches.front();
   if (!found.known) {
-    return line + session.bad("unknown place") + "  (most alike: " + nearest + ")";
+    return line + session.bad("unknown place") + "  (most alike: " + nearest.name + ")";
   }
-  line += session.good("near " + nearest);
+  line += session.good("near " + nearest.name);
   if (found.position) {
-    line += "  x " + fixed(found.position->position.x_m, 2) + " m  y " +
-            fixed(found.position->position.y_m, 2) + " m";
+    line +=
+        "  x " + fixed(found.position->x_m, 2) + " m  y " + fixed(found.position->y_m, 2) + " m";
     if (found.position->radius_m) line += "  within " + fixed(*found.position->radius_m, 2) + " m";
   }
   if (found.heading_rad) {
     line += "  heading " + fixed(degrees(*found.heading_rad), 1) + " degrees";
-  } else if (const auto& compass = found.matches.front().compass) {
-    line += "  turned " + fixed(degrees(compass->heading_rad), 1) + " degrees from it";
+  } else if (nearest.heading_rad) {
+    line += "  turned " + fixed(degrees(*nearest.heading_rad), 1) + " degrees from it";
   }
-  for (const auto& level : answer.levels) {
+  for (const auto& level : found.areas) {
     line += "\n    " + std::to_string(level.components) +
             (level.components == 1 ? " component: " : " components: ") +
             std::to_string(level.candidates.size()) +
@@ -111,49 +107,22 @@ std::string as_text(const Answer& answer, const VisualMemory& memory, Session& s
   return line;
 }
 
-/// Everything that answers queries, read once.
-class Answerer {
- public:
-  Answerer(const LocaliseArguments& wanted, const MemoryHeader& header, const VisualMemory& memory,
-           const PictureSource& source)
-      : wanted_(wanted),
-        memory_(memory),
-        pipeline_(header, source),
-        localiser_(memory, wanted.localiser) {
-    if (wanted.areas) areas_.emplace(memory);
+Answer answer(const PlaceRecogniser& recogniser, const LocaliseArguments& wanted,
+              const DatasetEntry& entry, std::size_t index) {
+  Answer answer{entry.file, 0.0, {}};
+  Observation seen = read_observation(entry);
+  if (wanted.turn_seed) {
+    const Panorama panorama = recogniser.encoder().panorama(seen);
+    Random random(*wanted.turn_seed, index);
+    const auto columns = static_cast<std::uint64_t>(panorama.columns());
+    const auto turned = static_cast<int>(random.index(columns));
+    seen.picture = turn_columns(panorama, turned);
+    answer.turned_rad = wrap_angle(2.0 * std::numbers::pi * turned / static_cast<double>(columns));
   }
-
-  [[nodiscard]] Answer answer(const DatasetEntry& entry, std::size_t index) const {
-    Answer answer{entry.file, 0.0, {}, {}};
-    auto panorama = pipeline_.read(entry);
-    if (wanted_.turn_seed) {
-      Random random(*wanted_.turn_seed, index);
-      const auto columns = static_cast<std::uint64_t>(panorama.columns());
-      const auto turned = static_cast<int>(random.index(columns));
-      panorama = turn_columns(panorama, turned);
-      answer.turned_rad =
-          wrap_angle(2.0 * std::numbers::pi * turned / static_cast<double>(columns));
-    }
-    const auto query = pipeline_.packed(panorama);
-    std::vector<ViewId> excluded;
-    if (wanted_.exclude_same_file) {
-      if (const auto same = memory_.find(entry.file)) excluded.push_back(*same);
-    }
-    const SearchMask mask{excluded, {}};
-    answer.localisation = localiser_.localise(query, mask);
-    if (areas_) {
-      answer.levels = localise_hierarchically(memory_, *areas_, query, wanted_.accuracy, mask);
-    }
-    return answer;
-  }
-
- private:
-  const LocaliseArguments& wanted_;
-  const VisualMemory& memory_;
-  ViewEncoder pipeline_;
-  Localiser localiser_;
-  std::optional<ReferenceAreas> areas_;
-};
+  answer.place =
+      recogniser.localise(seen, std::span(&entry.file, wanted.exclude_same_file ? 1 : 0));
+  return answer;
+}
 
 void check(const Arguments& arguments, const LocaliseArguments& wanted,
            const MemoryHeader& header) {
@@ -168,10 +137,11 @@ void check(const Arguments& arguments, const LocaliseArguments& wanted,
 ExitCode localise(const Arguments& arguments, const LocaliseArguments& wanted, Session& session) {
   const auto file = MemoryFile::open(wanted.memory, Access::read_only);
   check(arguments, wanted, file.header());
-  const auto memory = file.load();
-  if (memory.empty()) throw FileError(wanted.memory, "holds no view; memorise a recording first");
   const auto recording = open_recording(wanted.input, wanted.pictures, file.header().source);
-  const Answerer answerer(wanted, file.header(), memory, recording.source);
+  const PlaceRecogniser recogniser(
+      file, {.localiser = wanted.localiser,
+             .source = recording.source,
+             .areas = wanted.areas ? std::optional(wanted.accuracy) : std::nullopt});
 
   const std::size_t total = recording.entries.size();
   Progress progress("localising", total);
@@ -181,13 +151,13 @@ ExitCode localise(const Arguments& arguments, const LocaliseArguments& wanted, S
     const std::size_t count = std::min(batch, total - begin);
     std::vector<std::optional<Answer>> answers(count);
     for_each_entry(session.executor(), count, [&](std::size_t i) {
-      answers[i] = answerer.answer(recording.entries[begin + i], begin + i);
+      answers[i] = answer(recogniser, wanted, recording.entries[begin + i], begin + i);
     });
     progress.clear();
-    for (const auto& answer : answers) {
-      known += answer->localisation.known ? 1 : 0;
-      session.print(session.json() ? as_json(*answer, memory, wanted.areas).dump()
-                                   : as_text(*answer, memory, session));
+    for (const auto& given : answers) {
+      known += given->place.known ? 1 : 0;
+      session.print(session.json() ? as_json(*given, wanted.areas).dump()
+                                   : as_text(*given, session));
     }
     progress.advance(count);
   }

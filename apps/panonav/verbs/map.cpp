@@ -8,7 +8,8 @@
 #include "panonav/core/error.hpp"
 #include "panonav/io/graph_file.hpp"
 #include "panonav/io/trajectory_file.hpp"
-#include "verbs/known_views.hpp"
+#include "panonav/pipeline/known_views.hpp"
+#include "panonav/pipeline/learnt_models.hpp"
 #include "verbs/mapped_run.hpp"
 #include "verbs/memorising.hpp"
 #include "verbs/recording.hpp"
@@ -178,11 +179,12 @@ ExitCode map(const Arguments& arguments, const MapArguments& wanted, Session& se
                                                                        {}, session.executor()));
   }
   const ViewEncoder pipeline(memory->header(), recording.source);
-  if (there) check_known_views(recording, *memory, pipeline, session);
+  if (there) check_known_views(recording, *memory, pipeline, session.executor());
   MapSettings settings = wanted.settings;
   settings.thumbnails = !wanted.no_thumbnails;
   const MappedRun run = map_recording(recording, pipeline, settings, *memory, session);
   store(recording, run, *memory);
+  keep_models(*memory);
   if (wanted.tum) write_trajectory(*wanted.tum, trajectory_of(recording, run, wanted.dataset));
   if (wanted.graph) {
     write_graph(*wanted.graph, run.map, [&](ViewId view) {

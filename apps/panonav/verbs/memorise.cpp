@@ -1,14 +1,15 @@
+#include <exception>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <vector>
 
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
-#include "panonav/pipeline/view_encoder.hpp"
-#include "panonav/storage/memory_file.hpp"
-#include "verbs/known_views.hpp"
-#include "verbs/memorising.hpp"
+#include "panonav/pipeline/known_views.hpp"
+#include "panonav/pipeline/memoriser.hpp"
+#include "panonav/pipeline/observation_source.hpp"
 #include "verbs/recording.hpp"
 
 namespace panonav::command {
@@ -54,39 +55,74 @@ void check_same_options(const Arguments& arguments, const MemoriseArguments& wan
   }
 }
 
+/// Appends what is missing; notes which recording it is of as soon as there is a file.
+void add_all(const Dataset& missing, const Dataset& recording, Memoriser& memoriser,
+             Session& session) {
+  bool noted = false;
+  const auto note = [&] {
+    if (!noted && memoriser.file() != nullptr) remember_recording(recording, *memoriser.file());
+    noted = memoriser.file() != nullptr;
+  };
+  note();
+  Progress progress("memorising", missing.entries.size());
+  DatasetObservations source(missing, session.executor());
+  std::exception_ptr failure;
+  while (!failure) {
+    std::vector<Observation> batch;
+    try {
+      while (batch.size() < DatasetObservations::decoded_ahead) {
+        auto observation = source.next();
+        if (!observation) break;
+        batch.push_back(std::move(*observation));
+      }
+    } catch (const Error&) {
+      failure = std::current_exception();  // what comes before it is memorised
+    }
+    if (batch.empty()) break;
+    progress.advance(batch.size());
+    memoriser.add(std::move(batch), session.executor());
+    note();
+  }
+  if (failure) std::rethrow_exception(failure);
+}
+
 ExitCode memorise(const Arguments& arguments, const MemoriseArguments& wanted, Session& session) {
   const bool resumes = fs::exists(wanted.memory);
-  std::optional<MemoryFile> memory;
-  if (resumes) memory = MemoryFile::open(wanted.memory, Access::read_write);
-  const auto recording =
-      open_recording(wanted.input, wanted.pictures,
-                     memory ? std::optional(memory->header().source) : std::nullopt);
-  if (memory) {
-    check_same_options(arguments, wanted, *memory);
-  } else {
-    memory = MemoryFile::create(
-        wanted.memory, header_from_first_views(recording, wanted.signature, wanted.preprocessing,
-                                               session.executor()));
+  std::optional<PictureSource> remembered;
+  if (resumes) remembered = MemoryFile::open(wanted.memory, Access::read_write).header().source;
+  const auto recording = open_recording(wanted.input, wanted.pictures, remembered);
+  Memoriser memoriser(wanted.memory, {.source = recording.source,
+                                      .signature = wanted.signature,
+                                      .preprocessing = wanted.preprocessing,
+                                      .thumbnails = !wanted.no_thumbnails});
+  Dataset missing = recording;
+  if (resumes) {
+    check_same_options(arguments, wanted, *memoriser.file());
+    Progress comparing("comparing", recording.entries.size());
+    check_known_views(recording, *memoriser.file(), *memoriser.encoder(), session.executor(),
+                      [&](std::size_t compared) { comparing.advance(compared); });
+    std::erase_if(missing.entries, [&](const DatasetEntry& entry) {
+      return memoriser.file()->find(entry.file).has_value();
+    });
   }
-  const ViewEncoder pipeline(memory->header(), recording.source);
-  if (resumes) check_known_views(recording, *memory, pipeline, session);
-  remember_recording(recording, *memory);
-  const auto counts = append_views(recording, pipeline, !wanted.no_thumbnails, *memory, session);
+  const std::size_t known_before = recording.entries.size() - missing.entries.size();
+  add_all(missing, recording, memoriser, session);
+  const auto counts = memoriser.finish(session.executor());
+  const MemoryFile* const memory = memoriser.file();
   const auto info = memory->info();
   if (session.json()) {
     session.print(nlohmann::ordered_json{{"memory", wanted.memory},
                                          {"appended", counts.appended},
-                                         {"known_before", counts.known_before},
+                                         {"known_before", known_before},
                                          {"views", info.views},
                                          {"file_bytes", info.file_bytes}}
                       .dump());
     return ExitCode::done;
   }
-  session.print(session.strong(std::to_string(counts.appended)) + " views memorised" +
-                (counts.known_before > 0
-                     ? ", " + std::to_string(counts.known_before) + " were known before"
-                     : "") +
-                "; " + wanted.memory + " holds " + std::to_string(info.views));
+  session.print(
+      session.strong(std::to_string(counts.appended)) + " views memorised" +
+      (known_before > 0 ? ", " + std::to_string(known_before) + " were known before" : "") + "; " +
+      wanted.memory + " holds " + std::to_string(info.views));
   if (!memory->header().elevations) {
     session.print(
         "The pictures' elevations are not known: every row is treated as on the horizon.");

@@ -16,15 +16,4 @@ namespace panonav::command {
                                                    const PreprocessingOptions& preprocessing,
                                                    Executor& executor);
 
-struct AppendCounts {
-  std::size_t appended = 0;
-  std::size_t known_before = 0;
-};
-
-/// Appends the views whose names the memory does not know. Signatures are computed side by side,
-/// appended one by one in the order of the recording; what was appended stays, whatever happens
-/// later. Throws FileError.
-AppendCounts append_views(const Dataset& recording, const ViewEncoder& pipeline, bool thumbnails,
-                          MemoryFile& memory, Session& session);
-
 }  // namespace panonav::command

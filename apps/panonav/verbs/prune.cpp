@@ -7,8 +7,8 @@
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/mapping/sparse_memory.hpp"
-#include "panonav/storage/memory_file.hpp"
-#include "verbs/known_views.hpp"
+#include "panonav/pipeline/known_views.hpp"
+#include "panonav/pipeline/learnt_models.hpp"
 
 namespace panonav::command {
 
@@ -49,6 +49,7 @@ ExitCode prune(const PruneArguments& wanted, Session& session) {
     file.remove(dropped);
     file.link(contract_links(memory.links(), selection));
     for (const auto& [name, map] : maps) file.save_map(name, map);
+    keep_models(file);
   }
   const double factor = selection.kept.empty() ? 1.0
                                                : static_cast<double>(memory.size()) /

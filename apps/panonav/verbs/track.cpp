@@ -11,8 +11,6 @@
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/trajectory_file.hpp"
-#include "panonav/pipeline/view_encoder.hpp"
-#include "panonav/storage/memory_file.hpp"
 #include "verbs/tracked_run.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES
 #include "reports/report_page.hpp"
@@ -118,28 +116,14 @@ std::vector<double> seconds_of(const Dataset& run, const TrackArguments& wanted,
   return seconds;
 }
 
-MonteCarloLocaliser make_localiser(const VisualMemory& memory, const TrackArguments& wanted) {
-  int posed = 0;
-  for (const ViewId view : memory.views()) posed += memory.info(view).pose ? 1 : 0;
-  if (posed < ObservationModel::least_views) {
-    throw FileError(wanted.memory, "holds " + std::to_string(posed) +
-                                       " views with a position; allowed: " +
-                                       std::to_string(ObservationModel::least_views) +
-                                       " or more; memorise a data set whose table has the columns "
-                                       "'x_m' and 'y_m'");
-  }
-  try {
-    MonteCarloLocaliser localiser(memory, wanted.filter, wanted.odometry);
-    const auto heading_rad = [&] { return wrap_angle(radians(*wanted.start_heading_deg)); };
-    if (wanted.start_x_m) {
-      localiser.start_at({*wanted.start_x_m, *wanted.start_y_m, heading_rad()},
-                         wanted.start.deviation_m, radians(wanted.start.heading_deviation_deg));
-    } else if (wanted.start_heading_deg) {
-      localiser.start_anywhere(heading_rad());
-    }
-    return localiser;
-  } catch (const ContractError& error) {  // the views are all in one place
-    throw FileError(wanted.memory, error.what());
+void start(Tracker& tracker, const TrackArguments& wanted) {
+  if (!wanted.start_heading_deg) return;
+  const double heading_rad = wrap_angle(radians(*wanted.start_heading_deg));
+  if (wanted.start_x_m) {
+    tracker.start_at({*wanted.start_x_m, *wanted.start_y_m, heading_rad}, wanted.start.deviation_m,
+                     radians(wanted.start.heading_deviation_deg));
+  } else {
+    tracker.start_anywhere(heading_rad);
   }
 }
 
@@ -243,12 +227,11 @@ void print_summary(const TrackSummary& summary, Session& session) {
 ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Session& session) {
   check(arguments, wanted);
   const auto file = MemoryFile::open(wanted.memory, Access::read_only);
-  const auto memory = file.load();
   const Dataset run = read_run(wanted.dataset);
-  const ViewEncoder pipeline(file.header(), run.source);
   std::vector<double> seconds;
   if (wanted.tum) seconds = seconds_of(run, wanted, session);
-  MonteCarloLocaliser localiser = make_localiser(memory, wanted);
+  Tracker tracker(file, {wanted.filter, wanted.odometry, run.source});
+  start(tracker, wanted);
   TrackSettings settings{.every = wanted.every};
 #ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) {
@@ -259,7 +242,7 @@ ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Ses
 
   std::vector<TrackedImage> images;
   Progress progress("tracking", (run.entries.size() - 1) / settings.every + 1);
-  track(localiser, pipeline, run, settings, session.executor(), [&](TrackedImage&& image) {
+  track(tracker, run, settings, session.executor(), [&](TrackedImage&& image) {
     progress.clear();
     session.print(session.json() ? as_json(image).dump() : as_text(image, session));
     images.push_back(std::move(image));
@@ -278,7 +261,8 @@ ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Ses
   if (!session.json()) print_summary(summary, session);
 #ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) {
-    write_track_report(*wanted.report, memory, localiser.model().spacing_m, images, summary);
+    write_track_report(*wanted.report, tracker.memory(), tracker.localiser().model().spacing_m,
+                       images, summary);
     tell_report(*wanted.report, session);
   }
 #endif

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "panonav/geometry/angles.hpp"
+#include "panonav/pipeline/observation_source.hpp"
 
 namespace panonav::command {
 
@@ -64,8 +65,7 @@ std::vector<Point2> even_sample(const Particles& particles, std::size_t count) {
   return sample;
 }
 
-void track(MonteCarloLocaliser& localiser, const ViewEncoder& pipeline, const Dataset& run,
-           const TrackSettings& settings, Executor& executor,
+void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, Executor& executor,
            const std::function<void(TrackedImage&&)>& report) {
   const auto& entries = run.entries;
   const auto every = static_cast<std::size_t>(settings.every);
@@ -75,17 +75,17 @@ void track(MonteCarloLocaliser& localiser, const ViewEncoder& pipeline, const Da
     const std::size_t count = std::min(batch, looked_at - begin);
     std::vector<std::optional<PackedSignature>> signatures(count);
     for_each_entry(executor, count, [&](std::size_t i) {
-      signatures[i] = pipeline.packed(pipeline.read(entries[(begin + i) * every]));
+      signatures[i] = tracker.encoder().packed(read_observation(entries[(begin + i) * every]));
     });
     for (std::size_t i = 0; i < count; ++i) {
       const std::size_t index = (begin + i) * every;
-      for (std::size_t e = index + 1 - std::min(index, every); e <= index; ++e) {
-        localiser.move(inverse(*entries[e - 1].odometry) * *entries[e].odometry);
+      for (std::size_t e = index - std::min(index, every - 1); e <= index; ++e) {
+        tracker.move_to(*entries[e].odometry);
       }
       const DatasetEntry& entry = entries[index];
       TrackedImage image{
-          index, entry.file, entry.stamp_s, entry.pose, localiser.observe(*signatures[i]), {}};
-      image.particles = even_sample(localiser.particles(), settings.particles_kept);
+          index, entry.file, entry.stamp_s, entry.pose, tracker.observe(*signatures[i]), {}};
+      image.particles = even_sample(tracker.localiser().particles(), settings.particles_kept);
       report(std::move(image));
     }
   }

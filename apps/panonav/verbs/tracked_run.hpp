@@ -10,7 +10,7 @@
 #include "panonav/io/dataset.hpp"
 #include "panonav/localisation/monte_carlo.hpp"
 #include "panonav/memory/visual_memory.hpp"
-#include "panonav/pipeline/view_encoder.hpp"
+#include "panonav/pipeline/tracker.hpp"
 
 namespace panonav::command {
 
@@ -49,8 +49,7 @@ struct TrackSettings {
 /// looks at every `settings.every`-th picture, the first one included. Signatures are computed on
 /// all threads, the filter runs in order; the same on any number of threads. `report` is called
 /// after each image, in order. Throws FileError on a picture that cannot be read.
-void track(MonteCarloLocaliser& localiser, const ViewEncoder& pipeline, const Dataset& run,
-           const TrackSettings& settings, Executor& executor,
+void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, Executor& executor,
            const std::function<void(TrackedImage&&)>& report);
 
 /// `count` positions drawn evenly by weight; all of them where there are fewer. No randomness.

@@ -104,11 +104,12 @@ Localiser::Localiser(const VisualMemory& memory, std::shared_ptr<const ColumnRan
       position_model_(learn_position_model(*ranking_)) {}
 
 Localiser::Localiser(const VisualMemory& memory, const PlaceModel& place_model,
-                     const PositionModel& position_model, const LocaliserOptions& options)
+                     const PositionModel& position_model, const LocaliserOptions& options,
+                     std::optional<double> spacing_m)
     : memory_(&memory),
       options_(options),
       ranking_(ranking_of(memory, options)),
-      support_(*ranking_),
+      support_(*ranking_, spacing_m),
       place_model_(place_model),
       position_model_(position_model) {
   require(position_model_.components == options_.components, "components of the position model",

@@ -62,10 +62,11 @@ class Localiser {
   /// ContractError on more components than the memory's. Cost: about 200 searches, and 0.2 s for
   /// comparing columns, at most.
   explicit Localiser(const VisualMemory& memory, const LocaliserOptions& options = {});
-  /// With models learnt before. Throws ContractError when the position model was learnt over other
-  /// components.
+  /// With models learnt before; `spacing_m`: that of the support, where it is known. Throws
+  /// ContractError when the position model was learnt over other components.
   Localiser(const VisualMemory& memory, const PlaceModel& place_model,
-            const PositionModel& position_model, const LocaliserOptions& options = {});
+            const PositionModel& position_model, const LocaliserOptions& options = {},
+            std::optional<double> spacing_m = std::nullopt);
 
   [[nodiscard]] const PlaceModel& place_model() const noexcept { return place_model_; }
   [[nodiscard]] const PositionModel& position_model() const noexcept { return position_model_; }

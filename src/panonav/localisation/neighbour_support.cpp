@@ -23,7 +23,8 @@ constexpr double heading_tolerance_rad = radians(20.0);
 
 }  // namespace
 
-NeighbourSupport::NeighbourSupport(const ColumnRanking& ranking) : ranking_(&ranking) {
+NeighbourSupport::NeighbourSupport(const ColumnRanking& ranking, std::optional<double> spacing_m)
+    : ranking_(&ranking) {
   std::vector<Point2> positions;
   std::vector<ViewId> views;
   for (const ViewId view : ranking.memory().views()) {
@@ -33,7 +34,8 @@ NeighbourSupport::NeighbourSupport(const ColumnRanking& ranking) : ranking_(&ran
     }
   }
   if (positions.size() < 2) return;
-  radius_m_ = spacings * VoronoiCells(positions).spacing_m();
+  spacing_m_ = spacing_m ? *spacing_m : VoronoiCells(positions).spacing_m();
+  radius_m_ = spacings * spacing_m_;
   if (!(radius_m_ > 0.0)) return;
   for (std::size_t i = 0; i < views.size(); ++i) {
     const auto [x, y] = cell_of(positions[i]);

@@ -16,8 +16,12 @@ namespace panonav {
 class NeighbourSupport {
  public:
   /// Neighbours are the 8 nearest references within 1.5 spacings of the memory. The ranking must
-  /// outlive *this.
-  explicit NeighbourSupport(const ColumnRanking& ranking);
+  /// outlive *this. `spacing_m`: what `spacing_m()` gave for the same views.
+  explicit NeighbourSupport(const ColumnRanking& ranking,
+                            std::optional<double> spacing_m = std::nullopt);
+
+  /// Between references with headings; 0 where there are fewer than two.
+  [[nodiscard]] double spacing_m() const noexcept { return spacing_m_; }
 
   /// Ascending by distance; empty for a view without a position or heading.
   [[nodiscard]] std::vector<ViewId> neighbours(ViewId view) const;
@@ -44,6 +48,7 @@ class NeighbourSupport {
   [[nodiscard]] std::pair<std::int64_t, std::int64_t> cell_of(Point2 position) const;
 
   const ColumnRanking* ranking_;
+  double spacing_m_ = 0.0;
   double radius_m_ = 0.0;
   std::vector<Site> sites_;  ///< ascending by cell, then view
 };

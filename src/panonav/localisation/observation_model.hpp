@@ -37,6 +37,7 @@ struct ObservationModel {
                                          ///< best reference (`PlaceModel::threshold`)
   double neighbouring_difference = 0.4;  ///< expected between references one spacing apart
   int sampled_views = 0;
+  friend bool operator==(const ObservationModel&, const ObservationModel&) = default;
 };
 
 /// Throws OptionError, and ContractError on a memory with fewer than `least_views` posed views or

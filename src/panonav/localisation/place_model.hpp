@@ -39,6 +39,7 @@ struct PlaceModel {
   /// Nine of ten views differ by no more from the one taken nearest to them; empty where fewer than
   /// `least_views` of the sampled views have a position.
   std::optional<double> beside;
+  friend bool operator==(const PlaceModel&, const PlaceModel&) = default;
 };
 
 /// Learns the criterion from the memory itself; no other scene and no label is needed.

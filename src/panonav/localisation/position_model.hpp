@@ -37,6 +37,7 @@ struct PositionModel {
   double radius_m_per_deviation = 0.0;  ///< radius that holds 95 % over the kriging deviation
   double median_error_m = 0.0;          ///< of the views left out
   double error95_m = 0.0;               ///< 95 % of the views left out were nearer
+  friend bool operator==(const PositionModel&, const PositionModel&) = default;
 };
 
 /// Learns the neighbourhood and the exponent that place the views of the memory best when each is

@@ -1,9 +1,11 @@
 #include "panonav/memory/visual_memory.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <deque>
 #include <limits>
+#include <mutex>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -46,7 +48,7 @@ struct VisualMemory::Implementation {
         full_scale(other.full_scale),
         elevations(other.elevations),
         store(other.store),
-        index(other.index),
+        index(other.searched().index),
         records(other.records),
         views(other.views),
         rows(other.rows),
@@ -76,15 +78,27 @@ struct VisualMemory::Implementation {
   void require_view(ViewId view) const { static_cast<void>(position(view)); }
   [[nodiscard]] Row row(ViewId view) const { return rows[position(view)]; }
 
+  /// What is searched; rows that came since the last search are indexed first, all at once.
   [[nodiscard]] SearchedViews searched() const {
+    index_rows();
     return {shape, store, index, views, rows, view_of_row};
+  }
+  void index_rows() const {
+    if (all_indexed.load(std::memory_order_acquire)) return;
+    const std::lock_guard lock(indexing);
+    index.insert(store, not_indexed);
+    not_indexed.clear();
+    all_indexed.store(true, std::memory_order_release);
   }
 
   SignatureShape shape;
   float full_scale;
   std::optional<ElevationBand> elevations;
   ViewStore store;
-  SketchIndex index;
+  mutable SketchIndex index;
+  mutable std::vector<Row> not_indexed;  // in the order of appending
+  mutable std::atomic<bool> all_indexed = true;
+  mutable std::mutex indexing;
   std::deque<ReferenceInfo>
       records;                // by row of the store; a deque, so that names stay where they are
   std::vector<ViewId> views;  // ascending
@@ -166,7 +180,8 @@ void VisualMemory::append_as(ViewId id, const PackedSignature& signature, Refere
   memory.names.emplace(memory.records[row].name, id);
   memory.views.push_back(id);
   memory.rows.push_back(row);
-  memory.index.insert(memory.store, row);
+  memory.not_indexed.push_back(row);
+  memory.all_indexed.store(false, std::memory_order_relaxed);
   memory.next_id = std::uint64_t{id.value} + 1;
 }
 
@@ -177,6 +192,7 @@ void VisualMemory::remove(ViewId view) {
   memory.links.erase_all_of(view);
   memory.names.erase(memory.records[row].name);
   memory.records[row] = {};
+  memory.index_rows();
   memory.index.erase(row);
   memory.store.free(row);
   memory.views.erase(memory.views.begin() + static_cast<std::ptrdiff_t>(position));

@@ -10,6 +10,7 @@ namespace panonav {
 namespace {
 
 constexpr std::size_t group_bytes = 8;
+constexpr std::size_t enough_to_learn = 64;
 constexpr std::int32_t no_slack = -static_cast<std::int32_t>(SketchIndex::no_view);
 
 std::size_t groups_of(std::size_t dimensions) {
@@ -212,8 +213,7 @@ void SketchIndex::learn(Segment& segment, std::size_t first_row, const ViewStore
   segment.outside = 0;
 }
 
-void SketchIndex::insert(const ViewStore& store, Row row) {
-  if (!layout_.any()) return;
+SketchIndex::Segment& SketchIndex::segment_of(Row row) {
   const std::size_t number = row / rows_per_segment;
   const std::size_t place = row % rows_per_segment;
   if (number == segments_.size()) segments_.push_back(make_segment());
@@ -226,6 +226,13 @@ void SketchIndex::insert(const ViewStore& store, Row row) {
     segment.fine.slacks.resize(layout_.fine_blocks > 0 ? rows : 0, no_slack);
   }
   rows_end_ = std::max(rows_end_, std::size_t{row} + 1);
+  return segment;
+}
+
+void SketchIndex::insert(const ViewStore& store, Row row) {
+  if (!layout_.any()) return;
+  const std::size_t place = row % rows_per_segment;
+  Segment& segment = segment_of(row);
 
   BlockSums sums;
   layout_.sum_blocks(store.magnitudes(row), sums);
@@ -233,10 +240,30 @@ void SketchIndex::insert(const ViewStore& store, Row row) {
   ++segment.used;
   // A scale that was learnt from fewer views is never too wide, so only those outside call for
   // another.
-  constexpr std::size_t enough_to_learn = 64;
   const bool first = segment.learnt_from == 0 && segment.used >= enough_to_learn;
   const bool drifted = segment.learnt_from > 0 && segment.outside >= 8 + segment.used / 8;
-  if (first || drifted) learn(segment, number * rows_per_segment, store);
+  if (first || drifted) learn(segment, row - place, store);
+}
+
+void SketchIndex::insert(const ViewStore& store, std::span<const Row> rows) {
+  if (!layout_.any()) return;
+  while (!rows.empty()) {
+    const std::size_t number = rows.front() / rows_per_segment;
+    const auto end =
+        std::ranges::find_if(rows, [number](Row row) { return row / rows_per_segment != number; });
+    const auto here = rows.first(static_cast<std::size_t>(end - rows.begin()));
+    rows = rows.subspan(here.size());
+    if (here.size() < enough_to_learn) {
+      for (const Row row : here) insert(store, row);
+      continue;
+    }
+    for (const Row row : here) {
+      Segment& segment = segment_of(row);
+      segment.coarse.slacks[row % rows_per_segment] = 0;  // there, to be encoded
+      ++segment.used;
+    }
+    learn(segments_[number], number * rows_per_segment, store);
+  }
 }
 
 void SketchIndex::erase(Row row) {

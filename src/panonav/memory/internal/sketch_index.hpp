@@ -84,6 +84,9 @@ class SketchIndex {
 
   /// Row `row` of the store holds a new view. Rows beyond the last come one by one.
   void insert(const ViewStore& store, Row row);
+  /// The same for many rows at once: each segment's scale is learnt once, from all of
+  /// its rows.
+  void insert(const ViewStore& store, std::span<const Row> rows);
   void erase(Row row);
 
   /// What does not depend on the segment: the query's block sums, and which of them count.
@@ -145,6 +148,8 @@ class SketchIndex {
   };
 
   [[nodiscard]] Segment make_segment() const;
+  /// Makes room for the row.
+  Segment& segment_of(Row row);
   /// Whether all sums lay within the scales.
   bool encode(Segment& segment, std::size_t place, const BlockSums& sums) const;
   void learn(Segment& segment, std::size_t first_row, const ViewStore& store) const;

@@ -1,4 +1,4 @@
-#include "verbs/known_views.hpp"
+#include "panonav/pipeline/known_views.hpp"
 
 #include <algorithm>
 #include <cstdlib>
@@ -11,10 +11,11 @@
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/pipeline/observation_source.hpp"
 #include "panonav/storage/checksum.hpp"
 #include "panonav/storage/memory_header.hpp"
 
-namespace panonav::command {
+namespace panonav {
 
 namespace {
 
@@ -80,27 +81,11 @@ bool met_before(const MemoryFile& memory, const std::string& mark) {
   return false;
 }
 
-/// Equal but for rounding: another processor's instructions may round a value the other way. The
-/// phase of a magnitude near 0 is rounding itself.
-bool same_picture(const PackedSignature& a, const PackedSignature& b) {
-  constexpr int clear_magnitude = 8;
-  for (std::size_t i = 0; i < a.magnitudes.size(); ++i) {
-    if (std::abs(a.magnitudes[i] - b.magnitudes[i]) > 1) return false;
-    if (a.magnitudes[i] < clear_magnitude) continue;
-    const int steps = std::abs(a.phases[i] - b.phases[i]);
-    if (std::min(steps, 256 - steps) > 1) return false;
-  }
-  return true;
-}
-
 }  // namespace
 
 void check_known_views(const Dataset& recording, const MemoryFile& memory,
-                       const ViewEncoder& pipeline, Session& session) {
-  const auto refuse = [&](const DatasetEntry& entry, const std::string& what) {
-    throw FileError(memory.path().string(),
-                    "holds " + what + " " + entry.file + "; names must be unique within a memory");
-  };
+                       const ViewEncoder& encoder, Executor& executor,
+                       const std::function<void(std::size_t)>& compared) {
   const VisualMemory views = memory.load();
   std::vector<const DatasetEntry*> known;
   for (const auto& entry : recording.entries) {
@@ -109,26 +94,26 @@ void check_known_views(const Dataset& recording, const MemoryFile& memory,
     known.push_back(&entry);
     const auto& info = views.info(*view);
     if (info.pose != entry.pose || info.stamp_s != entry.stamp_s) {
-      refuse(entry, "a view with another pose or stamp under the name");
+      refuse_known_view(memory.path(), entry.file,
+                        "a view with another pose or stamp under the name");
     }
   }
   if (known.empty() || met_before(memory, fingerprint(recording, memory))) return;
 
-  Progress progress("comparing", known.size());
   constexpr std::size_t batch = 32;
   for (std::size_t begin = 0; begin < known.size(); begin += batch) {
     const std::size_t count = std::min(batch, known.size() - begin);
     std::vector<std::optional<PackedSignature>> seen(count);
-    for_each_entry(session.executor(), count, [&](std::size_t i) {
-      seen[i] = pipeline.packed(pipeline.read(*known[begin + i]));
+    for_each_entry(executor, count, [&](std::size_t i) {
+      seen[i] = encoder.packed(read_observation(*known[begin + i]));
     });
     for (std::size_t i = 0; i < count; ++i) {
       const auto& entry = *known[begin + i];
-      if (!same_picture(*seen[i], views.packed(*views.find(entry.file)))) {
-        refuse(entry, "another picture under the name");
+      if (!is_same_picture(*seen[i], views.packed(*views.find(entry.file)))) {
+        refuse_known_view(memory.path(), entry.file, "another picture under the name");
       }
     }
-    progress.advance(count);
+    if (compared) compared(count);
   }
 }
 
@@ -143,4 +128,21 @@ void forget_recordings(MemoryFile& memory) {
   if (memory.parameter(recordings_parameter)) memory.set_parameter(recordings_parameter, "");
 }
 
-}  // namespace panonav::command
+bool is_same_picture(const PackedSignature& a, const PackedSignature& b) {
+  constexpr int clear_magnitude = 8;  // the phase of a magnitude near 0 is rounding itself
+  for (std::size_t i = 0; i < a.magnitudes.size(); ++i) {
+    if (std::abs(a.magnitudes[i] - b.magnitudes[i]) > 1) return false;
+    if (a.magnitudes[i] < clear_magnitude) continue;
+    const int steps = std::abs(a.phases[i] - b.phases[i]);
+    if (std::min(steps, 256 - steps) > 1) return false;
+  }
+  return true;
+}
+
+void refuse_known_view(const std::filesystem::path& memory, const std::string& name,
+                       const std::string& what) {
+  throw FileError(memory.string(),
+                  "holds " + what + " " + name + "; names must be unique within a memory");
+}
+
+}  // namespace panonav

@@ -1,22 +1,26 @@
 #pragma once
 
+#include <cstddef>
+#include <filesystem>
+#include <functional>
 #include <string>
 
-#include "cli/session.hpp"
+#include "panonav/core/executor.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/storage/memory_file.hpp"
 
-namespace panonav::command {
+namespace panonav {
 
 /// Names that the memory knows must mean the same views: two recordings with the same file names
 /// must not be mixed. Poses and stamps of all known views are compared. So are their pictures,
 /// unless the memory met this very recording before: same names, poses, sizes and times of change
 /// of all files. Throws FileError at the first view that differs, or whose picture cannot be read.
 /// Cost: one look at each file; for a recording that was changed or copied since, as much
-/// computing as memorising the views that are known.
+/// computing as memorising the views that are known; `compared` hears of each few of them.
 void check_known_views(const Dataset& recording, const MemoryFile& memory,
-                       const ViewEncoder& pipeline, Session& session);
+                       const ViewEncoder& encoder, Executor& executor,
+                       const std::function<void(std::size_t)>& compared = {});
 
 /// Notes that all views of the recording that the memory knows are the recording's, or will be.
 void remember_recording(const Dataset& recording, MemoryFile& memory);
@@ -24,4 +28,11 @@ void remember_recording(const Dataset& recording, MemoryFile& memory);
 /// A view that was dropped may come back from another recording, so no recording counts as met.
 void forget_recordings(MemoryFile& memory);
 
-}  // namespace panonav::command
+/// Equal but for rounding: another processor's instructions may round a value the other way.
+[[nodiscard]] bool is_same_picture(const PackedSignature& a, const PackedSignature& b);
+
+/// Throws the FileError for a name that the memory holds with another view.
+[[noreturn]] void refuse_known_view(const std::filesystem::path& memory, const std::string& name,
+                                    const std::string& what);
+
+}  // namespace panonav

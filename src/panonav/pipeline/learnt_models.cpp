@@ -1,0 +1,172 @@
+#include "panonav/pipeline/learnt_models.hpp"
+
+#include <array>
+#include <cmath>
+#include <concepts>
+#include <cstdio>
+#include <cstdlib>
+#include <sstream>
+#include <string>
+#include <string_view>
+
+#include "panonav/core/error.hpp"
+#include "panonav/localisation/neighbour_support.hpp"
+#include "panonav/storage/checksum.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr const char* parameter_name = "learnt models";
+/// Counts up when what is learnt changes, so that models of an older version are not used.
+constexpr std::string_view learning_version = "1";
+
+// The members of each model in the order in which they are kept.
+template <class Model, class Visit>
+requires std::same_as<std::remove_const_t<Model>, PlaceModel>
+void visit_members(Model& m, const Visit& visit) {
+  visit(m.threshold), visit(m.learnt), visit(m.sampled_views), visit(m.neighbouring);
+  visit(m.arbitrary), visit(m.mirrored), visit(m.beside);
+}
+template <class Model, class Visit>
+requires std::same_as<std::remove_const_t<Model>, PositionModel>
+void visit_members(Model& m, const Visit& visit) {
+  visit(m.learnt), visit(m.components), visit(m.sampled_views), visit(m.neighbourhood_m);
+  visit(m.exponent), visit(m.difference_unit), visit(m.variance_unit);
+  visit(m.radius_m_per_deviation), visit(m.median_error_m), visit(m.error95_m);
+}
+template <class Model, class Visit>
+requires std::same_as<std::remove_const_t<Model>, ObservationModel>
+void visit_members(Model& m, const Visit& visit) {
+  visit(m.spacing_m), visit(m.far_difference), visit(m.range_m), visit(m.sharpness);
+  visit(m.heading_width_rad), visit(m.explained_difference), visit(m.neighbouring_difference);
+  visit(m.sampled_views);
+}
+
+/// Words with a blank between them; doubles with all their bits.
+class Writer {
+ public:
+  void operator()(double value) const {
+    std::array<char, 40> text{};
+    std::snprintf(text.data(), text.size(), "%a ", value);
+    text_ += text.data();
+  }
+  void operator()(int value) const { text_ += std::to_string(value) + " "; }
+  void operator()(bool value) const { text_ += value ? "yes " : "no "; }
+  void operator()(const std::optional<double>& value) const {
+    if (value) {
+      (*this)(*value);
+    } else {
+      text_ += "- ";
+    }
+  }
+  [[nodiscard]] const std::string& text() const { return text_; }
+  void word(std::string_view word) { text_ += std::string(word) + " "; }
+
+ private:
+  mutable std::string text_;
+};
+
+/// Fails for good at the first word that is not what was written.
+class Reader {
+ public:
+  explicit Reader(const std::string& text) : words_(text) {}
+
+  [[nodiscard]] std::string word() const {
+    std::string word;
+    if (!(words_ >> word)) ok_ = false;
+    return word;
+  }
+  void operator()(double& value) const { value = number(word()); }
+  void operator()(int& value) const { value = static_cast<int>(number(word())); }
+  void operator()(bool& value) const {
+    const std::string read = word();
+    value = read == "yes";
+    ok_ = ok_ && (value || read == "no");
+  }
+  void operator()(std::optional<double>& value) const {
+    const std::string read = word();
+    value = read == "-" ? std::nullopt : std::optional(number(read));
+  }
+  [[nodiscard]] bool ok() const { return ok_; }
+
+ private:
+  [[nodiscard]] double number(const std::string& word) const {
+    char* end = nullptr;
+    const double value = std::strtod(word.c_str(), &end);
+    if (word.empty() || *end != '\0' || !std::isfinite(value)) ok_ = false;
+    return value;
+  }
+  mutable std::istringstream words_;
+  mutable bool ok_ = true;
+};
+
+/// Changes with every change of the views, of their signatures and of their poses.
+std::string fingerprint(const VisualMemory& memory) {
+  RecordBytes scratch;
+  std::uint64_t hash = checksum({}, memory.shape().size());
+  for (const ViewId view : memory.views()) {
+    scratch.clear();
+    scratch.add(std::int64_t{view.value});
+    if (const auto& pose = memory.info(view).pose) {
+      scratch.add(pose->x_m);
+      scratch.add(pose->y_m);
+      if (pose->heading_rad) scratch.add(*pose->heading_rad);
+    }
+    const PackedSignature signature = memory.packed(view);
+    hash = checksum(scratch.bytes(), hash);
+    hash = checksum(signature.magnitudes, hash);
+    hash = checksum(signature.phases, hash);
+  }
+  std::ostringstream text;
+  text << std::hex << hash;
+  return text.str();
+}
+
+}  // namespace
+
+LearntModels learn_models(const VisualMemory& memory) {
+  const ColumnRanking ranking(memory);
+  LearntModels models{learn_place_model(ranking), learn_position_model(ranking),
+                      NeighbourSupport(ranking).spacing_m(), std::nullopt};
+  try {
+    models.observation = learn_observation_model(ranking);
+  } catch (const ContractError&) {  // nothing to learn from
+  }
+  return models;
+}
+
+void keep_models(MemoryFile& file) {
+  const VisualMemory memory = file.load();
+  if (memory.empty() || kept_models(file, memory)) return;
+  const LearntModels models = learn_models(memory);
+  Writer writer;
+  writer.word(learning_version);
+  writer.word(fingerprint(memory));
+  visit_members(models.place, writer);
+  visit_members(models.position, writer);
+  writer(models.spacing_m);
+  writer(models.observation.has_value());
+  if (models.observation) visit_members(*models.observation, writer);
+  file.set_parameter(parameter_name, writer.text());
+}
+
+std::optional<LearntModels> kept_models(const MemoryFile& file, const VisualMemory& memory) {
+  const auto text = file.parameter(parameter_name);
+  if (!text) return std::nullopt;
+  const Reader reader(*text);
+  if (reader.word() != learning_version || reader.word() != fingerprint(memory)) {
+    return std::nullopt;
+  }
+  LearntModels models;
+  visit_members(models.place, reader);
+  visit_members(models.position, reader);
+  reader(models.spacing_m);
+  bool has_observation = false;
+  reader(has_observation);
+  if (has_observation) visit_members(models.observation.emplace(), reader);
+  if (!reader.ok()) return std::nullopt;
+  return models;
+}
+
+}  // namespace panonav

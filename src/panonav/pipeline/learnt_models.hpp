@@ -1,0 +1,35 @@
+#pragma once
+
+#include <optional>
+
+#include "panonav/localisation/observation_model.hpp"
+#include "panonav/localisation/place_model.hpp"
+#include "panonav/localisation/position_model.hpp"
+#include "panonav/storage/memory_file.hpp"
+
+namespace panonav {
+
+/// What localisation and tracking learn of a memory before they answer, with the default options of
+/// learning and over all components.
+struct LearntModels {
+  PlaceModel place;
+  PositionModel position;
+  double spacing_m = 0.0;  ///< of references with headings (`NeighbourSupport`)
+  /// Empty for a memory with too few views with a position, or all of them in one place.
+  std::optional<ObservationModel> observation;
+  friend bool operator==(const LearntModels&, const LearntModels&) = default;
+};
+[[nodiscard]] LearntModels learn_models(const VisualMemory& memory);
+
+/// Learns the models of the file's views and keeps them in the file, with a fingerprint of the
+/// views that they were learnt from; does nothing where the file has them. To be called when views
+/// or poses have changed. Cost: loading, and up to some seconds of learning.
+void keep_models(MemoryFile& file);
+
+/// The models that the file keeps, to the bit as `learn_models` gives them; empty where it keeps
+/// none or has changed since. `memory` holds all views of the file. Never writes. Cost: one pass
+/// over the signatures, 40 ms for 100,000 of 20 x 15.
+[[nodiscard]] std::optional<LearntModels> kept_models(const MemoryFile& file,
+                                                      const VisualMemory& memory);
+
+}  // namespace panonav

@@ -1,0 +1,175 @@
+#include "panonav/pipeline/memoriser.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdlib>
+#include <exception>
+#include <iterator>
+#include <string>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/pipeline/known_views.hpp"
+#include "panonav/pipeline/learnt_models.hpp"
+
+namespace panonav {
+
+namespace {
+
+double now_s() {
+  const auto since = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration<double>(since).count();
+}
+
+std::string text_of(const Observation& observation) {
+  return observation.file.empty() ? observation.name : observation.file.string();
+}
+
+Panorama first_panorama(const Observation& first, const PictureSource& source,
+                        const SignatureOptions& signature) {
+  if (const auto* ready = std::get_if<Panorama>(&first.picture)) return *ready;
+  const PanoramaReader reader(source, wanted_shape(source, signature));
+  try {
+    return reader.convert(std::get<Image>(first.picture).view());
+  } catch (const ContractError& error) {
+    if (first.file.empty()) throw;
+    throw FileError(first.file.string(), error.what());
+  }
+}
+
+}  // namespace
+
+MemoryHeader header_from_first(std::span<const Observation> first, const PictureSource& source,
+                               const SignatureOptions& signature,
+                               const PreprocessingOptions& preprocessing, Executor& executor) {
+  if (first.empty()) throw ContractError("observations", 0, "1 or more to make a memory of");
+  MemoryHeader header;
+  header.source = source;
+  header.preprocessing = preprocessing;
+  header.created_s = now_s();
+  const Panorama panorama = first_panorama(first.front(), source, signature);
+  header.shape = {panorama.rows(), signature.components};
+  header.panorama_columns = panorama.columns();
+  header.elevations = panorama.elevations();
+  if (const auto* image = std::get_if<Image>(&first.front().picture);
+      image != nullptr && source.kind == PictureKind::panorama) {
+    const PanoramaShape own{image->height(), image->width()};
+    if (own != PanoramaShape{panorama.rows(), panorama.columns()}) header.picture_shape = own;
+  }
+  if (2 * header.shape.components > header.panorama_columns) {
+    throw ContractError("components", header.shape.components,
+                        "1 to " + std::to_string(header.panorama_columns / 2) +
+                            ", half the columns of " + text_of(first.front()));
+  }
+  const ViewEncoder encoder(header, source);
+  std::vector<float> largest(first.size(), 0.0F);
+  for_each_entry(executor, first.size(), [&](std::size_t i) {
+    largest[i] = largest_structure(encoder.signature(first[i]));
+  });
+  header.full_scale = *std::ranges::max_element(largest);
+  constexpr float rounding = 1e-6F;  // of the transform, for values of 0 .. 1
+  if (!(header.full_scale > rounding)) {
+    throw FileError(text_of(first.front()),
+                    "the first " + std::to_string(first.size()) +
+                        " views are of one colour; a memory needs views with structure");
+  }
+  return header;
+}
+
+Memoriser::Memoriser(const std::filesystem::path& memory, MemoriserOptions options)
+    : path_(memory), options_(std::move(options)) {
+  if (std::filesystem::exists(path_)) {
+    file_ = MemoryFile::open(path_, Access::read_write);
+    encoder_.emplace(file_->header(), options_.source.value_or(file_->header().source));
+  } else if (!options_.source) {
+    throw ContractError("source of " + path_.string(), "empty",
+                        "how pictures lie, as the file is a new one");
+  }
+}
+
+void Memoriser::add(Observation observation) {
+  Executor alone;
+  std::vector<Observation> one;
+  one.push_back(std::move(observation));
+  add(std::move(one), alone);
+}
+
+void Memoriser::add(std::vector<Observation> observations, Executor& executor) {
+  if (file_) return store(observations, executor);
+  std::ranges::move(observations, std::back_inserter(waiting_));
+  if (waiting_.size() >= scale_views) make_file(executor);
+}
+
+void Memoriser::make_file(Executor& executor) {
+  const std::span<const Observation> all(waiting_);
+  file_ = MemoryFile::create(
+      path_, header_from_first(all.first(std::min(scale_views, all.size())), *options_.source,
+                               options_.signature, options_.preprocessing, executor));
+  encoder_.emplace(file_->header(), *options_.source);
+  store(std::exchange(waiting_, {}), executor);
+}
+
+void Memoriser::store(std::span<const Observation> observations, Executor& executor) {
+  std::vector<NewView> views(observations.size());
+  std::vector<std::exception_ptr> failures(observations.size());
+  for_each_entry(executor, observations.size(), [&](std::size_t i) {
+    const Observation& seen = observations[i];
+    try {
+      views[i].info = {seen.name, seen.pose, seen.stamp_s};
+      if (options_.thumbnails) {
+        const Panorama panorama = encoder_->panorama(seen);
+        views[i].signature = encoder_->packed(panorama);
+        views[i].thumbnail = thumbnail_png(panorama);
+      } else {
+        views[i].signature = encoder_->packed(seen);
+      }
+    } catch (const Error&) {
+      failures[i] = std::current_exception();
+    }
+  });
+  std::vector<NewView> unknown;
+  const auto append = [&] {
+    if (!unknown.empty()) counts_.appended += file_->append(std::exchange(unknown, {})).size();
+  };
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    try {
+      if (failures[i]) std::rethrow_exception(failures[i]);
+      if (const auto known = file_->find(views[i].info.name)) {
+        require_same_view(observations[i], views[i].signature, *known);
+        ++counts_.known_before;
+        continue;
+      }
+    } catch (const Error&) {
+      append();
+      throw;
+    }
+    unknown.push_back(std::move(views[i]));
+  }
+  append();
+}
+
+void Memoriser::require_same_view(const Observation& seen, const PackedSignature& signature,
+                                  ViewId view) {
+  const VisualMemory there = file_->load(std::array{view});
+  const ReferenceInfo& info = there.info(view);
+  if (info.pose != seen.pose || info.stamp_s != seen.stamp_s) {
+    refuse_known_view(path_, seen.name, "a view with another pose or stamp under the name");
+  }
+  if (!is_same_picture(signature, there.packed(view))) {
+    refuse_known_view(path_, seen.name, "another picture under the name");
+  }
+}
+
+Memoriser::Counts Memoriser::finish() {
+  Executor alone;
+  return finish(alone);
+}
+
+Memoriser::Counts Memoriser::finish(Executor& executor) {
+  if (!file_) make_file(executor);
+  keep_models(*file_);
+  return counts_;
+}
+
+}  // namespace panonav

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "panonav/core/executor.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
+#include "panonav/storage/memory_file.hpp"
+
+namespace panonav {
+
+struct MemoriserOptions {
+  /// How pictures lie. Empty: as those of the file; a new file needs it.
+  std::optional<PictureSource> source;
+  SignatureOptions signature;          ///< of a new file
+  PreprocessingOptions preprocessing;  ///< of a new file
+  bool thumbnails = true;              ///< keep small pictures of the views for people
+};
+
+/// The header of a new memory: sizes from the first observation, the full scale from all of these.
+/// Throws ContractError on options that do not fit the pictures, FileError on observations without
+/// structure.
+[[nodiscard]] MemoryHeader header_from_first(std::span<const Observation> first,
+                                             const PictureSource& source,
+                                             const SignatureOptions& signature,
+                                             const PreprocessingOptions& preprocessing,
+                                             Executor& executor);
+
+/// Appends observations to a memory file, which is made where there is none:
+///   panonav::Memoriser memoriser("office.panonav", {.source = source});
+///   memoriser.add(observation);
+///   memoriser.finish();
+/// A new file appears once as many observations have come as its full scale is taken from; after
+/// that a view is on the disk when `add` returns. In batches of any size and on any number of
+/// threads the same views are stored. One thread at a time.
+class Memoriser {
+ public:
+  /// Observations that the full scale of a new memory is taken from.
+  static constexpr std::size_t scale_views = 32;
+
+  /// Throws FileError as `MemoryFile::open`, ContractError as `ViewEncoder`, and for a new file
+  /// without a source.
+  explicit Memoriser(const std::filesystem::path& memory, MemoriserOptions options = {});
+
+  /// The observation's name becomes the view's; a name that the memory knows must come with the
+  /// same pose, stamp and picture, and is not stored again. Throws ContractError on an empty name,
+  /// FileError on another view under a known name, and as `ViewEncoder::panorama`.
+  void add(Observation observation);
+  /// The same, encoded on all threads and stored in one transaction. Those before one that is
+  /// refused are stored.
+  void add(std::vector<Observation> observations, Executor& executor);
+
+  struct Counts {
+    std::size_t appended = 0;
+    std::size_t known_before = 0;  ///< observations whose views were there
+  };
+  /// Writes what still waits for a new file's full scale, and keeps in the file what is learnt of
+  /// its views (`keep_models`). More may be added afterwards. Throws FileError; ContractError when
+  /// nothing was ever added.
+  Counts finish();
+  Counts finish(Executor& executor);
+
+  /// Null as long as a new file waits for its full scale, as `encoder()`.
+  [[nodiscard]] MemoryFile* file() noexcept { return file_ ? &*file_ : nullptr; }
+  [[nodiscard]] const ViewEncoder* encoder() const noexcept {
+    return encoder_ ? &*encoder_ : nullptr;
+  }
+
+ private:
+  void make_file(Executor& executor);
+  void store(std::span<const Observation> observations, Executor& executor);
+  void require_same_view(const Observation& seen, const PackedSignature& signature, ViewId view);
+
+  std::filesystem::path path_;
+  MemoriserOptions options_;
+  std::vector<Observation> waiting_;
+  std::optional<MemoryFile> file_;
+  std::optional<ViewEncoder> encoder_;
+  Counts counts_;
+};
+
+}  // namespace panonav

@@ -1,0 +1,43 @@
+#include "panonav/pipeline/observation_source.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/io/image_file.hpp"
+
+namespace panonav {
+
+Observation read_observation(const DatasetEntry& entry) {
+  Observation observation(read_image(entry.path));
+  observation.name = entry.file;
+  observation.file = entry.path;
+  observation.stamp_s = entry.stamp_s;
+  observation.odometry = entry.odometry;
+  observation.pose = entry.pose;
+  return observation;
+}
+
+DatasetObservations::DatasetObservations(Dataset dataset, Executor& executor)
+    : dataset_(std::move(dataset)), executor_(&executor) {}
+
+std::optional<Observation> DatasetObservations::next() {
+  if (next_ == size()) return std::nullopt;
+  if (next_ == first_decoded_ + decoded_.size()) {
+    first_decoded_ = next_;
+    decoded_.clear();
+    decoded_.resize(std::min(decoded_ahead, size() - next_));
+    executor_->for_chunks(decoded_.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
+      try {
+        decoded_[i].observation = read_observation(dataset_.entries[first_decoded_ + i]);
+      } catch (const Error&) {
+        decoded_[i].failure = std::current_exception();
+      }
+    });
+  }
+  Decoded& decoded = decoded_[next_++ - first_decoded_];
+  if (decoded.failure) std::rethrow_exception(decoded.failure);
+  return std::exchange(decoded.observation, std::nullopt);
+}
+
+}  // namespace panonav

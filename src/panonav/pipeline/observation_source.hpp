@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstddef>
+#include <exception>
+#include <optional>
+#include <vector>
+
+#include "panonav/core/executor.hpp"
+#include "panonav/io/dataset.hpp"
+#include "panonav/pipeline/observation.hpp"
+
+namespace panonav {
+
+/// The picture of an entry and what the data set knows of it; several threads may read at a time.
+/// Throws FileError on a picture that is missing or damaged.
+[[nodiscard]] Observation read_observation(const DatasetEntry& entry);
+
+/// Where a robot's observations come from, one by one in the order in which they were made: a data
+/// set, a folder, a video, a camera.
+class ObservationSource {
+ public:
+  virtual ~ObservationSource() = default;
+  /// How all its pictures lie.
+  [[nodiscard]] virtual const PictureSource& pictures() const noexcept = 0;
+  /// Empty when there is none left. Throws FileError on a picture that cannot be read; the next
+  /// call goes on behind it.
+  [[nodiscard]] virtual std::optional<Observation> next() = 0;
+};
+
+/// Those of a data set, a folder or a single picture. Pictures are decoded some ahead, on all
+/// threads of the executor, which must outlive *this; never more than `decoded_ahead` of them are
+/// held.
+class DatasetObservations final : public ObservationSource {
+ public:
+  static constexpr std::size_t decoded_ahead = 16;
+
+  DatasetObservations(Dataset dataset, Executor& executor);
+
+  [[nodiscard]] const PictureSource& pictures() const noexcept override { return dataset_.source; }
+  [[nodiscard]] std::optional<Observation> next() override;
+  /// Entries in all.
+  [[nodiscard]] std::size_t size() const noexcept { return dataset_.entries.size(); }
+
+ private:
+  struct Decoded {
+    std::optional<Observation> observation;
+    std::exception_ptr failure;
+  };
+  Dataset dataset_;
+  Executor* executor_;
+  std::size_t next_ = 0;
+  std::size_t first_decoded_ = 0;
+  std::vector<Decoded> decoded_;
+};
+
+}  // namespace panonav

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "panonav/localisation/monte_carlo.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
+#include "panonav/storage/memory_file.hpp"
+
+namespace panonav {
+
+struct TrackerOptions {
+  MonteCarloOptions filter;
+  OdometryNoise odometry;
+  /// How pictures lie; empty: as those that the memory was made from.
+  std::optional<PictureSource> source;
+};
+
+/// Follows a moving robot through its pictures and odometry by a memory file
+/// (`MonteCarloLocaliser`):
+///   panonav::Tracker tracker("office.panonav");
+///   const auto estimate = tracker.observe(observation);
+///   if (estimate.state == panonav::LocalisationState::localised) use(*estimate.pose);
+/// Pictures become signatures as the file says, and the observation model comes from the file, too
+/// (`keep_models`); one that does not fit the views any more is learnt anew. Holds the whole
+/// memory; the file is not needed afterwards. Same file, options and observations: same bits.
+class Tracker {
+ public:
+  /// The robot starts anywhere in the memorised area. Throws FileError on a file that is missing or
+  /// damaged, or whose views do not know enough positions to learn from; OptionError.
+  explicit Tracker(const std::filesystem::path& memory, const TrackerOptions& options = {});
+  explicit Tracker(const MemoryFile& file, const TrackerOptions& options = {});
+  ~Tracker();
+  Tracker(Tracker&&) noexcept;
+  Tracker& operator=(Tracker&&) noexcept;
+
+  /// As `MonteCarloLocaliser`: forgets what is known of the robot.
+  void start_anywhere(std::optional<double> heading_rad = std::nullopt);
+  void start_at(const Pose2& pose, double deviation_m, double heading_deviation_rad);
+
+  /// Moves by the odometry, where the observation has one, and takes the picture into account.
+  /// Throws as `ViewEncoder::panorama`; the robot has moved then all the same.
+  MonteCarloEstimate observe(const Observation& observation);
+  /// The picture alone, encoded by `encoder()` on another thread.
+  MonteCarloEstimate observe(const PackedSignature& view);
+  /// Odometry between pictures, absolute in its own frame: the robot moves by the difference from
+  /// the one before; the first says nothing yet.
+  void move_to(const Pose2& odometry);
+
+  [[nodiscard]] const VisualMemory& memory() const noexcept;
+  [[nodiscard]] const ViewEncoder& encoder() const noexcept;
+  [[nodiscard]] const MonteCarloLocaliser& localiser() const noexcept;
+
+ private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace panonav

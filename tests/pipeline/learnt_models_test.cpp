@@ -1,0 +1,141 @@
+#include "panonav/pipeline/learnt_models.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/pipeline/place_recogniser.hpp"
+#include "panonav/pipeline/tracker.hpp"
+#include "support/temporary_folder.hpp"
+
+namespace panonav {
+namespace {
+
+constexpr SignatureShape shape{8, 6};
+
+/// Views on a grid whose signatures change smoothly with the place.
+NewView view_at(int number, double x_m, double y_m) {
+  NewView view;
+  view.info = {"view_" + std::to_string(number), ReferencePose{x_m, y_m, 0.3}, {}};
+  view.signature.shape = shape;
+  Random random(7);
+  for (std::size_t i = 0; i < shape.size(); ++i) {
+    const double a = random.uniform(0.3, 1.5);
+    const double b = random.uniform(0.3, 1.5);
+    view.signature.magnitudes.push_back(
+        static_cast<std::uint8_t>(128.0 + 100.0 * std::sin(a * x_m + b * y_m + double(i))));
+    view.signature.phases.push_back(
+        static_cast<std::uint8_t>(128.0 + 100.0 * std::cos(b * x_m - a * y_m + double(i))));
+  }
+  return view;
+}
+
+class KeptModels : public ::testing::Test {
+ protected:
+  MemoryFile make_file(int views = 60) {
+    MemoryHeader header;
+    header.shape = shape;
+    header.panorama_columns = 32;
+    MemoryFile file = MemoryFile::create(path(), header);
+    for (int i = 0; i < views; ++i) file.append(view_at(i, 0.5 * (i % 8), 0.5 * (i / 8)));
+    return file;
+  }
+  [[nodiscard]] std::filesystem::path path() const { return folder_.path() / "m.panonav"; }
+  testing::TemporaryFolder folder_;
+};
+
+TEST_F(KeptModels, ComeBackFromTheFileToTheBit) {
+  MemoryFile file = make_file();
+  EXPECT_EQ(kept_models(file, file.load()), std::nullopt);
+  keep_models(file);
+  const VisualMemory memory = file.load();
+  const auto kept = kept_models(MemoryFile::open(path(), Access::read_only), memory);
+  ASSERT_TRUE(kept);
+  EXPECT_EQ(*kept, learn_models(memory));
+  EXPECT_TRUE(kept->place.learnt);
+  EXPECT_TRUE(kept->position.learnt);
+  ASSERT_TRUE(kept->observation);
+  EXPECT_DOUBLE_EQ(kept->spacing_m, 0.5);
+}
+
+TEST_F(KeptModels, OfOtherViewsAreNotUsed) {
+  MemoryFile file = make_file();
+  keep_models(file);
+  const auto outdated = [&] { return !kept_models(file, file.load()); };
+  EXPECT_FALSE(outdated());
+  const ViewId last = file.append(view_at(99, 9.0, 9.0));
+  EXPECT_TRUE(outdated());
+  keep_models(file);
+  EXPECT_FALSE(outdated());
+  file.set_pose(last, ReferencePose{9.0, 9.5, 0.3});
+  EXPECT_TRUE(outdated());
+  keep_models(file);
+  file.remove(std::vector{last});
+  EXPECT_TRUE(outdated());
+  keep_models(file);
+  EXPECT_EQ(kept_models(file, file.load()).value(), learn_models(file.load()));
+  file.set_parameter("learnt models", "1 nonsense");
+  EXPECT_TRUE(outdated());
+}
+
+TEST_F(KeptModels, AnswersAreThoseOfModelsLearntAnew) {
+  MemoryFile file = make_file();
+  const PlaceRecogniser anew(file);
+  Tracker tracker_anew(file);
+  keep_models(file);
+  const PlaceRecogniser kept(file);
+  Tracker tracker(file);
+  EXPECT_EQ(kept.localiser().place_model(), anew.localiser().place_model());
+  EXPECT_EQ(kept.localiser().position_model(), anew.localiser().position_model());
+  EXPECT_EQ(tracker.localiser().model(), tracker_anew.localiser().model());
+  for (int i = 0; i < 10; ++i) {
+    const PackedSignature query = view_at(0, 0.37 * i, 0.21 * i).signature;
+    const Localisation a = kept.localiser().localise(query);
+    const Localisation b = anew.localiser().localise(query);
+    EXPECT_EQ(a.known, b.known);
+    ASSERT_EQ(a.matches.size(), b.matches.size());
+    EXPECT_EQ(a.matches.front().view, b.matches.front().view);
+    ASSERT_EQ(a.position.has_value(), b.position.has_value());
+    if (a.position) {
+      EXPECT_EQ(a.position->position, b.position->position);
+      EXPECT_EQ(a.position->radius_m, b.position->radius_m);
+    }
+    const MonteCarloEstimate c = tracker.observe(query);
+    const MonteCarloEstimate d = tracker_anew.observe(query);
+    EXPECT_EQ(c.spread_m, d.spread_m);
+    EXPECT_EQ(c.pose, d.pose);
+  }
+}
+
+TEST_F(KeptModels, ASmallMemoryKeepsWhatItHas) {
+  MemoryFile file = make_file(3);
+  keep_models(file);
+  const auto kept = kept_models(file, file.load());
+  ASSERT_TRUE(kept);
+  EXPECT_FALSE(kept->place.learnt);
+  EXPECT_FALSE(kept->observation);
+  EXPECT_THROW(Tracker{file}, FileError);
+}
+
+TEST_F(KeptModels, ARecogniserNeedsViewsAndFittingOptions) {
+  MemoryFile file = make_file(0);
+  keep_models(file);
+  EXPECT_THROW(PlaceRecogniser{file}, FileError);
+  file.append(view_at(1, 0.0, 0.0));
+  EXPECT_THROW(PlaceRecogniser(file, {.localiser = {.components = 7}}), ContractError);
+  EXPECT_THROW(PlaceRecogniser(path().string() + "x"), FileError);
+  const PlaceRecogniser recogniser(path());
+  EXPECT_THROW(static_cast<void>(recogniser.localise(Image(31, 8))), ContractError);
+  const Place place = recogniser.localise(Image(32, 8));
+  EXPECT_EQ(place.matches.front().name, "view_1");
+  EXPECT_TRUE(
+      recogniser.localise(Image(32, 8), std::vector<std::string>{"view_1"}).matches.empty());
+}
+
+}  // namespace
+}  // namespace panonav

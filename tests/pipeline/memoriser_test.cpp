@@ -1,0 +1,126 @@
+#include "panonav/pipeline/memoriser.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+#include "panonav/pipeline/learnt_models.hpp"
+#include "support/temporary_folder.hpp"
+
+namespace panonav {
+namespace {
+
+Observation seen_at(int number, double contrast = 1.0) {
+  Image image(64, 16);
+  for (int v = 0; v < 16; ++v) {
+    for (int u = 0; u < 64; ++u) {
+      const double wave = std::sin(0.1 * u + 0.05 * number * v) + std::cos(0.2 * u + number);
+      image.at(u, v) = static_cast<std::uint8_t>(120.0 + contrast * 50.0 * wave);
+    }
+  }
+  Observation observation(std::move(image));
+  observation.name = "view_" + std::to_string(number);
+  observation.pose = ReferencePose{0.5 * (number % 7), 0.5 * (number / 7), 0.1};
+  observation.stamp_s = number;
+  return observation;
+}
+
+MemoriserOptions options() {
+  MemoriserOptions options;
+  options.source = PictureSource{.kind = PictureKind::panorama};
+  options.signature.components = 8;
+  return options;
+}
+
+class Memorising : public ::testing::Test {
+ protected:
+  [[nodiscard]] std::filesystem::path path(std::string_view name = "m.panonav") const {
+    return folder_ / name;
+  }
+  testing::TemporaryFolder folder_;
+};
+
+TEST_F(Memorising, InBatchesOfAnySizeTheSameViewsAreStored) {
+  constexpr int views = 45;
+  std::vector<VisualMemory> memories;
+  std::vector<MemoryHeader> headers;
+  std::vector<std::vector<std::uint8_t>> thumbnails;
+  for (const int batch : {1, 7, 32, 100}) {
+    const auto file = path(std::to_string(batch));
+    Memoriser memoriser(file, options());
+    Executor executor(batch == 7 ? 3 : 1);
+    for (int first = 0; first < views; first += batch) {
+      EXPECT_EQ(memoriser.file() != nullptr, first >= 32);
+      std::vector<Observation> seen;
+      for (int i = first; i < std::min(views, first + batch); ++i) seen.push_back(seen_at(i));
+      if (batch == 1) {
+        memoriser.add(seen.front());
+      } else {
+        memoriser.add(std::move(seen), executor);
+      }
+    }
+    EXPECT_EQ(memoriser.finish(executor).appended, 45U);
+    const MemoryFile made = MemoryFile::open(file, Access::read_only);
+    memories.push_back(made.load());
+    headers.push_back(made.header());
+    headers.back().created_s.reset();
+    thumbnails.push_back(made.thumbnail(memories.back().views().back()).value());
+    EXPECT_TRUE(kept_models(made, memories.back()));
+  }
+  for (std::size_t m = 1; m < memories.size(); ++m) {
+    EXPECT_EQ(headers[m], headers[0]);
+    EXPECT_EQ(thumbnails[m], thumbnails[0]);
+    ASSERT_EQ(memories[m].size(), 45U);
+    for (const ViewId view : memories[0].views()) {
+      EXPECT_EQ(memories[m].packed(view), memories[0].packed(view));
+      EXPECT_EQ(memories[m].info(view), memories[0].info(view));
+    }
+  }
+}
+
+TEST_F(Memorising, GoesOnWhereItStoppedAndRefusesOtherViewsUnderKnownNames) {
+  {
+    Memoriser first(path(), options());
+    for (int i = 0; i < 5; ++i) first.add(seen_at(i));
+    EXPECT_EQ(first.finish().appended, 5U);
+  }
+  Memoriser more(path());
+  for (int i = 3; i < 8; ++i) more.add(seen_at(i));
+  Observation moved = seen_at(2);
+  moved.pose->x_m += 1.0;
+  EXPECT_THROW(more.add(moved), FileError);
+  Observation other = seen_at(40);
+  other.name = "view_2";
+  other.pose = seen_at(2).pose;
+  other.stamp_s = 2.0;
+  EXPECT_THROW(more.add(other), FileError);
+  EXPECT_THROW(more.add(Observation(Image(63, 16))), ContractError);
+  Executor executor;
+  std::vector<Observation> last{seen_at(8), seen_at(9), Observation(Image(63, 16)), seen_at(10)};
+  EXPECT_THROW(more.add(std::move(last), executor), ContractError);
+  const auto counts = more.finish();
+  EXPECT_EQ(counts.appended, 5U);  // 5 .. 9
+  EXPECT_EQ(counts.known_before, 2U);
+  EXPECT_EQ(MemoryFile::open(path(), Access::read_only).names().back(), "view_9");
+}
+
+TEST_F(Memorising, MakesNoFileOfWhatItCannotCompare) {
+  EXPECT_THROW(Memoriser{path()}, ContractError);  // how do pictures lie?
+  Memoriser nothing(path(), options());
+  EXPECT_THROW(static_cast<void>(nothing.finish()), ContractError);
+  Memoriser plain(path(), options());
+  plain.add(seen_at(0, 0.0));
+  EXPECT_THROW(static_cast<void>(plain.finish()), FileError);
+  MemoriserOptions too_many = options();
+  too_many.signature.components = 33;
+  Memoriser fine(path(), too_many);
+  fine.add(seen_at(0));
+  EXPECT_THROW(static_cast<void>(fine.finish()), ContractError);
+  EXPECT_FALSE(std::filesystem::exists(path()));
+}
+
+}  // namespace
+}  // namespace panonav
