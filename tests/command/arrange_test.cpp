@@ -4,21 +4,14 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "command_runner.hpp"
-#include "landmark_world.hpp"
 #include "panonav/storage/memory_file.hpp"
+#include "support/command_runner.hpp"
+#include "support/landmark_pictures.hpp"
 
 namespace panonav::testing {
 namespace {
 
 using nlohmann::json;
-
-std::string text_of(const std::string& path) {
-  std::ifstream file(path);
-  std::stringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
 
 /// A memory of a grid of places.
 class Arrange : public ::testing::Test {
@@ -30,20 +23,17 @@ class Arrange : public ::testing::Test {
       pose = {0.5 + 0.3 * pose.x_m, 0.5 + 0.3 * pose.y_m, wrap_angle(7.0 * pose.x_m + pose.y_m)};
     }
     write_dataset(folder / "run", world, poses);
-    const auto made = run_panonav({"memorise", folder / "run", memory});
-    EXPECT_EQ(made.exit_code, 0) << made.err;
+    run_well({"memorise", folder / "run", memory});
   }
   TemporaryFolder folder;
-  LandmarkWorld world{4};
+  ToyWorld world = landmark_world(4);
   std::vector<Pose2> poses;
   std::string memory = folder / "run.panonav";
 };
 
 TEST_F(Arrange, StoresAndTellsTheMap) {
-  const auto result = run_panonav({"arrange", memory, "--json", "--graphml", folder / "map.graphml",
-                                   "--tum", folder / "map.tum"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  const auto answer = json::parse(result.out);
+  const auto answer = answer_of({"arrange", memory, "--json", "--graphml", folder / "map.graphml",
+                                 "--tum", folder / "map.tum"});
   EXPECT_EQ(answer["views"], poses.size());
   ASSERT_EQ(answer["nodes"].size(), poses.size());
   EXPECT_EQ(answer["metric"], false);
@@ -62,8 +52,8 @@ TEST_F(Arrange, StoresAndTellsTheMap) {
   EXPECT_EQ(map->nodes.size(), poses.size());
   EXPECT_EQ(map->edges.size(), answer["springs"]);
   EXPECT_GT(file.info().links, 0U);
-  EXPECT_NE(text_of(folder / "map.graphml").find("<graphml"), std::string::npos);
-  const auto poses_and_header = lines(text_of(folder / "map.tum"));
+  EXPECT_TRUE(contains(bytes_of(folder / "map.graphml"), "<graphml"));
+  const auto poses_and_header = lines(bytes_of(folder / "map.tum"));
   ASSERT_FALSE(poses_and_header.empty());
   EXPECT_EQ(poses_and_header.front().front(), '#');
   EXPECT_EQ(poses_and_header.size() - 1, answer["parts"][0]["views"]);
@@ -72,18 +62,16 @@ TEST_F(Arrange, StoresAndTellsTheMap) {
 TEST_F(Arrange, LeavesTheMemoryAsItIsWhenToldSo) {
   const auto result = run_panonav({"arrange", memory, "--no-save"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_NE(result.out.find("views arranged"), std::string::npos);
+  EXPECT_TRUE(contains(result.out, "views arranged"));
   const auto file = MemoryFile::open(memory, Access::read_only);
   EXPECT_FALSE(file.map("lattice").has_value());
   EXPECT_EQ(file.info().links, 0U);
 }
 
 TEST_F(Arrange, RefusesInOneLine) {
-  EXPECT_NE(refusal({"arrange", folder / "none.panonav"}).find("none.panonav"), std::string::npos);
-  EXPECT_NE(refusal({"arrange", memory, "--odometry", folder / "run"}).find("odometry"),
-            std::string::npos);
-  EXPECT_NE(refusal({"arrange", memory, "--neighbours", "0"}).find("neighbours"),
-            std::string::npos);
+  EXPECT_TRUE(contains(refusal({"arrange", folder / "none.panonav"}), "none.panonav"));
+  EXPECT_TRUE(contains(refusal({"arrange", memory, "--odometry", folder / "run"}), "odometry"));
+  EXPECT_TRUE(contains(refusal({"arrange", memory, "--neighbours", "0"}), "neighbours"));
 }
 
 }  // namespace

@@ -4,12 +4,13 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 
-#include "command_runner.hpp"
 #include "panonav/io/camera_file.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/simulation/mirror.hpp"
+#include "support/command_runner.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -17,38 +18,27 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-std::set<std::string> keys_of(const json& object) {
-  std::set<std::string> keys;
-  for (const auto& [key, value] : object.items()) keys.insert(key);
-  return keys;
-}
-
 /// Three pictures of the simulated mirror camera, made once for all tests of this file.
 class CameraVerbs : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    folder_ = new TemporaryFolder;
-    const auto made = run_panonav({"simulate", "office", *folder_ / "run", "--random", "3",
-                                   "--rays-per-axis", "1", "--exposure", "2"});
-    ASSERT_EQ(made.exit_code, 0) << made.err;
+    folder_.emplace();
+    run_well({"simulate", "office", *folder_ / "run", "--random", "3", "--rays-per-axis", "1",
+              "--exposure", "2"});
   }
-  static void TearDownTestSuite() { delete folder_; }
+  static void TearDownTestSuite() { folder_.reset(); }
   static std::string picture(int i) {
     return *folder_ / ("run/view_0000" + std::to_string(i) + ".png");
   }
   static std::string true_camera() { return *folder_ / "run/camera.toml"; }
 
   TemporaryFolder out_;
-  static TemporaryFolder* folder_;
+  inline static std::optional<TemporaryFolder> folder_;
 };
-TemporaryFolder* CameraVerbs::folder_ = nullptr;
 
 TEST_F(CameraVerbs, CalibrateFindsTheSimulatedMirror) {
-  const auto result =
-      run_panonav({"calibrate", picture(0), picture(1), picture(2), "-o", out_ / "camera.toml",
-                   "--overlay", out_ / "overlay.png", "--json"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  const auto said = json::parse(result.out);
+  const auto said = answer_of({"calibrate", picture(0), picture(1), picture(2), "-o",
+                               out_ / "camera.toml", "--overlay", out_ / "overlay.png", "--json"});
   EXPECT_EQ(keys_of(said),
             (std::set<std::string>{"images", "width_px", "height_px", "centre_u_px", "centre_v_px",
                                    "rim_radius_px", "inner_radius_px", "inner_radius_found",
@@ -72,21 +62,20 @@ TEST_F(CameraVerbs, CalibrateWithoutAMirrorIsNoAnswer) {
   const auto result = run_panonav({"calibrate", out_ / "plain.png", "-o", out_ / "camera.toml"});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_EQ(lines(result.err).size(), 1U) << result.err;
-  EXPECT_NE(result.err.find("plain.png"), std::string::npos);
+  EXPECT_TRUE(contains(result.err, "plain.png"));
   EXPECT_FALSE(fs::exists(out_ / "camera.toml"));
 }
 
 TEST_F(CameraVerbs, CalibrateRefusesBadInput) {
-  const auto camera = out_ / "camera.toml";
-  std::ofstream(out_.path() / "text.png") << "no picture";
+  const std::string camera = out_ / "camera.toml";
+  std::ofstream(out_ / "text.png") << "no picture";
   Image other(64, 48);
   write_png(out_ / "other.png", other.view());
   const auto refused = [&](const std::vector<std::string>& images, const std::string& word) {
     std::vector<std::string> arguments{"calibrate"};
     arguments.insert(arguments.end(), images.begin(), images.end());
     arguments.insert(arguments.end(), {"-o", camera});
-    const auto line = refusal(arguments);
-    EXPECT_NE(line.find(word), std::string::npos) << line;
+    EXPECT_TRUE(contains(refusal(arguments), word));
     EXPECT_FALSE(fs::exists(camera));
   };
   refused({out_ / "nowhere.png"}, "nowhere.png");
@@ -94,17 +83,14 @@ TEST_F(CameraVerbs, CalibrateRefusesBadInput) {
   refused({picture(0), out_ / "other.png"}, "64 x 48; allowed: 640 x 480");
   refused({picture(0), "--rim-elevation-deg", "100"}, "rim_elevation_deg is 100");
   refused({picture(0), "--least-quality", "0"}, "least_quality is 0");
-  EXPECT_NE(refusal({"calibrate", picture(0)}).find("--out is required"), std::string::npos);
-  EXPECT_NE(refusal({"calibrate", picture(0), "-o", out_ / "text.png/camera.toml"})
-                .find("text.png/camera.toml"),
-            std::string::npos);
+  EXPECT_TRUE(contains(refusal({"calibrate", picture(0)}), "--out is required"));
+  EXPECT_TRUE(contains(refusal({"calibrate", picture(0), "-o", out_ / "text.png/camera.toml"}),
+                       "text.png/camera.toml"));
 }
 
 TEST_F(CameraVerbs, UnwrapGivesTheCylinder) {
-  const auto result = run_panonav(
-      {"unwrap", picture(0), "--camera", true_camera(), "-o", out_ / "p.png", "--json"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  const auto said = json::parse(result.out);
+  const auto said =
+      answer_of({"unwrap", picture(0), "--camera", true_camera(), "-o", out_ / "p.png", "--json"});
   EXPECT_EQ(keys_of(said), (std::set<std::string>{"image", "out", "rows", "columns",
                                                   "elevations_rad", "horizon_row"}));
   EXPECT_EQ(said["rows"], 80);
@@ -118,25 +104,23 @@ TEST_F(CameraVerbs, UnwrapGivesTheCylinder) {
       std::minmax_element(panorama.pixels().begin(), panorama.pixels().end());
   EXPECT_GT(*brightest - *darkest, 60) << "a plain picture";
 
-  ASSERT_EQ(run_panonav({"unwrap", picture(0), "--camera", true_camera(), "-o", out_ / "s.png",
-                         "--rows", "20", "--columns", "128"})
-                .exit_code,
-            0);
+  run_well({"unwrap", picture(0), "--camera", true_camera(), "-o", out_ / "s.png", "--rows", "20",
+            "--columns", "128"});
   EXPECT_EQ(read_image(out_ / "s.png").size(), (ImageSize{128, 20}));
 }
 
 TEST_F(CameraVerbs, UnwrapRefusesBadInput) {
-  std::ofstream(out_.path() / "text.png") << "no picture";
+  std::ofstream(out_ / "text.png") << "no picture";
   Image other(64, 48);
   write_png(out_ / "other.png", other.view());
-  std::ofstream(out_.path() / "bad.toml") << "model = \"unified\"\nxi = nan\n";
-  const auto panorama = out_ / "p.png";
+  std::ofstream(out_ / "bad.toml") << "model = \"unified\"\nxi = nan\n";
+  const std::string panorama = out_ / "p.png";
   const auto refused = [&](const std::string& image, const std::vector<std::string>& more,
                            const std::vector<std::string>& words) {
     std::vector<std::string> arguments{"unwrap", image, "-o", panorama};
     arguments.insert(arguments.end(), more.begin(), more.end());
     const auto line = refusal(arguments);
-    for (const auto& word : words) EXPECT_NE(line.find(word), std::string::npos) << line;
+    for (const auto& word : words) EXPECT_TRUE(contains(line, word));
     EXPECT_FALSE(fs::exists(panorama));
   };
   refused(picture(0), {}, {"--camera"});
@@ -148,14 +132,12 @@ TEST_F(CameraVerbs, UnwrapRefusesBadInput) {
   refused(picture(0), {"--camera", true_camera(), "--rows", "0"}, {"rows is 0"});
   refused(picture(0), {"--kind", "equirectangular", "--elevation-deg", "40", "-30"},
           {"--elevation-deg is 40 -30; allowed"});
-  EXPECT_NE(
-      refusal({"unwrap", picture(0), "--camera", true_camera(), "-o", out_ / "text.png/p.png"})
-          .find("text.png/p.png"),
-      std::string::npos);
-  EXPECT_NE(refusal({"unwrap", picture(0), "--camera", true_camera(), "-o", panorama},
-                    {.file_size_limit_bytes = 2000, .kill_after_ms = {}})
-                .find("p.png"),
-            std::string::npos);
+  EXPECT_TRUE(contains(
+      refusal({"unwrap", picture(0), "--camera", true_camera(), "-o", out_ / "text.png/p.png"}),
+      "text.png/p.png"));
+  EXPECT_TRUE(contains(refusal({"unwrap", picture(0), "--camera", true_camera(), "-o", panorama},
+                               {.file_size_limit_bytes = 2000, .kill_after_ms = {}}),
+                       "p.png"));
   EXPECT_FALSE(fs::exists(panorama)) << "half a picture";
 }
 

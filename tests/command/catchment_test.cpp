@@ -4,24 +4,14 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "command_runner.hpp"
-#include "landmark_world.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "support/command_runner.hpp"
+#include "support/landmark_pictures.hpp"
 
 namespace panonav::testing {
 namespace {
 
 using nlohmann::json;
-
-#define REQUIRE_REAL_DATA(variable, folder) \
-  const auto variable = real_data(folder);  \
-  if (!variable) GTEST_SKIP() << "PANONAV_DATA does not name a folder that holds " folder
-
-json answer_of(const std::vector<std::string>& arguments) {
-  const auto result = run_panonav(arguments);
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  return json::parse(result.out);
-}
 
 class Catchment : public ::testing::Test {
  protected:
@@ -32,7 +22,7 @@ class Catchment : public ::testing::Test {
     write_dataset(run, world, poses);
   }
   TemporaryFolder folder;
-  LandmarkWorld world{11};
+  ToyWorld world = landmark_world(11);
   std::string run = folder / "run";
 };
 
@@ -75,7 +65,7 @@ TEST_F(Catchment, RefusesStagesThatAreNoFrequencies) {
   for (const std::string wrong : {"", "0", "2,", "a", "2,99", "2;4"}) {
     const auto result = run_panonav({"catchment", run, "--stages", wrong});
     EXPECT_EQ(result.exit_code, 2) << wrong;
-    EXPECT_NE(result.err.find("--stages"), std::string::npos) << result.err;
+    EXPECT_TRUE(contains(result.err, "--stages"));
   }
 }
 
@@ -104,7 +94,7 @@ TEST_F(Catchment, ASecondRecordingOfTheSamePlacesIsComparedWithTheFirst) {
 TEST_F(Catchment, AheadPointsAlongTheWay) {
   std::vector<Pose2> poses;
   for (int i = 0; i < 30; ++i) poses.push_back({0.02 * i, 0.5, 0.0});
-  const auto way = folder.path() / "way";
+  const std::string way = folder / "way";
   std::filesystem::create_directory(way);
   write_dataset(way, world, poses);
   for (const std::string seed : {"", "5"}) {
@@ -115,25 +105,23 @@ TEST_F(Catchment, AheadPointsAlongTheWay) {
     EXPECT_NEAR(answer["direction_rad"].get<double>(), 0.0, radians(15.0));
     EXPECT_GE(answer["resultant_length"].get<double>(), 0.9);
   }
-  EXPECT_NE(refusal({"catchment", way, "--ahead", "30"}).find("1 to 29"), std::string::npos);
+  EXPECT_TRUE(contains(refusal({"catchment", way, "--ahead", "30"}), "1 to 29"));
 }
 
 TEST_F(Catchment, BadInputIsOneLine) {
-  EXPECT_NE(refusal({"catchment", run, "--up-to-m", "0"}).find("> 0"), std::string::npos);
-  EXPECT_NE(refusal({"catchment", run, "--bin-m", "-1"}).find("> 0"), std::string::npos);
-  EXPECT_NE(refusal({"catchment", run, "--goal", "none.png"}).find("none.png"), std::string::npos);
-  EXPECT_NE(refusal({"catchment", run, "--ahead", "2", "--goal", "x"}).find("leave out"),
-            std::string::npos);
-  EXPECT_NE(refusal({"catchment", run, "--longest-step-m", "0"}).find("longest_step_m"),
-            std::string::npos);
+  EXPECT_TRUE(contains(refusal({"catchment", run, "--up-to-m", "0"}), "> 0"));
+  EXPECT_TRUE(contains(refusal({"catchment", run, "--bin-m", "-1"}), "> 0"));
+  EXPECT_TRUE(contains(refusal({"catchment", run, "--goal", "none.png"}), "none.png"));
+  EXPECT_TRUE(contains(refusal({"catchment", run, "--ahead", "2", "--goal", "x"}), "leave out"));
+  EXPECT_TRUE(contains(refusal({"catchment", run, "--longest-step-m", "0"}), "longest_step_m"));
   std::ofstream(std::filesystem::path(run) / "poses.csv") << "file,x_m,y_m\n"
                                                           << view_name(0) << ",0,0\n";
-  EXPECT_NE(refusal({"catchment", run}).find("has no heading"), std::string::npos);
+  EXPECT_TRUE(contains(refusal({"catchment", run}), "has no heading"));
 }
 
 TEST_F(Catchment, TheReportHasItsPictures) {
-  const auto report = folder.path() / "report";
-  ASSERT_EQ(run_panonav({"catchment", run, "--report", report}).exit_code, 0);
+  const std::filesystem::path report = folder / "report";
+  run_well({"catchment", run, "--report", report});
   for (const auto* file : {"index.html", "homeward.png", "orientation.png", "areas.png",
                            "catchment.png", "field.png", "difference.png", "ends.png"}) {
     EXPECT_TRUE(std::filesystem::exists(report / file)) << file;
@@ -141,7 +129,8 @@ TEST_F(Catchment, TheReportHasItsPictures) {
 }
 
 TEST(RealHoming, GantryPlantsLeadHomeFromThirtyCentimetres) {
-  REQUIRE_REAL_DATA(data, "gantry_plants");
+  const auto data = real_data("gantry_plants");
+  PANONAV_REQUIRE_DATA(data, "gantry_plants");
   // One-bit pictures of 90 columns: higher components than usual still tell something.
   const auto answer = answer_of({"catchment", *data, "--components", "30", "--up-to-m", "0.3",
                                  "--turn-randomly", "1", "--json"});
@@ -150,7 +139,8 @@ TEST(RealHoming, GantryPlantsLeadHomeFromThirtyCentimetres) {
 }
 
 TEST(RealHoming, SussexRouteLeadsAlongTheWay) {
-  REQUIRE_REAL_DATA(data, "sussex_route");
+  const auto data = real_data("sussex_route");
+  PANONAV_REQUIRE_DATA(data, "sussex_route");
   const auto answer = answer_of({"catchment", *data, "--ahead", "20", "--json"});
   EXPECT_EQ(answer["pairs"], 435);
   EXPECT_NEAR(answer["direction_rad"].get<double>(), 0.0, radians(10.0));

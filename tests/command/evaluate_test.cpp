@@ -4,7 +4,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "command_runner.hpp"
+#include "support/command_runner.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -14,7 +14,7 @@ using nlohmann::json;
 class Evaluate : public ::testing::Test {
  protected:
   void write(const std::string& name, const std::string& text) const {
-    std::ofstream(folder_.path() / name) << text;
+    std::ofstream(folder_ / name) << text;
   }
   /// A way around a corner, 8 poses, with `text(i, x, y, heading)` for each line.
   template <class Line>
@@ -37,10 +37,8 @@ TEST_F(Evaluate, AShiftedCopyIsRightOnceAligned) {
   write("truth.tum", lines_of(tum));
   write("shifted.tum",
         lines_of([](int i, double x, double y) { return tum(i, x + 3.0, y - 1.0); }));
-  const auto aligned =
-      run_panonav({"evaluate", folder_ / "shifted.tum", folder_ / "truth.tum", "--json"});
-  ASSERT_EQ(aligned.exit_code, 0) << aligned.err;
-  const auto said = json::parse(aligned.out);
+  const auto said =
+      answer_of({"evaluate", folder_ / "shifted.tum", folder_ / "truth.tum", "--json"});
   for (const char* key : {"pairs", "left_out", "alignment", "position_m", "heading_rad",
                           "relative_pairs", "relative_position_m", "relative_heading_rad"}) {
     EXPECT_TRUE(said.contains(key)) << key;
@@ -60,8 +58,8 @@ TEST_F(Evaluate, TextForPeopleSaysTheSame) {
   const auto result =
       run_panonav({"evaluate", folder_ / "shifted.tum", folder_ / "truth.tum", "--align", "false"});
   EXPECT_EQ(result.exit_code, 0);
-  EXPECT_NE(result.out.find("8 poses compared"), std::string::npos) << result.out;
-  EXPECT_NE(result.out.find("rms 3.000"), std::string::npos) << result.out;
+  EXPECT_TRUE(contains(result.out, "8 poses compared"));
+  EXPECT_TRUE(contains(result.out, "rms 3.000"));
 }
 
 TEST_F(Evaluate, NoCommonTimeIsNoAnswer) {
@@ -70,7 +68,7 @@ TEST_F(Evaluate, NoCommonTimeIsNoAnswer) {
   const auto result = run_panonav({"evaluate", folder_ / "later.tum", folder_ / "truth.tum"});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_EQ(lines(result.err).size(), 1U) << result.err;
-  EXPECT_NE(result.err.find("later.tum"), std::string::npos);
+  EXPECT_TRUE(contains(result.err, "later.tum"));
 }
 
 TEST_F(Evaluate, BrokenFilesAreNamedWithLineAndField) {
@@ -78,21 +76,18 @@ TEST_F(Evaluate, BrokenFilesAreNamedWithLineAndField) {
   const auto refused = [&](const std::string& name, const std::string& text) {
     write(name, text);
     const auto line = refusal({"evaluate", folder_ / name, folder_ / "truth.tum"});
-    EXPECT_NE(line.find(name), std::string::npos) << line;
+    EXPECT_TRUE(contains(line, name));
     return line;
   };
-  EXPECT_NE(refused("nan.tum", "0 nan 0 0 0 0 0 1\n").find("nan"), std::string::npos);
+  EXPECT_TRUE(contains(refused("nan.tum", "0 nan 0 0 0 0 0 1\n"), "nan"));
   (void)refused("short.tum", "0 1 2\n");
   (void)refused("empty.tum", "");
   (void)refused("back.tum", "1 0 0 0 0 0 0 1\n0 0 0 0 0 0 0 1\n");
-  EXPECT_NE(refused("columns.csv", "stamp_s,x_m,heading_deg\n0,1,0\n").find("y_m"),
-            std::string::npos);
-  EXPECT_NE(refusal({"evaluate", folder_ / "no.tum", folder_ / "truth.tum"}).find("no.tum"),
-            std::string::npos);
-  EXPECT_NE(refusal({"evaluate", folder_ / "truth.tum", folder_ / "truth.tum",
-                     "--relative-distance-m", "-1"})
-                .find("relative_distance_m is -1"),
-            std::string::npos);
+  EXPECT_TRUE(contains(refused("columns.csv", "stamp_s,x_m,heading_deg\n0,1,0\n"), "y_m"));
+  EXPECT_TRUE(contains(refusal({"evaluate", folder_ / "no.tum", folder_ / "truth.tum"}), "no.tum"));
+  EXPECT_TRUE(contains(refusal({"evaluate", folder_ / "truth.tum", folder_ / "truth.tum",
+                                "--relative-distance-m", "-1"}),
+                       "relative_distance_m is -1"));
 }
 
 }  // namespace

@@ -4,9 +4,9 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "command_runner.hpp"
-#include "landmark_world.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "support/command_runner.hpp"
+#include "support/landmark_pictures.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -18,20 +18,15 @@ class Home : public ::testing::Test {
  protected:
   Home() {
     std::filesystem::create_directory(folder / "run");
-    world.write_picture(folder / "home.png", home);
+    write_picture(folder / "home.png", world, home);
     poses = grid_poses(3);
     for (Pose2& pose : poses) {
       pose = {0.8 + 0.4 * pose.x_m, 0.9 + 0.4 * pose.y_m, wrap_angle(7.0 * pose.x_m + pose.y_m)};
     }
     write_dataset(folder / "run", world, poses);
   }
-  [[nodiscard]] static json answer_of(const std::vector<std::string>& arguments) {
-    const auto result = run_panonav(arguments);
-    EXPECT_EQ(result.exit_code, 0) << result.err;
-    return json::parse(lines(result.out).at(0));
-  }
   TemporaryFolder folder;
-  LandmarkWorld world{4};
+  ToyWorld world = landmark_world(4);
   Pose2 home{1.0, 1.0, 0.4};
   std::vector<Pose2> poses;
 };
@@ -44,7 +39,7 @@ TEST_F(Home, EveryPictureOfADataSetPointsThere) {
   double homeward = 0.0;
   for (std::size_t i = 0; i < all.size(); ++i) {
     const auto answer = json::parse(all[i]);
-    EXPECT_EQ(answer["goal"], folder / "home.png");
+    EXPECT_EQ(answer["goal"], (folder / "home.png").string());
     EXPECT_EQ(answer["current"], view_name(i));
     EXPECT_NEAR(angle_difference(answer["heading_rad"], home.heading_rad - poses[i].heading_rad),
                 0.0, radians(15.0));
@@ -59,22 +54,22 @@ TEST_F(Home, EveryPictureOfADataSetPointsThere) {
 
 TEST_F(Home, APictureOfADataSetLiesAsItSays) {
   const auto both =
-      answer_of({"home", folder / "home.png", folder / "run/" + view_name(0), "--json"});
-  const auto stated = answer_of({"home", folder / "home.png", folder / "run/" + view_name(0),
+      answer_of({"home", folder / "home.png", folder / ("run/" + view_name(0)), "--json"});
+  const auto stated = answer_of({"home", folder / "home.png", folder / ("run/" + view_name(0)),
                                  "--kind", "panorama", "--json"});
   EXPECT_NEAR(both["heading_rad"].get<double>(), stated["heading_rad"].get<double>(), 0.02);
   const auto mirrored =
-      answer_of({"home", folder / "home.png", folder / "run/" + view_name(0), "--kind", "panorama",
-                 "--columns-run", "counter-clockwise", "--json"});
+      answer_of({"home", folder / "home.png", folder / ("run/" + view_name(0)), "--kind",
+                 "panorama", "--columns-run", "counter-clockwise", "--json"});
   EXPECT_NEAR(mirrored["heading_rad"].get<double>(), -both["heading_rad"].get<double>(), 0.02);
   EXPECT_NEAR(mirrored["eta"].get<double>(), -both["eta"].get<double>(), 0.01);
 }
 
 TEST_F(Home, AViewOfAMemoryGivesTheSameWithinRounding) {
-  const auto memory = folder / "run.panonav";
-  ASSERT_EQ(run_panonav({"memorise", folder / "run", memory}).exit_code, 0);
+  const std::string memory = folder / "run.panonav";
+  run_well({"memorise", folder / "run", memory});
   const std::string goal = view_name(4);
-  const auto direct = answer_of({"home", folder / "run/" + goal, folder / "home.png", "--json"});
+  const auto direct = answer_of({"home", folder / ("run/" + goal), folder / "home.png", "--json"});
   const auto kept = answer_of({"home", goal, folder / "home.png", "--memory", memory, "--json"});
   EXPECT_EQ(kept["goal"], goal);
   EXPECT_NEAR(angle_difference(kept["direction_rad"], direct["direction_rad"]), 0.0, radians(3.0));
@@ -94,76 +89,67 @@ TEST_F(Home, TheSamePictureHasNoDirection) {
   const auto text =
       run_panonav({"home", folder / "home.png", folder / "home.png", "--kind", "panorama"});
   EXPECT_EQ(text.exit_code, 1);
-  EXPECT_NE(text.out.find("looks like home itself"), std::string::npos) << text.out;
+  EXPECT_TRUE(contains(text.out, "looks like home itself"));
 }
 
 TEST_F(Home, SaysItInWords) {
-  const auto here = folder / "here.png";
-  world.write_picture(here, {0.8, 1.0, home.heading_rad - radians(90.0)});
+  const std::string here = folder / "here.png";
+  write_picture(here, world, {0.8, 1.0, home.heading_rad - radians(90.0)});
   const auto result = run_panonav({"home", folder / "home.png", here, "--kind", "panorama"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_NE(result.out.find("degrees to the left, about 0."), std::string::npos) << result.out;
-  EXPECT_NE(result.out.find("the robot has turned by "), std::string::npos) << result.out;
-  EXPECT_NE(result.out.find("degrees to the right; confidence"), std::string::npos) << result.out;
+  EXPECT_TRUE(contains(result.out, "degrees to the left, about 0."));
+  EXPECT_TRUE(contains(result.out, "the robot has turned by "));
+  EXPECT_TRUE(contains(result.out, "degrees to the right; confidence"));
 }
 
 TEST_F(Home, ThePublishedRuleAndOneRowAreOtherRules) {
-  const std::vector<std::string> ask{"home", folder / "home.png", folder / "run/" + view_name(0),
+  const std::vector<std::string> ask{"home", folder / "home.png", folder / ("run/" + view_name(0)),
                                      "--json"};
-  const auto with = [&](std::vector<std::string> more) {
-    auto all = ask;
-    all.insert(all.end(), more.begin(), more.end());
-    return answer_of(all);
+  const auto asked = [&](const std::vector<std::string>& more) {
+    return answer_of(with(ask, more));
   };
-  const auto ours = with({});
-  EXPECT_EQ(with({"--published", "5"})["frequencies"], 5.0);
-  EXPECT_NE(with({"--horizon"})["xi"], ours["xi"]);
-  EXPECT_NE(with({"--components", "8"})["xi"], ours["xi"]);
+  const auto ours = asked({});
+  EXPECT_EQ(asked({"--published", "5"})["frequencies"], 5.0);
+  EXPECT_NE(asked({"--horizon"})["xi"], ours["xi"]);
+  EXPECT_NE(asked({"--components", "8"})["xi"], ours["xi"]);
 }
 
 TEST_F(Home, BadInputIsOneLine) {
   const std::string home_file = folder / "home.png";
   const std::string run = folder / "run";
-  EXPECT_NE(refusal({"home", home_file, home_file}).find("--kind"), std::string::npos);
-  EXPECT_NE(refusal({"home", run, home_file}).find("is a folder"), std::string::npos);
-  EXPECT_NE(refusal({"home", home_file, run, "--components", "60"}).find("allowed: 3 to 48"),
-            std::string::npos);
-  EXPECT_NE(refusal({"home", home_file, run, "--components", "2"}).find(">= 3"), std::string::npos);
-  EXPECT_NE(refusal({"home", home_file, run, "--published", "14"}).find("1 to 13"),
-            std::string::npos);
-  EXPECT_NE(refusal({"home", home_file, run, "--published", "5", "--weights", "equal"})
-                .find("--published sets 'weights'"),
-            std::string::npos);
-  EXPECT_NE(refusal({"home", home_file, run, "--masked-rows-top", "12"}).find("leave none"),
-            std::string::npos);
-  world.write_picture(folder / "low.png", home, 96, 7);
-  EXPECT_NE(refusal({"home", folder / "low.png", run}).find("rows is 12; allowed: 7"),
-            std::string::npos);
+  EXPECT_TRUE(contains(refusal({"home", home_file, home_file}), "--kind"));
+  EXPECT_TRUE(contains(refusal({"home", run, home_file}), "is a folder"));
+  EXPECT_TRUE(
+      contains(refusal({"home", home_file, run, "--components", "60"}), "allowed: 3 to 48"));
+  EXPECT_TRUE(contains(refusal({"home", home_file, run, "--components", "2"}), ">= 3"));
+  EXPECT_TRUE(contains(refusal({"home", home_file, run, "--published", "14"}), "1 to 13"));
+  EXPECT_TRUE(contains(refusal({"home", home_file, run, "--published", "5", "--weights", "equal"}),
+                       "--published sets 'weights'"));
+  EXPECT_TRUE(contains(refusal({"home", home_file, run, "--masked-rows-top", "12"}), "leave none"));
+  write_picture(folder / "low.png", world, home, 96, 7);
+  EXPECT_TRUE(contains(refusal({"home", folder / "low.png", run}), "rows is 12; allowed: 7"));
   std::ofstream(folder / "broken.png") << "no picture";
-  EXPECT_NE(refusal({"home", folder / "broken.png", run}).find("broken.png"), std::string::npos);
+  EXPECT_TRUE(contains(refusal({"home", folder / "broken.png", run}), "broken.png"));
 
-  const auto memory = folder / "run.panonav";
-  ASSERT_EQ(run_panonav({"memorise", run, memory}).exit_code, 0);
-  EXPECT_NE(refusal({"home", "99", home_file, "--memory", memory}).find("'99'"), std::string::npos);
-  EXPECT_NE(
-      refusal({"home", "1", home_file, "--memory", memory, "--rows", "7"}).find("leave out --rows"),
-      std::string::npos);
-  EXPECT_NE(
-      refusal({"home", "1", home_file, "--memory", memory, "--components", "16"}).find("3 to 15"),
-      std::string::npos);
+  const std::string memory = folder / "run.panonav";
+  run_well({"memorise", run, memory});
+  EXPECT_TRUE(contains(refusal({"home", "99", home_file, "--memory", memory}), "'99'"));
+  EXPECT_TRUE(contains(refusal({"home", "1", home_file, "--memory", memory, "--rows", "7"}),
+                       "leave out --rows"));
+  EXPECT_TRUE(contains(refusal({"home", "1", home_file, "--memory", memory, "--components", "16"}),
+                       "3 to 15"));
 }
 
 #ifdef PANONAV_COMMAND_SIMULATES
 TEST_F(Home, TheReportHasItsPictures) {
-  const auto report = folder.path() / "report";
-  ASSERT_EQ(
-      run_panonav({"home", folder / "home.png", folder / "run", "--report", report}).exit_code, 0);
+  const std::filesystem::path report = folder / "report";
+  run_well({"home", folder / "home.png", folder / "run", "--report", report});
   for (const auto* file : {"index.html", "home_1.png", "home_4.png", "field.png"}) {
     EXPECT_TRUE(std::filesystem::exists(report / file)) << file;
   }
-  EXPECT_NE(refusal({"home", folder / "home.png", folder / "run", "--report", folder / "run"})
-                .find("not made by panonav home"),
-            std::string::npos);
+  EXPECT_TRUE(
+      contains(refusal({"home", folder / "home.png", folder / "run", "--report", folder / "run"}),
+               "not made by panonav home"));
 }
 #endif
 

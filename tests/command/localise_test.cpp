@@ -6,12 +6,13 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <optional>
 
-#include "command_runner.hpp"
-#include "landmark_world.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
+#include "support/command_runner.hpp"
+#include "support/landmark_pictures.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -22,25 +23,20 @@ using nlohmann::json;
 class Localise : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    folder_ = new TemporaryFolder;
-    world_ = new LandmarkWorld(7);
-    write_dataset(folder_->path() / "grid", *world_, grid_poses(5));
+    folder_.emplace();
+    world_ = landmark_world(7);
+    write_dataset(*folder_ / "grid", *world_, grid_poses(5));
     Random random(3);
     std::vector<Pose2> asked;
     for (int i = 0; i < 20; ++i) {
       asked.push_back({random.uniform(0.0, 2.0), random.uniform(0.0, 2.0),
                        random.uniform(-std::numbers::pi, std::numbers::pi)});
     }
-    asked_ = new std::vector<Pose2>(asked);
-    write_dataset(folder_->path() / "asked", *world_, asked);
-    const auto made = run_panonav({"memorise", *folder_ / "grid", memory()});
-    ASSERT_EQ(made.exit_code, 0) << made.err;
+    asked_ = asked;
+    write_dataset(*folder_ / "asked", *world_, asked);
+    run_well({"memorise", *folder_ / "grid", memory()});
   }
-  static void TearDownTestSuite() {
-    delete folder_;
-    delete world_;
-    delete asked_;
-  }
+  static void TearDownTestSuite() { folder_.reset(); }
   static std::string memory() { return *folder_ / "grid.panonav"; }
   static std::string grid() { return *folder_ / "grid"; }
   static std::string asked() { return *folder_ / "asked"; }
@@ -48,20 +44,13 @@ class Localise : public ::testing::Test {
   static std::vector<json> answers(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), "localise");
     arguments.push_back("--json");
-    const auto result = run_panonav(arguments);
-    EXPECT_EQ(result.exit_code, 0) << result.err;
-    std::vector<json> parsed;
-    for (const auto& line : lines(result.out)) parsed.push_back(json::parse(line));
-    return parsed;
+    return answers_of(arguments);
   }
 
-  static TemporaryFolder* folder_;
-  static LandmarkWorld* world_;
-  static std::vector<Pose2>* asked_;
+  inline static std::optional<TemporaryFolder> folder_;
+  inline static std::optional<ToyWorld> world_;
+  inline static std::optional<std::vector<Pose2>> asked_;
 };
-TemporaryFolder* Localise::folder_ = nullptr;
-LandmarkWorld* Localise::world_ = nullptr;
-std::vector<Pose2>* Localise::asked_ = nullptr;
 
 TEST_F(Localise, TheLibraryGivesTheCommandsAnswerToTheBit) {
   const PlaceRecogniser recogniser(memory());
@@ -91,11 +80,9 @@ TEST_F(Localise, JsonLinesHaveExactlyTheDocumentedFields) {
   const auto all = answers({memory(), asked()});
   ASSERT_EQ(all.size(), 20U);
   for (const auto& answer : all) {
-    std::vector<std::string> keys;
-    for (const auto& [key, value] : answer.items()) keys.push_back(key);
-    std::sort(keys.begin(), keys.end());
-    EXPECT_EQ(keys, (std::vector<std::string>{"bytes_read", "components", "file", "heading_rad",
-                                              "known", "matches", "position", "turned_rad"}));
+    EXPECT_EQ(keys_of(answer),
+              (std::set<std::string>{"bytes_read", "components", "file", "heading_rad", "known",
+                                     "matches", "position", "turned_rad"}));
     EXPECT_TRUE(answer["known"].is_boolean());
     EXPECT_TRUE(answer["components"].is_number_integer());
     EXPECT_TRUE(answer["bytes_read"].is_number_unsigned());
@@ -192,7 +179,7 @@ TEST_F(Localise, AnswersDoNotDependOnTheNumberOfThreads) {
 }
 
 TEST_F(Localise, AnotherWorldIsUnknownAndExitCodeSaysSo) {
-  write_dataset(folder_->path() / "elsewhere", LandmarkWorld(1234), grid_poses(4));
+  write_dataset(*folder_ / "elsewhere", landmark_world(1234), grid_poses(4));
   const auto result = run_panonav({"localise", memory(), *folder_ / "elsewhere", "--json"});
   const auto said = lines(result.out);
   ASSERT_EQ(said.size(), 16U);
@@ -220,34 +207,33 @@ TEST_F(Localise, OneImageAsksToo) {
 TEST_F(Localise, TextForPeopleNamesEachImage) {
   const auto result = run_panonav({"localise", memory(), asked()});
   EXPECT_EQ(result.exit_code, 0);
-  EXPECT_NE(result.out.find(view_name(0)), std::string::npos);
+  EXPECT_TRUE(contains(result.out, view_name(0)));
   EXPECT_EQ(result.out.find('\033'), std::string::npos) << "colours in a pipe";
 }
 
 TEST_F(Localise, WrongArgumentsAreRefused) {
-  EXPECT_NE(refusal({"localise", memory(), asked(), "--components", "0"}).find("components"),
-            std::string::npos);
-  EXPECT_NE(refusal({"localise", memory(), asked(), "--components", "400"}).find("components"),
-            std::string::npos);
-  EXPECT_NE(refusal({"localise", memory(), asked(), "--top", "0"}).find("top"), std::string::npos);
-  EXPECT_NE(refusal({"localise", *folder_ / "nothing.panonav", asked()}).find("nothing.panonav"),
-            std::string::npos);
-  EXPECT_NE(refusal({"localise", memory(), *folder_ / "nowhere"}).find("nowhere"),
-            std::string::npos);
-  EXPECT_NE(refusal({"localise", memory()}).find("INPUT"), std::string::npos);
+  EXPECT_TRUE(
+      contains(refusal({"localise", memory(), asked(), "--components", "0"}), "components"));
+  EXPECT_TRUE(
+      contains(refusal({"localise", memory(), asked(), "--components", "400"}), "components"));
+  EXPECT_TRUE(contains(refusal({"localise", memory(), asked(), "--top", "0"}), "top"));
+  EXPECT_TRUE(
+      contains(refusal({"localise", *folder_ / "nothing.panonav", asked()}), "nothing.panonav"));
+  EXPECT_TRUE(contains(refusal({"localise", memory(), *folder_ / "nowhere"}), "nowhere"));
+  EXPECT_TRUE(contains(refusal({"localise", memory()}), "INPUT"));
 }
 
 TEST_F(Localise, BadQueriesAreNamed) {
-  const auto data = folder_->path() / "bad";
+  const std::filesystem::path data = *folder_ / "bad";
   const auto table = [&](const std::string& rows) {
     std::ofstream(data / "poses.csv") << "file,x_m,y_m,heading_deg\n" << rows;
   };
   const auto refused = [&](const std::vector<std::string>& words) {
     const auto line = refusal({"localise", memory(), data});
-    for (const auto& word : words) EXPECT_NE(line.find(word), std::string::npos) << line;
+    for (const auto& word : words) EXPECT_TRUE(contains(line, word));
   };
   write_dataset(data, *world_, grid_poses(2));
-  ASSERT_EQ(run_panonav({"localise", memory(), data}).exit_code, 0);
+  run_well({"localise", memory(), data});
   table("view_000.png,0,nan,0\n");
   refused({"poses.csv", "y_m", "nan"});
   table("view_000.png,0,0\n");
@@ -282,16 +268,14 @@ TEST_F(Localise, AreasShrinkAndAreListedComponentByComponent) {
   // Stopping at an accuracy, and a memory without positions.
   const auto coarse = answers({memory(), asked(), "--areas", "--area-components", "2"});
   EXPECT_EQ(coarse.front()["areas"].size(), 2U);
-  const auto plain = *folder_ / "plain.panonav";
-  std::filesystem::create_directory(folder_->path() / "plain");
+  const std::string plain = *folder_ / "plain.panonav";
+  std::filesystem::create_directory(*folder_ / "plain");
   for (const int i : {0, 7, 13}) {
     std::filesystem::copy_file(std::filesystem::path(grid()) / view_name(static_cast<size_t>(i)),
-                               folder_->path() / "plain" / view_name(static_cast<size_t>(i)));
+                               *folder_ / "plain" / view_name(static_cast<size_t>(i)));
   }
-  ASSERT_EQ(run_panonav({"memorise", *folder_ / "plain", plain, "--kind", "panorama",
-                         "--elevation-deg", "-20", "20"})
-                .exit_code,
-            0);
+  run_well({"memorise", *folder_ / "plain", plain, "--kind", "panorama", "--elevation-deg", "-20",
+            "20"});
   const auto result = run_panonav({"localise", plain, *folder_ / "plain", "--areas", "--json"});
   EXPECT_LE(result.exit_code, 1) << result.err;
   const auto first = json::parse(lines(result.out).at(0));
@@ -302,14 +286,14 @@ TEST_F(Localise, AreasShrinkAndAreListedComponentByComponent) {
 }
 
 TEST_F(Localise, ViewsOfAnotherSizeAreRefused) {
-  write_dataset(folder_->path() / "small", *world_, grid_poses(2));
+  write_dataset(*folder_ / "small", *world_, grid_poses(2));
   for (int i = 0; i < 4; ++i) {
-    world_->write_picture(folder_->path() / "small" / view_name(static_cast<std::size_t>(i)),
-                          {0.5 * i, 0.0, 0.0}, 96, 10);
+    write_picture(*folder_ / "small" / view_name(static_cast<std::size_t>(i)), *world_,
+                  {0.5 * i, 0.0, 0.0}, 96, 10);
   }
   const auto line = refusal({"localise", memory(), *folder_ / "small"});
-  EXPECT_NE(line.find("view_000.png"), std::string::npos) << line;
-  EXPECT_NE(line.find("12"), std::string::npos) << line;
+  EXPECT_TRUE(contains(line, "view_000.png"));
+  EXPECT_TRUE(contains(line, "12"));
 }
 
 }  // namespace

@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "command_runner.hpp"
-#include "landmark_world.hpp"
+#include "support/command_runner.hpp"
+#include "support/landmark_pictures.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -27,11 +27,10 @@ std::vector<Pose2> round_trip() {
 
 class Map : public ::testing::Test {
  protected:
-  void SetUp() override { write_dataset(folder_.path() / "run", LandmarkWorld(3), round_trip()); }
+  void SetUp() override { write_dataset(folder_ / "run", landmark_world(3), round_trip()); }
   [[nodiscard]] std::string memory() const { return folder_ / "m.panonav"; }
-  [[nodiscard]] json map(std::vector<std::string> more = {}) const {
-    std::vector<std::string> arguments{"map", folder_ / "run", memory(), "--json"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
+  [[nodiscard]] json map(const std::vector<std::string>& more = {}) const {
+    const auto arguments = with({"map", folder_ / "run", memory(), "--json"}, more);
     const auto result = run_panonav(arguments);
     EXPECT_EQ(result.exit_code, 0) << result.err;
     EXPECT_EQ(result.err, "");
@@ -53,8 +52,7 @@ TEST_F(Map, EveryPictureBecomesANodeOfTheMap) {
   for (std::string line; std::getline(tum, line);) lines += line.empty() || line[0] == '#' ? 0 : 1;
   EXPECT_EQ(lines, said["parts"][0]);
   EXPECT_TRUE(fs::exists(folder_ / "m.graphml"));
-  const auto verified = run_panonav({"verify", memory()});
-  EXPECT_EQ(verified.exit_code, 0) << verified.out;
+  run_well({"verify", memory()});
   // A second time the views are known, and the map is the same.
   json again = map();
   json before = said;
@@ -75,9 +73,7 @@ TEST_F(Map, PruneShrinksTheMemoryAndKeepsTheMapWhole) {
   const auto dry =
       run_panonav({"prune", memory(), "--dry-run", "--max-difference", "0.05", "--json"});
   ASSERT_EQ(dry.exit_code, 0) << dry.err;
-  const auto pruned = run_panonav({"prune", memory(), "--max-difference", "0.05", "--json"});
-  ASSERT_EQ(pruned.exit_code, 0) << pruned.err;
-  const json result = json::parse(pruned.out);
+  const auto result = answer_of({"prune", memory(), "--max-difference", "0.05", "--json"});
   EXPECT_EQ(result["views_before"], 100);
   EXPECT_LT(result["views"], 100);
   EXPECT_GT(result["factor"], 1.0);
@@ -86,26 +82,23 @@ TEST_F(Map, PruneShrinksTheMemoryAndKeepsTheMapWhole) {
   EXPECT_EQ(json::parse(info.out)["views"], result["views"]);
   EXPECT_GE(json::parse(info.out)["links"].get<int>(),
             result["views"].get<int>() - static_cast<int>(said["parts"].size()));
-  EXPECT_EQ(run_panonav({"verify", memory()}).exit_code, 0);
+  run_well({"verify", memory()});
 }
 
 TEST_F(Map, WrongUseIsRefused) {
-  EXPECT_NE(refusal({"map", folder_ / "run", memory(), "--scale-m", "0"}).find("scale_m"),
-            std::string::npos);
+  EXPECT_TRUE(contains(refusal({"map", folder_ / "run", memory(), "--scale-m", "0"}), "scale_m"));
   EXPECT_FALSE(fs::exists(memory()));
-  EXPECT_NE(refusal({"map", folder_ / "none", memory()}).find("none"), std::string::npos);
+  EXPECT_TRUE(contains(refusal({"map", folder_ / "none", memory()}), "none"));
   static_cast<void>(map());
-  EXPECT_NE(refusal({"map", folder_ / "run", memory(), "--components", "9"}).find("keeps"),
-            std::string::npos);
-  EXPECT_NE(refusal({"prune", folder_ / "none.panonav"}).find("none.panonav"), std::string::npos);
+  EXPECT_TRUE(contains(refusal({"map", folder_ / "run", memory(), "--components", "9"}), "keeps"));
+  EXPECT_TRUE(contains(refusal({"prune", folder_ / "none.panonav"}), "none.panonav"));
 }
 
 TEST(MapOfADrive, TheHeightOfTheCameraTellsMetres) {
   const TemporaryFolder folder;
   const std::string run = folder / "run";
-  const auto made = run_panonav({"simulate", "loop", run, "--path", "tour", "--heading", "path",
-                                 "--spacing-m", "0.2", "--kind", "panorama", "--columns", "256"});
-  ASSERT_EQ(made.exit_code, 0) << made.err;
+  run_well({"simulate", "loop", run, "--path", "tour", "--heading", "path", "--spacing-m", "0.2",
+            "--kind", "panorama", "--columns", "256"});
   const auto scale_with = [&](const std::string& memory, std::vector<std::string> more) {
     std::vector<std::string> arguments{"map",   run,      memory,      "--wheel-lengths",
                                        "false", "--json", "--scale-m", "4"};

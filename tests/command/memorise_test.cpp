@@ -4,8 +4,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "command_runner.hpp"
-#include "landmark_world.hpp"
+#include "support/command_runner.hpp"
+#include "support/landmark_pictures.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -14,9 +14,7 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 json info_of(const std::string& memory) {
-  const auto result = run_panonav({"info", memory, "--json"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  return result.exit_code == 0 ? json::parse(result.out) : json();
+  return answer_of({"info", memory, "--json"});
 }
 
 int views_in(const std::string& memory) {
@@ -30,17 +28,15 @@ void write_text(const fs::path& path, const std::string& text) {
 class Memorise : public ::testing::Test {
  protected:
   void SetUp() override { write_dataset(data(), world_, grid_poses(4)); }
-  [[nodiscard]] fs::path data() const { return folder_.path() / "data"; }
+  [[nodiscard]] fs::path data() const { return folder_ / "data"; }
   [[nodiscard]] std::string memory() const { return folder_ / "m.panonav"; }
 
   TemporaryFolder folder_;
-  LandmarkWorld world_{5};
+  ToyWorld world_ = landmark_world(5);
 };
 
 TEST_F(Memorise, SaysWhatItDidAndInfoAgrees) {
-  const auto result = run_panonav({"memorise", data(), memory(), "--json"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  const auto said = json::parse(result.out);
+  const auto said = answer_of({"memorise", data(), memory(), "--json"});
   EXPECT_EQ(said["appended"], 16);
   EXPECT_EQ(said["known_before"], 0);
   const auto info = info_of(memory());
@@ -49,95 +45,85 @@ TEST_F(Memorise, SaysWhatItDidAndInfoAgrees) {
   EXPECT_EQ(info["components"], 15);
   EXPECT_EQ(info["views_with_position"], 16);
   EXPECT_EQ(info["views_with_heading"], 16);
-  const auto verified = run_panonav({"verify", memory(), "--json"});
-  EXPECT_EQ(verified.exit_code, 0);
-  EXPECT_EQ(json::parse(verified.out)["intact"], true);
+  EXPECT_EQ(answer_of({"verify", memory(), "--json"})["intact"], true);
 }
 
 TEST_F(Memorise, SecondTimeThereIsNothingToDo) {
-  ASSERT_EQ(run_panonav({"memorise", data(), memory()}).exit_code, 0);
-  const auto again = run_panonav({"memorise", data(), memory(), "--json"});
-  EXPECT_EQ(again.exit_code, 0) << again.err;
-  EXPECT_EQ(json::parse(again.out)["appended"], 0);
-  EXPECT_EQ(json::parse(again.out)["known_before"], 16);
+  run_well({"memorise", data(), memory()});
+  const auto again = answer_of({"memorise", data(), memory(), "--json"});
+  EXPECT_EQ(again["appended"], 0);
+  EXPECT_EQ(again["known_before"], 16);
   EXPECT_EQ(views_in(memory()), 16);
 }
 
 TEST_F(Memorise, PanoramasAreResampledToTheSizeAskedFor) {
-  ASSERT_EQ(run_panonav({"memorise", data(), memory(), "--rows", "6", "--columns", "48"}).exit_code,
-            0);
+  run_well({"memorise", data(), memory(), "--rows", "6", "--columns", "48"});
   const auto info = info_of(memory());
   EXPECT_EQ(info["rows"], 6);
   EXPECT_EQ(info["panorama_columns"], 48);
   EXPECT_EQ(info["views"], 16);
   // Asking resamples in the same way, so that every view finds itself.
-  const auto asked = run_panonav({"localise", memory(), data(), "--json"});
-  ASSERT_EQ(asked.exit_code, 0) << asked.err;
-  const auto answers = lines(asked.out);
+  const auto answers = answers_of({"localise", memory(), data(), "--json"});
   ASSERT_EQ(answers.size(), 16U);
-  for (const auto& line : answers) {
-    const auto answer = json::parse(line);
+  for (const auto& answer : answers) {
     EXPECT_EQ(answer["matches"][0]["file"], answer["file"]);
     EXPECT_EQ(answer["matches"][0]["dissimilarity"], 0);
   }
   // Pictures of another size than the recording's are still refused, on both ways in.
-  world_.write_picture(data() / view_name(5), {0.0, 0.0, 0.0}, 48, 6);
+  write_picture(data() / view_name(5), world_, {0.0, 0.0, 0.0}, 48, 6);
   auto line = refusal({"localise", memory(), data()});
-  EXPECT_NE(line.find(view_name(5) + ": rows is 6; allowed: 12"), std::string::npos) << line;
+  EXPECT_TRUE(contains(line, view_name(5) + ": rows is 6; allowed: 12"));
   line = refusal({"memorise", data(), folder_ / "o.panonav", "--rows", "6", "--columns", "48"});
-  EXPECT_NE(line.find(view_name(5)), std::string::npos) << line;
+  EXPECT_TRUE(contains(line, view_name(5)));
   EXPECT_FALSE(fs::exists(folder_ / "o.panonav"));
 }
 
 TEST_F(Memorise, AResumedMemoryTakesNoOtherPictureUnderAKnownName) {
-  ASSERT_EQ(run_panonav({"memorise", data(), memory()}).exit_code, 0);
+  run_well({"memorise", data(), memory()});
   // Same name, same pose, one other picture out of sixteen.
-  world_.write_picture(data() / view_name(6), {1.7, 0.1, 0.0});
+  write_picture(data() / view_name(6), world_, {1.7, 0.1, 0.0});
   auto line = refusal({"memorise", data(), memory()});
-  EXPECT_NE(line.find("m.panonav"), std::string::npos) << line;
-  EXPECT_NE(line.find("another picture under the name " + view_name(6)), std::string::npos) << line;
+  EXPECT_TRUE(contains(line, "m.panonav"));
+  EXPECT_TRUE(contains(line, "another picture under the name " + view_name(6)));
   // The robot turned on the spot: the same place, but another view.
-  world_.write_picture(data() / view_name(6), {0.5, 1.0, 0.4});
+  write_picture(data() / view_name(6), world_, {0.5, 1.0, 0.4});
   line = refusal({"memorise", data(), memory()});
-  EXPECT_NE(line.find(view_name(6)), std::string::npos) << line;
+  EXPECT_TRUE(contains(line, view_name(6)));
   // The true picture written anew is the same view.
-  world_.write_picture(data() / view_name(6), grid_poses(4)[6]);
-  EXPECT_EQ(run_panonav({"memorise", data(), memory()}).exit_code, 0);
+  write_picture(data() / view_name(6), world_, grid_poses(4)[6]);
+  run_well({"memorise", data(), memory()});
   fs::remove(data() / view_name(6));
   line = refusal({"memorise", data(), memory()});
-  EXPECT_NE(line.find(view_name(6)), std::string::npos) << line;
+  EXPECT_TRUE(contains(line, view_name(6)));
   EXPECT_EQ(views_in(memory()), 16);
 }
 
 TEST_F(Memorise, AResumedMemoryTakesNoOtherPoseUnderAKnownName) {
-  ASSERT_EQ(run_panonav({"memorise", data(), memory()}).exit_code, 0);
+  run_well({"memorise", data(), memory()});
   auto moved = grid_poses(4);
   moved[9].x_m += 0.01;
   write_dataset(data(), world_, moved);
-  const auto line = refusal({"memorise", data(), memory()});
-  EXPECT_NE(line.find(view_name(9)), std::string::npos) << line;
+  EXPECT_TRUE(contains(refusal({"memorise", data(), memory()}), view_name(9)));
   EXPECT_EQ(views_in(memory()), 16);
 }
 
 TEST_F(Memorise, WhatWasForgottenAndReplacedIsComparedAgain) {
-  ASSERT_EQ(run_panonav({"memorise", data(), memory()}).exit_code, 0);
-  ASSERT_EQ(run_panonav({"forget", memory(), view_name(6)}).exit_code, 0);
-  const auto other = folder_.path() / "other";
+  run_well({"memorise", data(), memory()});
+  run_well({"forget", memory(), view_name(6)});
+  const fs::path other = folder_ / "other";
   auto poses = grid_poses(4);
-  write_dataset(other, LandmarkWorld(99), poses);
+  write_dataset(other, landmark_world(99), poses);
   for (std::size_t i = 0; i < poses.size(); ++i) {
     if (i != 6) fs::remove(other / view_name(i));
   }
   write_text(other / "poses.csv", "file,x_m,y_m,heading_deg\nview_006.png,0.5,1,0\n");
-  ASSERT_EQ(run_panonav({"memorise", other, memory()}).exit_code, 0);
-  const auto line = refusal({"memorise", data(), memory()});
-  EXPECT_NE(line.find(view_name(6)), std::string::npos) << line;
+  run_well({"memorise", other, memory()});
+  EXPECT_TRUE(contains(refusal({"memorise", data(), memory()}), view_name(6)));
 }
 
 TEST_F(Memorise, TakesAFolderOfImagesWithoutPoses) {
   fs::remove(data() / "dataset.toml");
-  const auto result = run_panonav({"memorise", data(), memory(), "--kind", "panorama", "--json"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
+  run_well({"memorise", data(), memory(), "--kind", "panorama", "--json"});
   const auto info = info_of(memory());
   EXPECT_EQ(info["views"], 16);
   EXPECT_EQ(info["views_with_position"], 0);
@@ -145,51 +131,42 @@ TEST_F(Memorise, TakesAFolderOfImagesWithoutPoses) {
 
 TEST_F(Memorise, AFolderWithoutDatasetTomlNeedsAKind) {
   fs::remove(data() / "dataset.toml");
-  EXPECT_NE(refusal({"memorise", data(), memory()}).find("--kind"), std::string::npos);
+  EXPECT_TRUE(contains(refusal({"memorise", data(), memory()}), "--kind"));
   EXPECT_FALSE(fs::exists(memory()));
 }
 
 TEST_F(Memorise, ForgetDropsViewsByNameAndRefusesUnknownOnes) {
-  ASSERT_EQ(run_panonav({"memorise", data(), memory()}).exit_code, 0);
-  const auto line = refusal({"forget", memory(), view_name(2), "never_seen.png"});
-  EXPECT_NE(line.find("never_seen.png"), std::string::npos);
+  run_well({"memorise", data(), memory()});
+  EXPECT_TRUE(
+      contains(refusal({"forget", memory(), view_name(2), "never_seen.png"}), "never_seen.png"));
   EXPECT_EQ(views_in(memory()), 16) << "a refused forget must forget nothing";
-  EXPECT_EQ(run_panonav({"forget", memory(), view_name(2), view_name(3)}).exit_code, 0);
+  run_well({"forget", memory(), view_name(2), view_name(3)});
   EXPECT_EQ(views_in(memory()), 14);
 }
 
 TEST_F(Memorise, OptionsComeFromFlagsAndFromAFile) {
-  write_text(folder_.path() / "options.toml", "[signature]\ncomponents = 7\n");
-  ASSERT_EQ(
-      run_panonav({"memorise", data(), memory(), "--config", folder_ / "options.toml"}).exit_code,
-      0);
+  write_text(folder_ / "options.toml", "[signature]\ncomponents = 7\n");
+  run_well({"memorise", data(), memory(), "--config", folder_ / "options.toml"});
   EXPECT_EQ(info_of(memory())["components"], 7);
-  const auto other = folder_ / "other.panonav";
-  ASSERT_EQ(run_panonav({"memorise", data(), other, "--config", folder_ / "options.toml",
-                         "--components", "5"})
-                .exit_code,
-            0);
+  const std::string other = folder_ / "other.panonav";
+  run_well({"memorise", data(), other, "--config", folder_ / "options.toml", "--components", "5"});
   EXPECT_EQ(info_of(other)["components"], 5);
 }
 
 TEST_F(Memorise, WrongOptionsInAFileAreRefusedByName) {
   const std::string config = folder_ / "options.toml";
-  write_text(config, "[signature]\ncomponentz = 7\n");
-  auto line = refusal({"memorise", data(), memory(), "--config", config});
-  EXPECT_NE(line.find("options.toml"), std::string::npos) << line;
-  EXPECT_NE(line.find("componentz"), std::string::npos) << line;
-  write_text(config, "[signatures]\ncomponents = 7\n");
-  line = refusal({"memorise", data(), memory(), "--config", config});
-  EXPECT_NE(line.find("signatures"), std::string::npos) << line;
-  write_text(config, "[signature]\ncomponents = 0\n");
-  line = refusal({"memorise", data(), memory(), "--config", config});
-  EXPECT_NE(line.find("components"), std::string::npos) << line;
-  write_text(config, "not toml [");
-  line = refusal({"memorise", data(), memory(), "--config", config});
-  EXPECT_NE(line.find("options.toml"), std::string::npos) << line;
-  EXPECT_NE(
-      refusal({"memorise", data(), memory(), "--config", folder_ / "no.toml"}).find("no.toml"),
-      std::string::npos);
+  const std::vector<std::pair<std::string, std::vector<std::string>>> wrong{
+      {"[signature]\ncomponentz = 7\n", {"options.toml", "componentz"}},
+      {"[signatures]\ncomponents = 7\n", {"signatures"}},
+      {"[signature]\ncomponents = 0\n", {"components"}},
+      {"not toml [", {"options.toml"}}};
+  for (const auto& [text, words] : wrong) {
+    write_text(config, text);
+    const auto line = refusal({"memorise", data(), memory(), "--config", config});
+    for (const auto& word : words) EXPECT_TRUE(contains(line, word));
+  }
+  EXPECT_TRUE(contains(refusal({"memorise", data(), memory(), "--config", folder_ / "no.toml"}),
+                       "no.toml"));
   EXPECT_FALSE(fs::exists(memory()));
 }
 
@@ -198,107 +175,81 @@ class BadInput : public Memorise {
  protected:
   void SetUp() override {
     Memorise::SetUp();
-    first_ = folder_.path() / "first";
+    first_ = folder_ / "first";
     write_dataset(first_, world_, {{-1.0, -1.0, 0.0}, {-1.0, -0.5, 0.0}});
     fs::rename(first_ / view_name(0), first_ / "a.png");
     fs::rename(first_ / view_name(1), first_ / "b.png");
     write_text(first_ / "poses.csv", "file,x_m,y_m,heading_deg\na.png,-1,-1,0\nb.png,-1,-0.5,0\n");
-    ASSERT_EQ(run_panonav({"memorise", first_, memory()}).exit_code, 0);
+    run_well({"memorise", first_, memory()});
   }
   void expect_refused(const std::vector<std::string>& words, int views_kept_at_least = 2) {
     const auto line = refusal({"memorise", data(), memory()});
-    for (const auto& word : words) EXPECT_NE(line.find(word), std::string::npos) << line;
+    for (const auto& word : words) EXPECT_TRUE(contains(line, word));
     EXPECT_GE(views_in(memory()), views_kept_at_least);
-    EXPECT_EQ(run_panonav({"verify", memory()}).exit_code, 0);
+    run_well({"verify", memory()});
   }
   fs::path first_;
 };
 
-TEST_F(BadInput, MissingImage) {
-  fs::remove(data() / view_name(5));
-  expect_refused({view_name(5)});
+TEST_F(BadInput, WrongPicturesAreNamed) {
+  const std::string name = view_name(5);
+  fs::remove(data() / name);
+  expect_refused({name});
+  write_text(data() / name, "this is no picture");
+  expect_refused({name});
+  write_picture(data() / name, world_, {0.0, 0.0, 0.0});
+  fs::resize_file(data() / name, fs::file_size(data() / name) / 2);
+  expect_refused({name});
+  write_picture(data() / name, world_, {0.0, 0.0, 0.0}, 96, 9);
+  expect_refused({name, "9", "12"});
+  const std::vector<std::tuple<int, int, std::vector<std::string>>> sizes{{96, 9, {"9", "12"}},
+                                                                          {80, 12, {"80", "96"}}};
+  for (const auto& [columns, rows, words] : sizes) {
+    for (std::size_t i = 0; i < 16; ++i) {
+      write_picture(data() / view_name(i), world_, {0.0, 0.0, 0.0}, columns, rows);
+    }
+    expect_refused(words);
+  }
 }
 
-TEST_F(BadInput, UndecodableImage) {
-  write_text(data() / view_name(5), "this is no picture");
-  expect_refused({view_name(5)});
-}
-
-TEST_F(BadInput, ImageCutShort) {
-  fs::resize_file(data() / view_name(5), fs::file_size(data() / view_name(5)) / 2);
-  expect_refused({view_name(5)});
-}
-
-TEST_F(BadInput, WrongSize) {
-  world_.write_picture(data() / view_name(5), {0.0, 0.0, 0.0}, 96, 9);
-  expect_refused({view_name(5), "9", "12"});
-}
-
-TEST_F(BadInput, EmptyDataSet) {
-  write_text(data() / "poses.csv", "file,x_m,y_m,heading_deg\n");
-  expect_refused({"poses.csv"});
+TEST_F(BadInput, WrongTablesAreNamed) {
+  const std::vector<std::pair<std::string, std::vector<std::string>>> tables{
+      {"file,x_m,y_m,heading_deg\n", {}},
+      {"file,x_m,y_m,heading_deg\nview_000.png,0,nan,0\nview_001.png,0,0,0\n", {"y_m", "nan"}},
+      {"file,x_m,y_m,heading_deg\nview_000.png,0,1\n", {}},
+      {"file,x_m,heading_deg\nview_000.png,0,1\n", {"y_m"}},
+      {"file,x_m,y_m,heading_deg\nview_001.png,0,0,0\nview_001.png,1,0,0\n", {"view_001.png"}}};
+  for (const auto& [text, words] : tables) {
+    write_text(data() / "poses.csv", text);
+    expect_refused(with({"poses.csv"}, words));
+  }
 }
 
 TEST_F(BadInput, EmptyFolder) {
   fs::remove_all(data());
   fs::create_directory(data());
-  const auto line = refusal({"memorise", data(), memory(), "--kind", "panorama"});
-  EXPECT_NE(line.find("data"), std::string::npos) << line;
-}
-
-TEST_F(BadInput, PoseThatIsNoNumber) {
-  write_text(data() / "poses.csv",
-             "file,x_m,y_m,heading_deg\nview_000.png,0,nan,0\nview_001.png,0,0,0\n");
-  expect_refused({"poses.csv", "y_m", "nan"});
-}
-
-TEST_F(BadInput, MissingPoseField) {
-  write_text(data() / "poses.csv", "file,x_m,y_m,heading_deg\nview_000.png,0,1\n");
-  expect_refused({"poses.csv"});
-  write_text(data() / "poses.csv", "file,x_m,heading_deg\nview_000.png,0,1\n");
-  expect_refused({"poses.csv", "y_m"});
-}
-
-TEST_F(BadInput, DuplicateNames) {
-  write_text(data() / "poses.csv",
-             "file,x_m,y_m,heading_deg\nview_001.png,0,0,0\nview_001.png,1,0,0\n");
-  expect_refused({"poses.csv", "view_001.png"});
+  EXPECT_TRUE(contains(refusal({"memorise", data(), memory(), "--kind", "panorama"}), "data"));
 }
 
 TEST_F(BadInput, ZeroComponents) {
-  const auto line = refusal({"memorise", data(), folder_ / "new.panonav", "--components", "0"});
-  EXPECT_NE(line.find("components"), std::string::npos) << line;
+  EXPECT_TRUE(contains(refusal({"memorise", data(), folder_ / "new.panonav", "--components", "0"}),
+                       "components"));
   EXPECT_FALSE(fs::exists(folder_ / "new.panonav"));
-}
-
-TEST_F(BadInput, RowsThatDoNotMatchTheMemory) {
-  for (std::size_t i = 0; i < 16; ++i) {
-    world_.write_picture(data() / view_name(i), {0.0, 0.0, 0.0}, 96, 9);
-  }
-  expect_refused({"9", "12"});
-}
-
-TEST_F(BadInput, ColumnsThatDoNotMatchTheMemory) {
-  for (std::size_t i = 0; i < 16; ++i) {
-    world_.write_picture(data() / view_name(i), {0.0, 0.0, 0.0}, 80, 12);
-  }
-  expect_refused({"80", "96"});
 }
 
 TEST_F(BadInput, DirectoryThatCannotBeWritten) {
   // Root may write anywhere but into what is no real folder.
-  EXPECT_NE(refusal({"memorise", data(), "/proc/m.panonav"}).find("/proc"), std::string::npos);
-  EXPECT_NE(refusal({"memorise", data(), folder_ / "no/such/folder/m.panonav"}).find("no/such"),
-            std::string::npos);
+  EXPECT_TRUE(contains(refusal({"memorise", data(), "/proc/m.panonav"}), "/proc"));
+  EXPECT_TRUE(
+      contains(refusal({"memorise", data(), folder_ / "no/such/folder/m.panonav"}), "no/such"));
 }
 
 TEST_F(BadInput, FilesThatAreNoMemory) {
-  write_text(folder_.path() / "text.panonav", "hello");
-  EXPECT_NE(refusal({"memorise", data(), folder_ / "text.panonav"}).find("text.panonav"),
-            std::string::npos);
-  EXPECT_EQ(fs::file_size(folder_.path() / "text.panonav"), 5U) << "a foreign file was changed";
-  EXPECT_NE(refusal({"info", folder_ / "text.panonav"}).find("text.panonav"), std::string::npos);
-  EXPECT_NE(refusal({"verify", folder_ / "text.panonav"}).find("text.panonav"), std::string::npos);
+  write_text(folder_ / "text.panonav", "hello");
+  EXPECT_TRUE(contains(refusal({"memorise", data(), folder_ / "text.panonav"}), "text.panonav"));
+  EXPECT_EQ(fs::file_size(folder_ / "text.panonav"), 5U) << "a foreign file was changed";
+  EXPECT_TRUE(contains(refusal({"info", folder_ / "text.panonav"}), "text.panonav"));
+  EXPECT_TRUE(contains(refusal({"verify", folder_ / "text.panonav"}), "text.panonav"));
 }
 
 TEST_F(BadInput, FullDiskWhileAppendingKeepsWhatWasAppended) {
@@ -308,27 +259,27 @@ TEST_F(BadInput, FullDiskWhileAppendingKeepsWhatWasAppended) {
   EXPECT_EQ(result.exit_code, 2) << result.err;
   EXPECT_EQ(lines(result.err).size(), 1U) << result.err;
   EXPECT_GE(views_in(memory()), 2);
-  EXPECT_EQ(run_panonav({"verify", memory()}).exit_code, 0);
+  run_well({"verify", memory()});
   ASSERT_EQ(run_panonav({"memorise", data(), memory()}).exit_code, 0) << "resumes";
   EXPECT_EQ(views_in(memory()), 18);
 }
 
 TEST_F(BadInput, KilledMemoriseResumes) {
   write_dataset(data(), world_, grid_poses(15));
-  const auto whole = folder_ / "whole.panonav";
-  ASSERT_EQ(run_panonav({"memorise", data(), whole}).exit_code, 0);
-  const auto killed_memory = folder_ / "killed.panonav";
+  const std::string whole = folder_ / "whole.panonav";
+  run_well({"memorise", data(), whole});
+  const std::string killed_memory = folder_ / "killed.panonav";
   int killed = 0;
   for (int delay_ms = 5; delay_ms < 400; delay_ms += delay_ms < 40 ? 5 : 60) {
     const auto result = run_panonav({"memorise", data(), killed_memory},
                                     {.file_size_limit_bytes = {}, .kill_after_ms = delay_ms});
     killed += result.signal == 9 ? 1 : 0;
     if (fs::exists(killed_memory)) {
-      EXPECT_EQ(run_panonav({"verify", killed_memory}).exit_code, 0);
+      run_well({"verify", killed_memory});
     }
   }
   EXPECT_GE(killed, 3);
-  ASSERT_EQ(run_panonav({"memorise", data(), killed_memory}).exit_code, 0);
+  run_well({"memorise", data(), killed_memory});
   EXPECT_EQ(views_in(killed_memory), 225);
   // What was resumed answers as what was made in one go.
   const auto a = run_panonav({"localise", whole, data(), "--json", "--turn-randomly", "1"});

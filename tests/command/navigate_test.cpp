@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "command_runner.hpp"
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/storage/memory_file.hpp"
+#include "support/command_runner.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -36,10 +36,6 @@ class Navigate : public ::testing::Test {
     run_well({"route", "record", *folder / "run", with_route, "--name", "rows"});
   }
   static void TearDownTestSuite() { folder.reset(); }
-  static void run_well(const std::vector<std::string>& arguments) {
-    const auto result = run_panonav(arguments);
-    ASSERT_EQ(result.exit_code, 0) << arguments.front() << ": " << result.err;
-  }
   /// The view that is nearest to a place.
   static std::string view_near(Point2 place) {
     const VisualMemory views = MemoryFile::open(memory, Access::read_only).load();
@@ -53,17 +49,10 @@ class Navigate : public ::testing::Test {
     const VisualMemory views = MemoryFile::open(memory, Access::read_only).load();
     const auto& first = views.info(views.views().front());
     const auto& last = views.info(views.views().back());
-    std::vector<std::string> arguments{
-        "navigate",
-        file,
-        "--goal",
-        last.name,
-        "--scene",
-        "office",
-        "--start",
-        std::to_string(first.pose->x_m) + "," + std::to_string(first.pose->y_m) + ",40"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return arguments;
+    const std::string start =
+        std::to_string(first.pose->x_m) + "," + std::to_string(first.pose->y_m) + ",40";
+    return with({"navigate", file, "--goal", last.name, "--scene", "office", "--start", start},
+                more);
   }
   static std::vector<json> objects(const std::string& out) {
     std::vector<json> result;
@@ -168,23 +157,23 @@ TEST_F(Navigate, WithoutPosesItCannotSayHowFarOffItEnded) {
   EXPECT_TRUE(summary["goal_distance_m"].is_null());
   EXPECT_TRUE(summary["shortest_m"].is_null());
   EXPECT_TRUE(std::filesystem::exists(*folder / "nowhere.png"));
-  EXPECT_NE(refusal(there(nowhere, {"--kidnap", "1,1,0"})).find("--kidnap"), std::string::npos);
+  EXPECT_TRUE(contains(refusal(there(nowhere, {"--kidnap", "1,1,0"})), "--kidnap"));
 }
 
 TEST_F(Navigate, RefusesInOneLine) {
   const auto ask = [](const std::string& file, const std::string& goal) {
     return std::vector<std::string>{"navigate", file, "--goal", goal, "--scene", "office"};
   };
-  EXPECT_NE(refusal(ask(memory, "no_view.png")).find("no_view.png"), std::string::npos);
-  EXPECT_NE(refusal(ask(*folder / "none.panonav", "1")).find("none.panonav"), std::string::npos);
+  EXPECT_TRUE(contains(refusal(ask(memory, "no_view.png")), "no_view.png"));
+  EXPECT_TRUE(contains(refusal(ask(*folder / "none.panonav", "1")), "none.panonav"));
   auto wrong = ask(memory, view_near({0.0, 0.0}));
   wrong.insert(wrong.end(), {"--start", "900,900,0"});
-  EXPECT_NE(refusal(wrong).find("--start"), std::string::npos);
+  EXPECT_TRUE(contains(refusal(wrong), "--start"));
   wrong.back() = "1,2";
-  EXPECT_NE(refusal(wrong).find("X,Y,HEADING_DEG"), std::string::npos);
+  EXPECT_TRUE(contains(refusal(wrong), "X,Y,HEADING_DEG"));
   wrong = ask(bare, view_near({0.0, 0.0}));
   wrong.insert(wrong.end(), {"--passages", "links"});
-  EXPECT_NE(refusal(wrong).find("links"), std::string::npos);
+  EXPECT_TRUE(contains(refusal(wrong), "links"));
 
   // Routes beside which no view is known to lie, and none.
   {
@@ -196,16 +185,15 @@ TEST_F(Navigate, RefusesInOneLine) {
     ASSERT_EQ(file.append_route("adrift", far), 2U);
     file.set_parameter("route.adrift", "half_band_rad 0.0131 odometry");
   }
-  EXPECT_NE(refusal(there(with_route, {"--route", "far"})).find("within 0.4 m of the route 'far'"),
-            std::string::npos);
-  EXPECT_NE(refusal(there(with_route, {"--route", "adrift"})).find("odometry"), std::string::npos);
-  EXPECT_NE(refusal(there(with_route, {"--route", "none"})).find("adrift, far, rows"),
-            std::string::npos);
+  EXPECT_TRUE(
+      contains(refusal(there(with_route, {"--route", "far"})), "within 0.4 m of the route 'far'"));
+  EXPECT_TRUE(contains(refusal(there(with_route, {"--route", "adrift"})), "odometry"));
+  EXPECT_TRUE(contains(refusal(there(with_route, {"--route", "none"})), "adrift, far, rows"));
 
   const std::string empty = *folder / "empty.panonav";
   static_cast<void>(
       MemoryFile::create(empty, MemoryFile::open(memory, Access::read_only).header()));
-  EXPECT_NE(refusal(ask(empty, "1")).find("holds no views"), std::string::npos);
+  EXPECT_TRUE(contains(refusal(ask(empty, "1")), "holds no views"));
   const std::string lonely = *folder / "lonely.panonav";
   std::filesystem::copy_file(memory, lonely);
   {
@@ -218,8 +206,7 @@ TEST_F(Navigate, RefusesInOneLine) {
   }
   const VisualMemory views = MemoryFile::open(lonely, Access::read_only).load();
   const std::string name = views.info(views.views().front()).name;
-  EXPECT_NE(refusal(ask(lonely, name)).find("no passage leads to the view " + name),
-            std::string::npos);
+  EXPECT_TRUE(contains(refusal(ask(lonely, name)), "no passage leads to the view " + name));
 }
 
 }  // namespace

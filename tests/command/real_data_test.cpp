@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "command_runner.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/pose2.hpp"
+#include "support/command_runner.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -30,18 +30,6 @@ std::map<std::string, Point2> positions(const std::filesystem::path& csv, std::s
   return found;
 }
 
-std::vector<json> answers(const std::vector<std::string>& arguments) {
-  const auto result = run_panonav(arguments);
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  std::vector<json> parsed;
-  for (const auto& line : lines(result.out)) parsed.push_back(json::parse(line));
-  return parsed;
-}
-
-#define REQUIRE_REAL_DATA(variable, folder) \
-  const auto variable = real_data(folder);  \
-  if (!variable) GTEST_SKIP() << "PANONAV_DATA does not name a folder that holds " folder
-
 void expect_plants_found(const std::vector<json>& all, const std::filesystem::path& data) {
   const auto where = positions(data / "poses.csv", 1);
   ASSERT_EQ(all.size(), 196U);
@@ -56,25 +44,27 @@ void expect_plants_found(const std::vector<json>& all, const std::filesystem::pa
   EXPECT_LE(worst_m, 0.20 + 1e-9);
 }
 
-TEST(RealData, GantryPlantsLeaveOneOut) {
-  REQUIRE_REAL_DATA(data, "gantry_plants");
-  const TemporaryFolder folder;
-  const auto memory = folder / "plants.panonav";
-  ASSERT_EQ(run_panonav({"memorise", *data, memory}).exit_code, 0);
+using RealData = InTemporaryFolder;
+
+TEST_F(RealData, GantryPlantsLeaveOneOut) {
+  const auto data = real_data("gantry_plants");
+  PANONAV_REQUIRE_DATA(data, "gantry_plants");
+  const std::string memory = folder / "plants.panonav";
+  run_well({"memorise", *data, memory});
   const std::vector<std::string> ask{"localise", memory, *data, "--json", "--exclude-same-file"};
-  expect_plants_found(answers(ask), *data);
+  expect_plants_found(answers_of(ask), *data);
   for (const std::string seed : {"1", "2"}) {
     auto turned = ask;
     turned.insert(turned.end(), {"--turn-randomly", seed});
-    expect_plants_found(answers(turned), *data);
+    expect_plants_found(answers_of(turned), *data);
   }
 }
 
-TEST(RealData, SussexRouteEvenImagesRememberedOddOnesAsked) {
-  REQUIRE_REAL_DATA(data, "sussex_route");
-  const TemporaryFolder folder;
+TEST_F(RealData, SussexRouteEvenImagesRememberedOddOnesAsked) {
+  const auto data = real_data("sussex_route");
+  PANONAV_REQUIRE_DATA(data, "sussex_route");
   for (const std::string half : {"even", "odd"}) {
-    const auto path = folder.path() / half;
+    const std::filesystem::path path = folder / half;
     std::filesystem::create_directory(path);
     std::filesystem::copy_file(*data / "dataset.toml", path / "dataset.toml");
     std::ifstream in(*data / "poses.csv");
@@ -89,9 +79,9 @@ TEST(RealData, SussexRouteEvenImagesRememberedOddOnesAsked) {
       std::filesystem::create_symlink(*data / name, path / name);
     }
   }
-  const auto memory = folder / "route.panonav";
-  ASSERT_EQ(run_panonav({"memorise", folder / "even", memory}).exit_code, 0);
-  const auto all = answers({"localise", memory, folder / "odd", "--json"});
+  const std::string memory = folder / "route.panonav";
+  run_well({"memorise", folder / "even", memory});
+  const auto all = answers_of({"localise", memory, folder / "odd", "--json"});
   ASSERT_EQ(all.size(), 227U);
   const auto where = positions(*data / "poses.csv", 2);
   std::vector<double> nearest_m;
@@ -110,12 +100,12 @@ TEST(RealData, SussexRouteEvenImagesRememberedOddOnesAsked) {
   EXPECT_LE(quantile(interpolated_m, 0.95), 0.09);
 }
 
-TEST(RealData, IndoorWalkTurnedFindsItselfAndItsTurn) {
-  REQUIRE_REAL_DATA(data, "indoor_walk_360");
-  const TemporaryFolder folder;
-  const auto memory = folder / "walk.panonav";
-  ASSERT_EQ(run_panonav({"memorise", *data, memory}).exit_code, 0);
-  const auto all = answers({"localise", memory, *data, "--json", "--turn-randomly", "5"});
+TEST_F(RealData, IndoorWalkTurnedFindsItselfAndItsTurn) {
+  const auto data = real_data("indoor_walk_360");
+  PANONAV_REQUIRE_DATA(data, "indoor_walk_360");
+  const std::string memory = folder / "walk.panonav";
+  run_well({"memorise", *data, memory});
+  const auto all = answers_of({"localise", memory, *data, "--json", "--turn-randomly", "5"});
   ASSERT_EQ(all.size(), 117U);
   for (const auto& answer : all) {
     const auto& best = answer["matches"][0];

@@ -7,8 +7,8 @@
 #include <regex>
 #include <sstream>
 
-#include "command_runner.hpp"
 #include "panonav/io/image_file.hpp"
+#include "support/command_runner.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -16,17 +16,12 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-std::string bytes_of(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
-
 /// Every picture that the page shows is there and can be read; gives their number.
 int readable_pictures(const fs::path& folder) {
   const std::string page = bytes_of(folder / "index.html");
-  EXPECT_NE(page.find("</html>"), std::string::npos);
-  EXPECT_EQ(page.find("http"), std::string::npos) << "the page needs the network";
-  EXPECT_EQ(page.find("nan"), std::string::npos);
+  EXPECT_TRUE(contains(page, "</html>"));
+  EXPECT_FALSE(contains(page, "http")) << "the page needs the network";
+  EXPECT_FALSE(contains(page, "nan"));
   const std::regex source("<img src=\"([^\"]+)\"");
   int count = 0;
   for (std::sregex_iterator i(page.begin(), page.end(), source), end; i != end; ++i) {
@@ -52,7 +47,7 @@ void expect_eight_parts(const fs::path& folder) {
     at = page.find(heading, at);
     EXPECT_NE(at, std::string::npos) << heading;
   }
-  EXPECT_EQ(page.find("#part9"), std::string::npos);
+  EXPECT_FALSE(contains(page, "#part9"));
 }
 
 /// A command of the page as a user would type it.
@@ -93,12 +88,11 @@ void expect_tracked_and_navigated(const json& said) {
   }
 }
 
-TEST(Demo, TellsTheWholeStoryTwiceAndLeavesAMemoryThatAnswers) {
-  const TemporaryFolder folder;
-  const auto out = folder / "demo";
-  const auto first = run_panonav({"demo", "-o", out, "--quick", "--json"});
-  ASSERT_EQ(first.exit_code, 0) << first.err;
-  const auto said = json::parse(first.out);
+using Demo = InTemporaryFolder;
+
+TEST_F(Demo, TellsTheWholeStoryTwiceAndLeavesAMemoryThatAnswers) {
+  const std::string out = folder / "demo";
+  const auto said = answer_of({"demo", "-o", out, "--quick", "--json"});
   EXPECT_EQ(said["report"], out + "/index.html");
   EXPECT_GE(said["views"].get<int>(), 30);
   EXPECT_EQ(said["questions"], 8);
@@ -114,14 +108,12 @@ TEST(Demo, TellsTheWholeStoryTwiceAndLeavesAMemoryThatAnswers) {
   expect_tracked_and_navigated(said);
   const auto log = lines(bytes_of(fs::path(out) / "mission.log"));
   EXPECT_GT(log.size(), said["mission_carried"]["looks"].get<std::size_t>());
-  EXPECT_NE(bytes_of(fs::path(out) / "track.html").find("</html>"), std::string::npos);
+  EXPECT_TRUE(contains(bytes_of(fs::path(out) / "track.html"), "</html>"));
   EXPECT_LT(said["arranged_shape_difference"].get<double>(), 0.2);
   EXPECT_LT(said["drive_shape_difference"].get<double>(), 0.1);
   EXPECT_EQ(said["route_runs"], 2);
 
-  const auto info = run_panonav({"info", out + "/office.panonav", "--json"});
-  ASSERT_EQ(info.exit_code, 0) << info.err;
-  const auto memory = json::parse(info.out);
+  const auto memory = answer_of({"info", out + "/office.panonav", "--json"});
   EXPECT_EQ(memory["kind"], "mirror");
   EXPECT_EQ(memory["views"], said["views"]);
   EXPECT_TRUE(memory["elevations_rad"].is_array());
@@ -130,13 +122,13 @@ TEST(Demo, TellsTheWholeStoryTwiceAndLeavesAMemoryThatAnswers) {
       run_panonav({"localise", out + "/office.panonav", out + "/query_run", "--json"});
   EXPECT_EQ(asked.exit_code, 0) << asked.err;
   EXPECT_EQ(lines(asked.out).size(), 8U);
-  EXPECT_EQ(run_panonav({"localise", out + "/office.panonav", out + "/memory_run"}).exit_code, 0);
+  run_well({"localise", out + "/office.panonav", out + "/memory_run"});
 
   const auto tracked = run_from_page(out, "track");
   EXPECT_EQ(tracked.exit_code, 0) << tracked.err;
   const auto sent = run_from_page(out, "navigate");
   EXPECT_EQ(sent.exit_code, 0) << sent.out << sent.err;
-  EXPECT_NE(sent.out.find("the memory's lattice"), std::string::npos) << sent.out;
+  EXPECT_TRUE(contains(sent.out, "the memory's lattice"));
 
   // Again: its own files are written anew, the user's stay.
   std::ofstream(fs::path(out) / "notes.txt") << "mine";
@@ -148,26 +140,23 @@ TEST(Demo, TellsTheWholeStoryTwiceAndLeavesAMemoryThatAnswers) {
   EXPECT_EQ(bytes_of(fs::path(out) / "notes.txt"), "mine");
 }
 
-TEST(Demo, TouchesNoFolderThatIsNotItsOwn) {
-  const TemporaryFolder folder;
-  std::ofstream(folder.path() / "index.html") << "mine";
-  const auto line = refusal({"demo", "-o", folder.path(), "--quick"});
-  EXPECT_NE(line.find("not made by panonav demo"), std::string::npos) << line;
-  EXPECT_EQ(bytes_of(folder.path() / "index.html"), "mine");
-  const auto below = folder / "index.html/demo";
-  EXPECT_NE(refusal({"demo", "-o", below, "--quick"}).find(below), std::string::npos);
-  EXPECT_NE(refusal({"demo", "-o", folder / "new", "--seed", "x"}).find("--seed is 'x'"),
-            std::string::npos);
+TEST_F(Demo, TouchesNoFolderThatIsNotItsOwn) {
+  std::ofstream(folder / "index.html") << "mine";
+  EXPECT_TRUE(
+      contains(refusal({"demo", "-o", folder.path(), "--quick"}), "not made by panonav demo"));
+  EXPECT_EQ(bytes_of(folder / "index.html"), "mine");
+  const std::string below = folder / "index.html/demo";
+  EXPECT_TRUE(contains(refusal({"demo", "-o", below, "--quick"}), below));
+  EXPECT_TRUE(contains(refusal({"demo", "-o", folder / "new", "--seed", "x"}), "--seed is 'x'"));
   EXPECT_FALSE(fs::exists(folder / "new"));
 }
 
-TEST(Reproduce, WritesTheTableThreeTimesAndAllPictures) {
-  const TemporaryFolder folder;
-  const auto out = folder / "m04";
-  const auto result = run_panonav(
+using Reproduce = InTemporaryFolder;
+
+TEST_F(Reproduce, WritesTheTableThreeTimesAndAllPictures) {
+  const std::string out = folder / "m04";
+  const auto rows = answer_of(
       {"reproduce", "m04", "--quick", "--queries", "4", "--rows", "20", "-o", out, "--json"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  const auto rows = json::parse(result.out);
   ASSERT_GE(rows.size(), 20U);
   int judged = 0;
   for (const auto& row : rows) {
@@ -187,31 +176,27 @@ TEST(Reproduce, WritesTheTableThreeTimesAndAllPictures) {
   EXPECT_GE(readable_pictures(out), 5);
 }
 
-TEST(Reproduce, RefusesBadInput) {
-  const TemporaryFolder folder;
-  EXPECT_NE(refusal({"reproduce", "m99", "-o", folder / "x"}).find("PAPER is 'm99'; allowed: f11"),
-            std::string::npos);
+TEST_F(Reproduce, RefusesBadInput) {
+  EXPECT_TRUE(
+      contains(refusal({"reproduce", "m99", "-o", folder / "x"}), "PAPER is 'm99'; allowed: f11"));
   EXPECT_FALSE(fs::exists(folder / "x"));
-  std::ofstream(folder.path() / "file") << "mine";
-  EXPECT_NE(refusal({"reproduce", "m04", "--quick", "-o", folder / "file/x"}).find("file/x"),
-            std::string::npos);
-  EXPECT_NE(refusal({"reproduce", "m04", "--scenes", "1"}).find("--scenes is '1'"),
-            std::string::npos);
-  EXPECT_NE(refusal({"reproduce", "m04", "--only", "office"}).find("--only has no meaning for m04"),
-            std::string::npos);
-  EXPECT_NE(
-      refusal({"reproduce", "y03", "--queries", "3"}).find("--queries has no meaning for y03"),
-      std::string::npos);
-  EXPECT_NE(refusal({"reproduce", "y03", "--scenes", "1"}).find("allowed for y03: from 2"),
-            std::string::npos);
-  EXPECT_NE(refusal({"reproduce", "y03", "--quick", "-o", folder / "file/x"}).find("file/x"),
-            std::string::npos);
-  EXPECT_NE(refusal({"reproduce", "m03", "--queries", "3"}).find("--queries has no meaning"),
-            std::string::npos);
-  EXPECT_NE(refusal({"reproduce", "m03", "--data", folder / "nowhere"}).find("no such folder"),
-            std::string::npos);
-  EXPECT_NE(refusal({"reproduce", "m03", "--only", "kitchen"}).find("--only"), std::string::npos);
-  EXPECT_NE(refusal({"reproduce", "m04", "--sead", "3"}).find("--sead"), std::string::npos);
+  std::ofstream(folder / "file") << "mine";
+  EXPECT_TRUE(
+      contains(refusal({"reproduce", "m04", "--quick", "-o", folder / "file/x"}), "file/x"));
+  EXPECT_TRUE(contains(refusal({"reproduce", "m04", "--scenes", "1"}), "--scenes is '1'"));
+  EXPECT_TRUE(
+      contains(refusal({"reproduce", "m04", "--only", "office"}), "--only has no meaning for m04"));
+  EXPECT_TRUE(contains(refusal({"reproduce", "y03", "--queries", "3"}),
+                       "--queries has no meaning for y03"));
+  EXPECT_TRUE(contains(refusal({"reproduce", "y03", "--scenes", "1"}), "allowed for y03: from 2"));
+  EXPECT_TRUE(
+      contains(refusal({"reproduce", "y03", "--quick", "-o", folder / "file/x"}), "file/x"));
+  EXPECT_TRUE(
+      contains(refusal({"reproduce", "m03", "--queries", "3"}), "--queries has no meaning"));
+  EXPECT_TRUE(
+      contains(refusal({"reproduce", "m03", "--data", folder / "nowhere"}), "no such folder"));
+  EXPECT_TRUE(contains(refusal({"reproduce", "m03", "--only", "kitchen"}), "--only"));
+  EXPECT_TRUE(contains(refusal({"reproduce", "m04", "--sead", "3"}), "--sead"));
 }
 
 }  // namespace

@@ -7,14 +7,14 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "command_runner.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/trajectory_file.hpp"
 #include "panonav/panorama/panorama.hpp"
-#include "route/textured_room.hpp"
+#include "support/command_runner.hpp"
+#include "support/toy_world.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -24,7 +24,7 @@ using nlohmann::json;
 
 /// A data set of what a robot sees in a room from these poses; odometry as the robot's wheels tell
 /// it, which start at 0 and run 2 % long.
-void write_run(const fs::path& folder, const TexturedRoom& room, const std::vector<Pose2>& poses) {
+void write_run(const fs::path& folder, const ToyWorld& room, const std::vector<Pose2>& poses) {
   fs::create_directories(folder);
   Dataset dataset;
   dataset.folder = folder;
@@ -66,20 +66,6 @@ std::vector<Pose2> straight(Point2 from, double heading_rad, double length_m, do
   return poses;
 }
 
-std::vector<json> answers(const std::vector<std::string>& arguments, int exit_code = 0) {
-  const auto result = run_panonav(arguments);
-  EXPECT_EQ(result.exit_code, exit_code) << result.err;
-  std::vector<json> parsed;
-  for (const auto& line : lines(result.out)) parsed.push_back(json::parse(line));
-  return parsed;
-}
-
-std::set<std::string> keys_of(const json& object) {
-  std::set<std::string> keys;
-  for (const auto& [key, value] : object.items()) keys.insert(key);
-  return keys;
-}
-
 double error_m(const json& answer) {
   return std::hypot(answer["pose"]["x_m"].get<double>() - answer["truth"]["x_m"].get<double>(),
                     answer["pose"]["y_m"].get<double>() - answer["truth"]["y_m"].get<double>());
@@ -99,15 +85,12 @@ class RouteVerbs : public ::testing::Test {
     write_run(folder_ / "repeat", room_, straight({-1.2, -0.2}, 0.15, 2.0, 0.1));
   }
   json record(const std::vector<std::string>& more = {}) {
-    std::vector<std::string> arguments{"route", "record", folder_ / "teach", folder_ / "m.panonav",
-                                       "--json"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    const auto all = answers(arguments);
-    return all.size() == 1 ? all.front() : json();
+    return answer_of(
+        with({"route", "record", folder_ / "teach", folder_ / "m.panonav", "--json"}, more));
   }
 
   TemporaryFolder folder_;
-  TexturedRoom room_{3};
+  ToyWorld room_ = pillared_room(3);
 };
 
 TEST_F(RouteVerbs, RecordsALineEveryTenCentimetresAndFollowsToTheCentimetre) {
@@ -122,15 +105,14 @@ TEST_F(RouteVerbs, RecordsALineEveryTenCentimetresAndFollowsToTheCentimetre) {
   EXPECT_GT(recorded["bytes"].get<int>(), 1000);
   EXPECT_LE(recorded["bytes_per_km"].get<double>(), 3.6e6);
 
-  const auto info = answers({"info", folder_ / "m.panonav", "--json"});
-  ASSERT_EQ(info.size(), 1U);
-  ASSERT_EQ(info[0]["routes"].size(), 1U);
-  EXPECT_EQ(info[0]["routes"][0]["name"], "route");
-  EXPECT_EQ(info[0]["routes"][0]["lines"], 41);
-  EXPECT_EQ(info[0]["routes"][0]["bytes"], recorded["bytes"]);
+  const auto info = answer_of({"info", folder_ / "m.panonav", "--json"});
+  ASSERT_EQ(info["routes"].size(), 1U);
+  EXPECT_EQ(info["routes"][0]["name"], "route");
+  EXPECT_EQ(info["routes"][0]["lines"], 41);
+  EXPECT_EQ(info["routes"][0]["bytes"], recorded["bytes"]);
 
-  const auto all = answers({"route", "follow", folder_ / "m.panonav", folder_ / "repeat", "--tum",
-                            folder_ / "way.tum", "--json"});
+  const auto all = answers_of({"route", "follow", folder_ / "m.panonav", folder_ / "repeat",
+                               "--tum", folder_ / "way.tum", "--json"});
   ASSERT_EQ(all.size(), 21U);
   EXPECT_EQ(keys_of(all[0]),
             (std::set<std::string>{"file", "stamp_s", "on_route", "pose", "origin", "along_m",
@@ -153,7 +135,7 @@ TEST_F(RouteVerbs, RecordsALineEveryTenCentimetresAndFollowsToTheCentimetre) {
   EXPECT_NEAR(way[20].stamp_s, 2.0, 1e-9);
   EXPECT_NEAR(way[20].pose.x_m, all[20]["pose"]["x_m"].get<double>(), 1e-6);
 
-  const auto alone = answers(
+  const auto alone = answers_of(
       {"route", "follow", folder_ / "m.panonav", folder_ / "repeat", "--no-odometry", "--json"});
   ASSERT_EQ(alone.size(), 21U);
   for (const auto& answer : alone) EXPECT_EQ(answer["origin"], "search");
@@ -163,30 +145,30 @@ TEST_F(RouteVerbs, RecordsALineEveryTenCentimetresAndFollowsToTheCentimetre) {
 TEST_F(RouteVerbs, ARouteGrowsWhereItEndsAndNowhereElse) {
   (void)record();
   write_run(folder_ / "on", room_, straight({2.1, 0.0}, 0.0, 0.5, 0.1));
-  const auto grown = answers({"route", "record", folder_ / "on", folder_ / "m.panonav", "--json"});
-  ASSERT_EQ(grown.size(), 1U);
-  EXPECT_EQ(grown[0]["appended"], 6);
-  EXPECT_EQ(grown[0]["lines"], 47);
-  EXPECT_NEAR(grown[0]["length_m"].get<double>(), 4.6, 1e-6);
+  const auto grown =
+      answer_of({"route", "record", folder_ / "on", folder_ / "m.panonav", "--json"});
+  EXPECT_EQ(grown["appended"], 6);
+  EXPECT_EQ(grown["lines"], 47);
+  EXPECT_NEAR(grown["length_m"].get<double>(), 4.6, 1e-6);
 
-  const auto again = refusal({"route", "record", folder_ / "teach", folder_ / "m.panonav"});
-  EXPECT_NE(again.find("from the end of the route 'route'"), std::string::npos) << again;
+  EXPECT_TRUE(contains(refusal({"route", "record", folder_ / "teach", folder_ / "m.panonav"}),
+                       "from the end of the route 'route'"));
   const auto other =
       refusal({"route", "record", folder_ / "on", folder_ / "m.panonav", "--columns", "180"});
-  EXPECT_NE(other.find("--columns"), std::string::npos) << other;
+  EXPECT_TRUE(contains(other, "--columns"));
   const auto wheels =
       refusal({"route", "record", folder_ / "on", folder_ / "m.panonav", "--odometry"});
-  EXPECT_NE(wheels.find("frame"), std::string::npos) << wheels;
+  EXPECT_TRUE(contains(wheels, "frame"));
 
   const auto second = record({"--name", "by wheels", "--odometry", "--every-m", "0.2"});
   EXPECT_EQ(second["lines"], 21);  // 4.08 m by the wheels, 0.204 m apart
-  const auto which = refusal({"route", "follow", folder_ / "m.panonav", folder_ / "repeat"});
-  EXPECT_NE(which.find("by wheels, route"), std::string::npos) << which;
-  const auto none =
-      refusal({"route", "follow", folder_ / "m.panonav", folder_ / "repeat", "--name", "other"});
-  EXPECT_NE(none.find("holds no route 'other'"), std::string::npos) << none;
-  const auto by_wheels = answers({"route", "follow", folder_ / "m.panonav", folder_ / "repeat",
-                                  "--name", "by wheels", "--json"});
+  EXPECT_TRUE(contains(refusal({"route", "follow", folder_ / "m.panonav", folder_ / "repeat"}),
+                       "by wheels, route"));
+  EXPECT_TRUE(contains(
+      refusal({"route", "follow", folder_ / "m.panonav", folder_ / "repeat", "--name", "other"}),
+      "holds no route 'other'"));
+  const auto by_wheels = answers_of({"route", "follow", folder_ / "m.panonav", folder_ / "repeat",
+                                     "--name", "by wheels", "--json"});
   ASSERT_EQ(by_wheels.size(), 21U);
   for (const auto& answer : by_wheels) {
     EXPECT_TRUE(answer["on_route"]);
@@ -196,9 +178,9 @@ TEST_F(RouteVerbs, ARouteGrowsWhereItEndsAndNowhereElse) {
 
 TEST_F(RouteVerbs, ElsewhereIsNotOnThisRoute) {
   (void)record();
-  write_run(folder_ / "elsewhere", TexturedRoom(77), straight({-1.0, 0.0}, 0.3, 1.0, 0.1));
+  write_run(folder_ / "elsewhere", pillared_room(77), straight({-1.0, 0.0}, 0.3, 1.0, 0.1));
   const auto all =
-      answers({"route", "follow", folder_ / "m.panonav", folder_ / "elsewhere", "--json"}, 1);
+      answers_of({"route", "follow", folder_ / "m.panonav", folder_ / "elsewhere", "--json"}, 1);
   ASSERT_EQ(all.size(), 11U);
   for (const auto& answer : all) {
     EXPECT_FALSE(answer["on_route"]);
@@ -208,11 +190,11 @@ TEST_F(RouteVerbs, ElsewhereIsNotOnThisRoute) {
 
 TEST_F(RouteVerbs, NamesWhatHasChanged) {
   (void)record();
-  TexturedRoom changed = room_;
+  ToyWorld changed = room_;
   changed.move_pillar({0.5, 0.0});
   write_run(folder_ / "changed", changed, straight({-1.5, 0.0}, 0.0, 3.0, 0.05));
   const auto all =
-      answers({"route", "follow", folder_ / "m.panonav", folder_ / "changed", "--json"});
+      answers_of({"route", "follow", folder_ / "m.panonav", folder_ / "changed", "--json"});
   ASSERT_EQ(all.size(), 61U);
   int named = 0;
   for (const auto& answer : all) {
@@ -230,40 +212,36 @@ TEST_F(RouteVerbs, NamesWhatHasChanged) {
 }
 
 TEST_F(RouteVerbs, WrongUseIsRefused) {
-  EXPECT_NE(refusal({"route"}).find("route record, route follow"), std::string::npos);
-  EXPECT_NE(refusal({"route", "draw"}).find("route record, route follow"), std::string::npos);
+  EXPECT_TRUE(contains(refusal({"route"}), "route record, route follow"));
+  EXPECT_TRUE(contains(refusal({"route", "draw"}), "route record, route follow"));
   const std::string memory = folder_ / "m.panonav";
-  EXPECT_NE(refusal({"route", "follow", memory, folder_ / "repeat"}).find(memory),
-            std::string::npos);
+  EXPECT_TRUE(contains(refusal({"route", "follow", memory, folder_ / "repeat"}), memory));
   (void)record();
   const auto rows = refusal(
       {"route", "record", folder_ / "teach", memory, "--name", "b", "--horizon-rows", "1-2"});
-  EXPECT_NE(rows.find("elevations are not known"), std::string::npos) << rows;
-  EXPECT_NE(refusal({"route", "record", folder_ / "teach", memory, "--horizon-rows", "2-1"})
-                .find("FIRST-LAST"),
-            std::string::npos);
+  EXPECT_TRUE(contains(rows, "elevations are not known"));
+  EXPECT_TRUE(
+      contains(refusal({"route", "record", folder_ / "teach", memory, "--horizon-rows", "2-1"}),
+               "FIRST-LAST"));
   const auto help = run_panonav({"route", "record", "--help"});
   EXPECT_EQ(help.exit_code, 0);
-  EXPECT_NE(help.out.find("--half-band-rad"), std::string::npos);
-  EXPECT_EQ(run_panonav({"route", "--help"}).exit_code, 0);
+  EXPECT_TRUE(contains(help.out, "--half-band-rad"));
+  run_well({"route", "--help"});
 }
 
 #ifdef PANONAV_COMMAND_SIMULATES
 TEST_F(RouteVerbs, ReportsShowTheRouteAndTheFixes) {
   (void)record({"--report", folder_ / "recorded"});
-  ASSERT_EQ(run_panonav({"route", "follow", folder_ / "m.panonav", folder_ / "repeat", "--report",
-                         folder_ / "followed"})
-                .exit_code,
-            0);
+  run_well({"route", "follow", folder_ / "m.panonav", folder_ / "repeat", "--report",
+            folder_ / "followed"});
   for (const auto& [report, pictures] :
        std::vector<std::pair<std::string, std::vector<std::string>>>{
            {"recorded", {"panorama.png", "path.png"}},
            {"followed", {"path.png", "lines.png", "correlations.png", "errors.png"}}}) {
-    std::ifstream in(folder_ / (report + "/index.html"));
-    const std::string page{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-    EXPECT_EQ(page.find("nan"), std::string::npos);
+    const std::string page = bytes_of(folder_ / (report + "/index.html"));
+    EXPECT_FALSE(contains(page, "nan"));
     for (const auto& picture : pictures) {
-      EXPECT_NE(page.find(picture), std::string::npos);
+      EXPECT_TRUE(contains(page, picture));
       EXPECT_GE(read_image(folder_ / (report + "/" + picture)).width(), 200);
     }
   }
@@ -291,14 +269,14 @@ void link_part(const fs::path& from, const fs::path& to) {
 // each alone. The nearest signature is off by 4.9 cm in the median.
 TEST(RealRoute, SussexFollowedToThreeCentimetres) {
   const auto data = real_data("sussex_route");
-  if (!data) GTEST_SKIP() << "PANONAV_DATA does not name a folder that holds sussex_route";
+  PANONAV_REQUIRE_DATA(data, "sussex_route");
   const TemporaryFolder folder;
-  const auto recorded = answers({"route", "record", data->string(), folder / "m.panonav", "--every",
-                                 "10", "--every-m", "0", "--json"});
-  ASSERT_EQ(recorded.size(), 1U);
-  ASSERT_GE(recorded[0]["lines"].get<int>(), 45);
-  link_part(*data, folder.path() / "others");
-  const auto all = answers({"route", "follow", folder / "m.panonav", folder / "others", "--json"});
+  const auto recorded = answer_of({"route", "record", data->string(), folder / "m.panonav",
+                                   "--every", "10", "--every-m", "0", "--json"});
+  ASSERT_GE(recorded["lines"].get<int>(), 45);
+  link_part(*data, folder / "others");
+  const auto all =
+      answers_of({"route", "follow", folder / "m.panonav", folder / "others", "--json"});
   ASSERT_EQ(all.size(), 409U);
   std::vector<double> along_m;
   std::vector<double> lateral_m;

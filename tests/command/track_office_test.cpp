@@ -5,12 +5,13 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <regex>
 
-#include "command_runner.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
+#include "support/command_runner.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -18,42 +19,31 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-std::string bytes_of(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
-
 std::vector<std::string> with_small_pictures(std::vector<std::string> arguments) {
-  for (const char* more : {"--kind", "panorama", "--rows", "20", "--columns", "128"}) {
-    arguments.emplace_back(more);
-  }
-  return arguments;
+  return with(std::move(arguments), {"--kind", "panorama", "--rows", "20", "--columns", "128"});
 }
 
 /// A simulated office on a 25 cm grid and a walk through it, made once for all tests of this file.
 class TrackOffice : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    folder_ = new TemporaryFolder;
+    folder_.emplace();
     simulate({"office", *folder_ / "grid", "--grid", "0.25"});
     simulate(
         {"office", run(), "--path", "walk", "--poses", "40", "--spacing-m", "0.2", "--seed", "5"});
-    const auto made = run_panonav({"memorise", *folder_ / "grid", memory()});
-    ASSERT_EQ(made.exit_code, 0) << made.err;
+    run_well({"memorise", *folder_ / "grid", memory()});
   }
-  static void TearDownTestSuite() { delete folder_; }
+  static void TearDownTestSuite() { folder_.reset(); }
   static void simulate(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), "simulate");
-    const auto result = run_panonav(with_small_pictures(arguments));
-    ASSERT_EQ(result.exit_code, 0) << result.err;
+    run_well(with_small_pictures(arguments));
   }
   static constexpr double spacing_m = 0.25;
   static std::string memory() { return *folder_ / "office.panonav"; }
   static std::string run() { return *folder_ / "walk"; }
 
-  static TemporaryFolder* folder_;
+  inline static std::optional<TemporaryFolder> folder_;
 };
-TemporaryFolder* TrackOffice::folder_ = nullptr;
 
 struct Followed {
   int exit_code = 0;
@@ -114,7 +104,7 @@ TEST_F(TrackOffice, AnotherRoomIsHardlyEverTakenForThisOne) {
   int localised = 0;
   int lost = 0;
   for (const char* seed : {"1", "2", "3"}) {
-    const auto room = *folder_ / ("lab" + std::string(seed));
+    const std::string room = *folder_ / ("lab" + std::string(seed));
     simulate(
         {"lab", room, "--path", "walk", "--poses", "12", "--spacing-m", "0.2", "--seed", seed});
     const auto followed = follow({memory(), room});
@@ -134,30 +124,28 @@ TEST_F(TrackOffice, AnotherRoomIsHardlyEverTakenForThisOne) {
 }
 
 TEST_F(TrackOffice, EvaluateReadsTheTrajectoryAndFindsTheSameErrors) {
-  const auto tum = *folder_ / "estimate.tum";
+  const std::string tum = *folder_ / "estimate.tum";
   const auto followed = follow({memory(), run(), "--tum", tum});
   std::vector<double> errors;
   for (const auto& image : followed.images) {
     if (image["state"] == "localised") errors.push_back(error_m(image));
   }
   ASSERT_GE(errors.size(), 20U);
-  const auto result =
-      run_panonav({"evaluate", tum, run() + "/poses.csv", "--align", "false", "--json"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  const auto said = json::parse(result.out);
+  const auto said =
+      answer_of({"evaluate", tum, run() + "/poses.csv", "--align", "false", "--json"});
   EXPECT_EQ(said["pairs"], errors.size());
   EXPECT_NEAR(said["position_m"]["median"], median(errors), 1e-6);
 }
 
 TEST_F(TrackOffice, TheReportHoldsPicturesAndARunToPlay) {
-  const auto out = *folder_ / "report";
+  const std::string out = *folder_ / "report";
   const auto result = run_panonav({"track", memory(), run(), "--report", out});
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_NE(result.out.find(out + "/index.html"), std::string::npos);
+  EXPECT_TRUE(contains(result.out, out + "/index.html"));
   const std::string page = bytes_of(fs::path(out) / "index.html");
-  EXPECT_NE(page.find("href=\"track.html\""), std::string::npos);
-  EXPECT_EQ(page.find("http"), std::string::npos) << "the page needs the network";
-  EXPECT_EQ(page.find("nan"), std::string::npos);
+  EXPECT_TRUE(contains(page, "href=\"track.html\""));
+  EXPECT_FALSE(contains(page, "http")) << "the page needs the network";
+  EXPECT_FALSE(contains(page, "nan"));
   const std::regex source("<img src=\"([^\"]+)\"");
   int pictures = 0;
   for (std::sregex_iterator i(page.begin(), page.end(), source), end; i != end; ++i) {
@@ -167,8 +155,8 @@ TEST_F(TrackOffice, TheReportHoldsPicturesAndARunToPlay) {
   EXPECT_EQ(pictures, 4);
 
   const std::string played = bytes_of(fs::path(out) / "track.html");
-  EXPECT_EQ(played.find("http"), std::string::npos) << "the animation needs the network";
-  EXPECT_EQ(played.find(" src="), std::string::npos) << "the animation needs other files";
+  EXPECT_FALSE(contains(played, "http")) << "the animation needs the network";
+  EXPECT_FALSE(contains(played, " src=")) << "the animation needs other files";
   const std::string begin = "const run = ";
   const auto at = played.find(begin);
   ASSERT_NE(at, std::string::npos);
@@ -176,7 +164,7 @@ TEST_F(TrackOffice, TheReportHoldsPicturesAndARunToPlay) {
       json::parse(played.substr(at + begin.size(), played.find(";\n", at) - at - begin.size()));
   const auto images = follow({memory(), run()}).images;
   ASSERT_EQ(data["images"].size(), images.size());
-  const auto info = json::parse(run_panonav({"info", memory(), "--json"}).out);
+  const auto info = answer_of({"info", memory(), "--json"});
   EXPECT_EQ(data["references"].size(), info["views"].get<std::size_t>());
   for (std::size_t i = 0; i < images.size(); ++i) {
     const json& shown = data["images"][i];
@@ -188,12 +176,12 @@ TEST_F(TrackOffice, TheReportHoldsPicturesAndARunToPlay) {
   }
 
   // Again into the same folder, and never into somebody else's.
-  EXPECT_EQ(run_panonav({"track", memory(), run(), "--report", out}).exit_code, 0);
-  const auto foreign = folder_->path() / "mine";
+  run_well({"track", memory(), run(), "--report", out});
+  const fs::path foreign = *folder_ / "mine";
   fs::create_directory(foreign);
   std::ofstream(foreign / "index.html") << "mine";
-  const auto line = refusal({"track", memory(), run(), "--report", foreign});
-  EXPECT_NE(line.find("not made by panonav track"), std::string::npos) << line;
+  EXPECT_TRUE(contains(refusal({"track", memory(), run(), "--report", foreign}),
+                       "not made by panonav track"));
   EXPECT_EQ(bytes_of(foreign / "index.html"), "mine");
 }
 

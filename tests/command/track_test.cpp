@@ -6,13 +6,14 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <optional>
 #include <set>
 
-#include "command_runner.hpp"
-#include "landmark_world.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
+#include "support/command_runner.hpp"
+#include "support/landmark_pictures.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -38,7 +39,7 @@ std::vector<Pose2> circle_poses(int count) {
 }
 
 /// Pictures, and a table whose odometry is the true pose seen from `odometry_from_world`.
-void write_run(const std::filesystem::path& folder, const LandmarkWorld& world,
+void write_run(const std::filesystem::path& folder, const ToyWorld& world,
                const std::vector<Pose2>& poses, const Pose2& odometry_from_world = {},
                RunColumns columns = {}) {
   write_dataset(folder, world, poses);
@@ -63,17 +64,13 @@ void write_run(const std::filesystem::path& folder, const LandmarkWorld& world,
 class Track : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    folder_ = new TemporaryFolder;
-    world_ = new LandmarkWorld(7);
-    write_dataset(folder_->path() / "grid", *world_, grid_poses(5));
-    write_run(folder_->path() / "run", *world_, circle_poses(count), {3.0, -1.0, 0.7});
-    const auto made = run_panonav({"memorise", *folder_ / "grid", memory()});
-    ASSERT_EQ(made.exit_code, 0) << made.err;
+    folder_.emplace();
+    world_ = landmark_world(7);
+    write_dataset(*folder_ / "grid", *world_, grid_poses(5));
+    write_run(*folder_ / "run", *world_, circle_poses(count), {3.0, -1.0, 0.7});
+    run_well({"memorise", *folder_ / "grid", memory()});
   }
-  static void TearDownTestSuite() {
-    delete folder_;
-    delete world_;
-  }
+  static void TearDownTestSuite() { folder_.reset(); }
   static constexpr int count = 20;
   static std::string memory() { return *folder_ / "grid.panonav"; }
   static std::string run() { return *folder_ / "run"; }
@@ -88,17 +85,9 @@ class Track : public ::testing::Test {
     return parsed;
   }
 
-  static TemporaryFolder* folder_;
-  static LandmarkWorld* world_;
+  inline static std::optional<TemporaryFolder> folder_;
+  inline static std::optional<ToyWorld> world_;
 };
-TemporaryFolder* Track::folder_ = nullptr;
-LandmarkWorld* Track::world_ = nullptr;
-
-std::set<std::string> keys_of(const json& object) {
-  std::set<std::string> keys;
-  for (const auto& [key, value] : object.items()) keys.insert(key);
-  return keys;
-}
 
 TEST_F(Track, JsonLinesHaveExactlyTheDocumentedFields) {
   const auto all = tracked({run()});
@@ -147,7 +136,7 @@ TEST_F(Track, JsonLinesHaveExactlyTheDocumentedFields) {
 }
 
 TEST_F(Track, TheOdometryFrameDoesNotMatter) {
-  write_run(folder_->path() / "other_frame", *world_, circle_poses(count), {-7.0, 20.0, -2.5});
+  write_run(*folder_ / "other_frame", *world_, circle_poses(count), {-7.0, 20.0, -2.5});
   const auto one = tracked({run()});
   const auto other = tracked({*folder_ / "other_frame"});
   ASSERT_EQ(one.size(), static_cast<std::size_t>(count));
@@ -225,17 +214,16 @@ TEST_F(Track, TextSaysTheSameAsJson) {
 }
 
 TEST_F(Track, PicturesThatShowNothingAreNoAnswer) {
-  write_run(folder_->path() / "dark", *world_, circle_poses(6));
+  write_run(*folder_ / "dark", *world_, circle_poses(6));
   const Image black(96, 12);
-  for (std::size_t i = 0; i < 6; ++i)
-    write_png(folder_->path() / "dark" / view_name(i), black.view());
+  for (std::size_t i = 0; i < 6; ++i) write_png(*folder_ / "dark" / view_name(i), black.view());
   const auto result = run_panonav({"track", memory(), *folder_ / "dark"});
   EXPECT_EQ(result.exit_code, 1) << result.out;
-  EXPECT_NE(result.out.find("never localised"), std::string::npos) << result.out;
+  EXPECT_TRUE(contains(result.out, "never localised"));
 }
 
 TEST_F(Track, ATrajectoryOfTheLocalisedImages) {
-  const auto tum = *folder_ / "estimate.tum";
+  const std::string tum = *folder_ / "estimate.tum";
   const auto all = tracked({run(), "--tum", tum});
   std::ifstream in(tum);
   ASSERT_TRUE(in);
@@ -251,13 +239,12 @@ TEST_F(Track, ATrajectoryOfTheLocalisedImages) {
 }
 
 TEST_F(Track, WithoutStampsATrajectoryCountsPictures) {
-  write_run(folder_->path() / "plain", *world_, circle_poses(4), {},
-            {.stamps = false, .truth = false});
-  const auto tum = *folder_ / "plain.tum";
+  write_run(*folder_ / "plain", *world_, circle_poses(4), {}, {.stamps = false, .truth = false});
+  const std::string tum = *folder_ / "plain.tum";
   const auto result = run_panonav({"track", memory(), *folder_ / "plain", "--tum", tum, "--json"});
   EXPECT_LE(result.exit_code, 1) << result.err;
   ASSERT_EQ(lines(result.err).size(), 1U) << result.err;
-  EXPECT_NE(result.err.find("no column 'stamp_s'"), std::string::npos) << result.err;
+  EXPECT_TRUE(contains(result.err, "no column 'stamp_s'"));
   ASSERT_EQ(lines(result.out).size(), 4U);
   for (const auto& line : lines(result.out)) {
     EXPECT_TRUE(json::parse(line)["truth"].is_null());
@@ -267,31 +254,30 @@ TEST_F(Track, WithoutStampsATrajectoryCountsPictures) {
 }
 
 TEST_F(Track, StampsThatDoNotGrowMakeNoTrajectory) {
-  write_run(folder_->path() / "back", *world_, circle_poses(3));
-  const auto table = folder_->path() / "back/poses.csv";
-  std::ifstream in(table);
-  std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  in.close();
+  write_run(*folder_ / "back", *world_, circle_poses(3));
+  const std::string table = *folder_ / "back/poses.csv";
+  std::string text = bytes_of(table);
   const auto at = text.find(view_name(2) + ",1,");
   ASSERT_NE(at, std::string::npos) << text;
   std::ofstream(table) << text.replace(at + view_name(2).size() + 1, 1, "0.5");
   EXPECT_LE(run_panonav({"track", memory(), *folder_ / "back"}).exit_code, 1);
-  const auto line = refusal({"track", memory(), *folder_ / "back", "--tum", *folder_ / "back.tum"});
-  EXPECT_NE(line.find("stamp_s of " + view_name(2) + " is 0.5"), std::string::npos) << line;
+  EXPECT_TRUE(
+      contains(refusal({"track", memory(), *folder_ / "back", "--tum", *folder_ / "back.tum"}),
+               "stamp_s of " + view_name(2) + " is 0.5"));
   EXPECT_FALSE(std::filesystem::exists(*folder_ / "back.tum"));
 }
 
 TEST_F(Track, PositionsThatCannotBeMetresAreRefused) {
   auto far = circle_poses(3);
   far[1].x_m = 1e300;
-  write_run(folder_->path() / "far", *world_, far);
+  write_run(*folder_ / "far", *world_, far);
   const auto line = refusal({"track", memory(), *folder_ / "far"});
-  EXPECT_NE(line.find("odometry of " + view_name(1)), std::string::npos) << line;
-  EXPECT_NE(line.find("at most 1e"), std::string::npos) << line;
+  EXPECT_TRUE(contains(line, "odometry of " + view_name(1)));
+  EXPECT_TRUE(contains(line, "at most 1e"));
   std::vector<std::string> start{"track", memory(),      run(), "--start-x-m",
                                  "1e12",  "--start-y-m", "0",   "--start-heading-deg",
                                  "0"};
-  EXPECT_NE(refusal(start).find("--start-x-m"), std::string::npos);
+  EXPECT_TRUE(contains(refusal(start), "--start-x-m"));
   // Far, but possible: no answer and no crash.
   start[4] = "9e8";
   EXPECT_LE(run_panonav(start).exit_code, 1);
@@ -300,23 +286,20 @@ TEST_F(Track, PositionsThatCannotBeMetresAreRefused) {
 TEST_F(Track, ARunWithoutOdometryIsRefusedWithTheColumnsThatAreMissing) {
   const auto line = refusal({"track", memory(), *folder_ / "grid"});
   for (const char* word : {"grid", "odom_x_m", "odom_y_m", "odom_heading_deg"}) {
-    EXPECT_NE(line.find(word), std::string::npos) << line;
+    EXPECT_TRUE(contains(line, word));
   }
 }
 
 TEST_F(Track, AMemoryWithTooFewPositionsIsRefusedByName) {
-  const auto small = *folder_ / "small.panonav";
-  write_dataset(folder_->path() / "few", *world_, grid_poses(2));
-  ASSERT_EQ(run_panonav({"memorise", *folder_ / "few", small}).exit_code, 0);
-  const auto line = refusal({"track", small, run()});
-  EXPECT_NE(line.find("small.panonav: holds 4 views with a position; allowed: 8"),
-            std::string::npos)
-      << line;
-  const auto heap = *folder_ / "heap.panonav";
-  write_dataset(folder_->path() / "one_place", *world_,
-                std::vector<Pose2>(9, Pose2{1.0, 1.0, 0.0}));
-  ASSERT_EQ(run_panonav({"memorise", *folder_ / "one_place", heap}).exit_code, 0);
-  EXPECT_NE(refusal({"track", heap, run()}).find("heap.panonav"), std::string::npos);
+  const std::string small = *folder_ / "small.panonav";
+  write_dataset(*folder_ / "few", *world_, grid_poses(2));
+  run_well({"memorise", *folder_ / "few", small});
+  EXPECT_TRUE(contains(refusal({"track", small, run()}),
+                       "small.panonav: holds 4 views with a position; allowed: 8"));
+  const std::string heap = *folder_ / "heap.panonav";
+  write_dataset(*folder_ / "one_place", *world_, std::vector<Pose2>(9, Pose2{1.0, 1.0, 0.0}));
+  run_well({"memorise", *folder_ / "one_place", heap});
+  EXPECT_TRUE(contains(refusal({"track", heap, run()}), "heap.panonav"));
 }
 
 TEST_F(Track, WrongValuesAreNamedWithTheirRange) {
@@ -324,24 +307,20 @@ TEST_F(Track, WrongValuesAreNamedWithTheirRange) {
     more.insert(more.begin(), {"track", memory(), run()});
     return refusal(more);
   };
-  EXPECT_NE(refused({"--every", "0"}).find("--every is '0'"), std::string::npos);
-  EXPECT_NE(refused({"--start-x-m", "1"}).find("go together"), std::string::npos);
-  EXPECT_NE(refused({"--start-x-m", "1", "--start-y-m", "1"}).find("--start-heading-deg"),
-            std::string::npos);
-  EXPECT_NE(refused({"--start-heading-deg", "north"}).find("--start-heading-deg is 'north'"),
-            std::string::npos);
-  EXPECT_NE(refused({"--start-deviation-m", "-1"}).find("deviation_m is -1"), std::string::npos);
-  EXPECT_NE(refused({"--start-deviation-m", "1"}).find("go with --start-x-m"), std::string::npos);
-  EXPECT_NE(refused({"--redraw", "sometimes"}).find("redraw"), std::string::npos);
-  EXPECT_NE(refused({"--kld-error", "2"}).find("kld_error is 2"), std::string::npos);
-  EXPECT_NE(refused({"--least-particles", "300", "--most-particles", "200"})
-                .find("--least-particles is 300; allowed: at most"),
-            std::string::npos);
-  EXPECT_NE(refusal({"track", memory(), *folder_ / "nowhere"}).find("nowhere"), std::string::npos);
-  EXPECT_NE(refusal({"track", *folder_ / "no.panonav", run()}).find("no.panonav"),
-            std::string::npos);
-  EXPECT_NE(refused({"--tum", *folder_ / "nowhere/estimate.tum"}).find("estimate.tum"),
-            std::string::npos);
+  EXPECT_TRUE(contains(refused({"--every", "0"}), "--every is '0'"));
+  EXPECT_TRUE(contains(refused({"--start-x-m", "1"}), "go together"));
+  EXPECT_TRUE(contains(refused({"--start-x-m", "1", "--start-y-m", "1"}), "--start-heading-deg"));
+  EXPECT_TRUE(
+      contains(refused({"--start-heading-deg", "north"}), "--start-heading-deg is 'north'"));
+  EXPECT_TRUE(contains(refused({"--start-deviation-m", "-1"}), "deviation_m is -1"));
+  EXPECT_TRUE(contains(refused({"--start-deviation-m", "1"}), "go with --start-x-m"));
+  EXPECT_TRUE(contains(refused({"--redraw", "sometimes"}), "redraw"));
+  EXPECT_TRUE(contains(refused({"--kld-error", "2"}), "kld_error is 2"));
+  EXPECT_TRUE(contains(refused({"--least-particles", "300", "--most-particles", "200"}),
+                       "--least-particles is 300; allowed: at most"));
+  EXPECT_TRUE(contains(refusal({"track", memory(), *folder_ / "nowhere"}), "nowhere"));
+  EXPECT_TRUE(contains(refusal({"track", *folder_ / "no.panonav", run()}), "no.panonav"));
+  EXPECT_TRUE(contains(refused({"--tum", *folder_ / "nowhere/estimate.tum"}), "estimate.tum"));
 }
 
 }  // namespace

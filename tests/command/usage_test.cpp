@@ -2,7 +2,7 @@
 
 #include <sstream>
 
-#include "command_runner.hpp"
+#include "support/command_runner.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -32,31 +32,30 @@ TEST(Usage, VersionAndHelpGoToStandardOutput) {
   EXPECT_TRUE(version.err.empty());
   const auto help = run_panonav({"--help"});
   EXPECT_EQ(help.exit_code, 0);
-  EXPECT_NE(help.out.find("Usage"), std::string::npos);
+  EXPECT_TRUE(contains(help.out, "Usage"));
   EXPECT_TRUE(help.err.empty());
 }
 
 TEST(Usage, WrongUseIsOneLineWithAHint) {
-  EXPECT_NE(refusal({}).find("a verb is missing; see panonav --help"), std::string::npos);
-  EXPECT_NE(refusal({"frobnicate"}).find("'frobnicate' is no verb"), std::string::npos);
+  EXPECT_TRUE(contains(refusal({}), "a verb is missing; see panonav --help"));
+  EXPECT_TRUE(contains(refusal({"frobnicate"}), "'frobnicate' is no verb"));
   (void)refusal({"--no-such-flag"});
 }
 
 TEST(Usage, AMisspeltFlagIsNamedEvenWhereSomethingElseIsMissing) {
-  EXPECT_NE(refusal({"memorise", "--componnets", "5"}).find("--componnets"), std::string::npos);
-  EXPECT_NE(refusal({"memorise", "a", "b", "--componnets", "5"}).find("--componnets"),
-            std::string::npos);
+  EXPECT_TRUE(contains(refusal({"memorise", "--componnets", "5"}), "--componnets"));
+  EXPECT_TRUE(contains(refusal({"memorise", "a", "b", "--componnets", "5"}), "--componnets"));
 }
 
 TEST(Usage, EveryVerbHasHelpWithAnExampleOfItself) {
   const auto help = run_panonav({"--help"});
   for (const auto& verb : verbs()) {
-    EXPECT_NE(help.out.find("  " + with_help(verb).front()), std::string::npos) << verb;
-    EXPECT_NE(help.out.find(verb), std::string::npos) << verb;
+    EXPECT_TRUE(contains(help.out, "  " + with_help(verb).front())) << verb;
+    EXPECT_TRUE(contains(help.out, verb)) << verb;
     const auto own = run_panonav(with_help(verb));
     EXPECT_EQ(own.exit_code, 0) << own.err;
-    EXPECT_NE(own.out.find("--json"), std::string::npos) << verb;
-    EXPECT_NE(own.out.find("--config"), std::string::npos) << verb;
+    EXPECT_TRUE(contains(own.out, "--json")) << verb;
+    EXPECT_TRUE(contains(own.out, "--config")) << verb;
     const auto examples = own.out.find("Example:\n");
     ASSERT_NE(examples, std::string::npos) << verb;
     EXPECT_NE(own.out.find("panonav " + verb, examples), std::string::npos) << verb;
@@ -77,7 +76,7 @@ TEST(Usage, ExamplesAreUnderstood) {
       words.erase(words.begin());
       const auto result = run_panonav(words);
       EXPECT_EQ(result.exit_code, 2) << line;
-      EXPECT_NE(result.err.find("o such file"), std::string::npos) << line << '\n' << result.err;
+      EXPECT_TRUE(contains(result.err, "o such file")) << '\n';
       ++tried;
     }
   }

@@ -10,42 +10,30 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "support/toy_world.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
 constexpr double pi = std::numbers::pi;
 
-// What stands on a cylinder of radius 1 around (0, 0).
-struct Surroundings {
-  std::vector<double> amplitudes, phases;
+// What stands on a cylinder of radius 1 m around (0, 0).
+ToyWorld surroundings(std::uint64_t seed) {
+  Random random(seed);
+  std::vector<CylinderWave> waves;
+  for (int k = 1; k <= 10; ++k) {
+    const double amplitude = random.uniform(0.1, 0.3) / k;
+    waves.push_back({k, 0.0, amplitude, random.uniform(-pi, pi)});
+  }
+  return waved_cylinder(1.0, std::move(waves));
+}
 
-  explicit Surroundings(std::uint64_t seed) {
-    Random random(seed);
-    for (int k = 1; k <= 10; ++k) {
-      amplitudes.push_back(random.uniform(0.1, 0.3) / k);
-      phases.push_back(random.uniform(-pi, pi));
-    }
-  }
-  // The row that a robot sees from (x, y) with this heading.
-  [[nodiscard]] std::vector<float> seen_from(double x, double y, double heading,
-                                             int columns) const {
-    std::vector<float> row;
-    for (int c = 0; c < columns; ++c) {
-      const double direction = heading + 2.0 * pi * c / columns;
-      const double along = x * std::cos(direction) + y * std::sin(direction);
-      const double range = -along + std::sqrt(along * along + 1.0 - x * x - y * y);
-      const double azimuth =
-          std::atan2(y + range * std::sin(direction), x + range * std::cos(direction));
-      double value = 0.5;
-      for (int k = 1; k <= 10; ++k) {
-        value += amplitudes[k - 1] * std::cos(k * azimuth + phases[k - 1]);
-      }
-      row.push_back(static_cast<float>(value));
-    }
-    return row;
-  }
-};
+// The row that a robot sees from (x, y) with this heading.
+std::vector<float> seen_from(const ToyWorld& around, double x, double y, double heading,
+                             int columns) {
+  const Panorama view = around.panorama({x, y, heading}, 1, columns);
+  return {view.values().begin(), view.values().end()};
+}
 
 struct Answer {
   double xi, eta;
@@ -91,10 +79,10 @@ TEST(ExpectedImageHoming, FindsWhatTryingEveryPositionAndTurnFinds) {
   for (const int columns : {36, 72, 90}) {
     const ExpectedImageHoming homing(columns, {.positions = 60});
     for (int trial = 0; trial < 6; ++trial, ++trials) {
-      const Surroundings around(50 + trial);
-      const auto home = around.seen_from(0.0, 0.0, 0.4, columns);
-      auto current = around.seen_from(random.uniform(-0.4, 0.4), random.uniform(-0.4, 0.4),
-                                      random.uniform(-pi, pi), columns);
+      const ToyWorld around = surroundings(50 + trial);
+      const auto home = seen_from(around, 0.0, 0.0, 0.4, columns);
+      auto current = seen_from(around, random.uniform(-0.4, 0.4), random.uniform(-0.4, 0.4),
+                               random.uniform(-pi, pi), columns);
       for (float& v : current) v += static_cast<float>(random.normal(0.0, 0.02));
       const Answer truth = brute_force(homing, home, current);
       const HomeVector v = homing.home_vector(home, current);
@@ -111,13 +99,13 @@ TEST(ExpectedImageHoming, PointsHomeAndTellsDistanceAndHeadingWhereAllThingsAreE
   constexpr int columns = 180;
   const ExpectedImageHoming homing(columns, {.positions = 600});
   for (int trial = 0; trial < 12; ++trial) {
-    const Surroundings around(trial);
+    const ToyWorld around = surroundings(trial);
     const double angle = random.uniform(-pi, pi);
     const double heading = random.uniform(-pi, pi);
     constexpr double d = 0.2;
-    const auto home = around.seen_from(0.0, 0.0, 0.0, columns);
+    const auto home = seen_from(around, 0.0, 0.0, 0.0, columns);
     const auto current =
-        around.seen_from(d * std::cos(angle), d * std::sin(angle), heading, columns);
+        seen_from(around, d * std::cos(angle), d * std::sin(angle), heading, columns);
     const HomeVector v = homing.home_vector(home, current);
     EXPECT_LT(std::abs(angle_difference(v.direction_rad(), angle + pi - heading)), radians(20.0));
     EXPECT_NEAR(v.length(), d, 0.07);
@@ -128,9 +116,9 @@ TEST(ExpectedImageHoming, PointsHomeAndTellsDistanceAndHeadingWhereAllThingsAreE
 TEST(ExpectedImageHoming, ATurnByWholePixelsTurnsTheVectorAndNothingElse) {
   constexpr int columns = 72;
   const ExpectedImageHoming homing(columns);
-  const Surroundings around(3);
-  const auto home = around.seen_from(0.0, 0.0, 0.3, columns);
-  const auto current = around.seen_from(0.2, -0.1, 1.0, columns);
+  const ToyWorld around = surroundings(3);
+  const auto home = seen_from(around, 0.0, 0.0, 0.3, columns);
+  const auto current = seen_from(around, 0.2, -0.1, 1.0, columns);
   // A quarter turn maps the lattice of positions onto itself.
   std::vector<float> turned(columns);
   for (int c = 0; c < columns; ++c) turned[c] = current[(c + columns / 4) % columns];
@@ -145,7 +133,7 @@ TEST(ExpectedImageHoming, ATurnByWholePixelsTurnsTheVectorAndNothingElse) {
 TEST(ExpectedImageHoming, IdenticalViewsAreHomeAndFlatOnesTellNothing) {
   constexpr int columns = 72;
   const ExpectedImageHoming homing(columns);
-  const auto view = Surroundings(6).seen_from(0.1, 0.0, 0.0, columns);
+  const auto view = seen_from(surroundings(6), 0.1, 0.0, 0.0, columns);
   const HomeVector here = homing.home_vector(view, view);
   EXPECT_EQ(here.length(), 0.0);
   EXPECT_EQ(here.heading_rad, 0.0);
@@ -183,4 +171,4 @@ TEST(ExpectedImageHoming, RefusesWhatItCannotCompare) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

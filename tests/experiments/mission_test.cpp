@@ -45,10 +45,17 @@ TEST(MissionRobot, StopsWhereSomethingIsInItsWayAndFeelsItsWayPast) {
   }
 }
 
+const MissionPlace& office() {
+  Executor executor(2);
+  static const MissionPlace place =
+      make_mission_place(make_scene("office", {.seed = 71}), executor);
+  return place;
+}
+
 TEST(Missions, ArriveOverAMemoryWithoutPositionsAndAreRepeatable) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   Executor two(2);
-  const MissionPlace place = make_mission_place(make_scene("office", {.seed = 71}), two);
+  const MissionPlace& place = office();
   const RememberedPlace remembered = remember_grid(place, 0.4, 5, two);
   ASSERT_GT(remembered.truth.size(), 40U);
   ASSERT_EQ(remembered.graph.size(), remembered.truth.size());
@@ -172,7 +179,7 @@ TEST(Missions, ADriveWithLinesRecordsARouteThatIsRepeated) {
 
 TEST(Missions, RefuseWhatMakesNoSense) {
   Executor executor(2);
-  const MissionPlace place = make_mission_place(make_scene("office", {.seed = 71}), executor);
+  const MissionPlace& place = office();
   const RememberedPlace remembered = remember_grid(place, 1.0, 5, executor);
   EXPECT_THROW((void)random_missions(place, remembered, {.count = -1}, 1), ContractError);
   EXPECT_THROW((void)random_missions(place, remembered, {.beside_m = 0.0}, 1), ContractError);

@@ -11,7 +11,7 @@
 #include "panonav/simulation/load_gazebo.hpp"
 #include "support/skips.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
 namespace fs = std::filesystem;
@@ -33,17 +33,14 @@ void print(const std::string& place, const std::vector<PlaceResult>& results) {
 class GazeboWorld : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(GazeboWorld, IsRecognisedAlsoInOtherLightAndWithPeopleInView) {
-  if (std::getenv("PANONAV_DATA") == nullptr) {
-    GTEST_SKIP() << "PANONAV_DATA is not set: no Gazebo worlds to be in";
-  }
+  const auto scenes = real_data("scenes");
+  PANONAV_REQUIRE_DATA(scenes, "scenes");
   GazeboOptions reading;
   reading.textures.read = [](const fs::path& path) { return read_image(path); };
   const std::string name = GetParam();
   Executor executor(0);
   const PlaceRecording place =
-      record_place(load_gazebo(fs::path(std::getenv("PANONAV_DATA")) / "scenes" / name / "worlds" /
-                                   (name + ".world"),
-                               reading),
+      record_place(load_gazebo(*scenes / name / "worlds" / (name + ".world"), reading),
                    {.spacing_m = 0.5, .queries = 400, .columns = 256}, executor);
   ASSERT_GE(place.references.size(), 400U);
   const auto results = run_place_experiment(place, place_conditions(), executor);
@@ -100,4 +97,4 @@ TEST(PlaceExperiment, OfOnePlaceTellsItFromOthersAndIsTheSameOnAnyNumberOfThread
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

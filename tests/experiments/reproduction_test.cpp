@@ -1,25 +1,19 @@
 #include "experiments/reproduction.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
-
-#include <cmath>
-#include <filesystem>
-#include <set>
-#include <string>
 
 #include "panonav/core/error.hpp"
-#include "support/skips.hpp"
+#include "support/reproductions.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
-class ReproductionFolder : public ::testing::Test {
- protected:
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-  [[nodiscard]] Reproduction reproduce(int threads) const {
-    Executor executor(threads);
-    return reproduce_m04({.out = folder_ / std::to_string(threads),
+using Reproductions = ReproductionTest;
+
+TEST_F(Reproductions, SignaturesAreTheSameOnOneAndTwoThreads) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  const auto reproduce = [](const std::filesystem::path& out, Executor& executor) {
+    return reproduce_m04({.out = out,
                           .scenes = 2,
                           .queries = 3,
                           .rows = 6,
@@ -27,57 +21,81 @@ class ReproductionFolder : public ::testing::Test {
                           .mission_grids = {},
                           .seed = 5},
                          executor);
-  }
-  std::filesystem::path folder_ =
-      std::filesystem::path(::testing::TempDir()) / ("reproduction." + std::to_string(getpid()));
-};
-
-TEST_F(ReproductionFolder, SameSeedSameRowsOnOneAndTwoThreads) {
-  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
-  const Reproduction one = reproduce(1);
-  const Reproduction two = reproduce(2);
-  ASSERT_GT(one.rows.size(), 100U);
-  ASSERT_EQ(one.rows.size(), two.rows.size());
-  std::set<std::string> ids;
-  std::size_t times = 0;
-  for (std::size_t i = 0; i < one.rows.size(); ++i) {
-    const ResultRow& a = one.rows[i];
-    const ResultRow& b = two.rows[i];
-    EXPECT_TRUE(ids.insert(a.id).second) << a.id << " stands twice";
-    EXPECT_EQ(a.id, b.id);
-    EXPECT_TRUE(std::isfinite(a.ours)) << a.id;
-    if (a.unit == "ms") {
-      ++times;
-      EXPECT_GT(a.ours, 0.0) << a.id;
-      continue;
-    }
-    EXPECT_EQ(a.ours, b.ours) << a.id;
-    EXPECT_EQ(a.interval, b.interval) << a.id;
-    EXPECT_EQ(a.holds(), b.holds()) << a.id;
-    if (a.interval) {
-      EXPECT_LE(a.interval->first, a.interval->second) << a.id;
-    }
-  }
+  };
+  expect_same_on_one_and_two_threads(reproduce, 100, 10);
   EXPECT_GT(times, 0U);
-  for (const auto& picture : one.pictures) {
-    EXPECT_TRUE(std::filesystem::is_regular_file(folder_ / "1" / picture.file)) << picture.file;
-  }
-  EXPECT_GE(one.pictures.size(), 10U);
 }
 
-TEST(Reproduction, RefusesOneSceneAndFoldersThatCannotBeMade) {
+TEST_F(Reproductions, TrackingIsTheSameOnOneAndTwoThreads) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  const auto reproduce = [](const std::filesystem::path& out, Executor& executor) {
+    return reproduce_m03({.out = out,
+                          .scenes = 1,
+                          .variants = 1,
+                          .runs = 2,
+                          .rows = 4,
+                          .columns = 64,
+                          .seed = 705,
+                          .only = "office"},
+                         executor);
+  };
+  expect_same_on_one_and_two_threads(reproduce, 100, 9);
+  EXPECT_EQ(times, 0U);
+  for (const std::string& id : ids) EXPECT_EQ(id.rfind("m03.", 0), 0U) << id;
+  for (const char* const id :
+       {"m03.global.clean.none.images", "m03.global.hard.topological.within_10",
+        "m03.global.hard.ratio.explained", "m03.tracking.hard.explained.known_before",
+        "m03.kidnapped.hard.topological.images", "m03.particles.paper.0.1.within_10"}) {
+    EXPECT_TRUE(ids.contains(id)) << id;
+  }
+}
+
+TEST_F(Reproductions, HomingIsTheSameOnOneAndTwoThreads) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  const auto reproduce = [](const std::filesystem::path& out, Executor& executor) {
+    return reproduce_s06({.out = out,
+                          .scenes = 2,
+                          .goals_every = 8,
+                          .goals_every_further = 16,
+                          .spacing_m = 0.1,
+                          .seed = 7,
+                          .starts = 1},
+                         executor);
+  };
+  expect_same_on_one_and_two_threads(reproduce, 50, 16);
+  EXPECT_GE(judged, 15U);
+}
+
+TEST_F(Reproductions, MappingIsTheSameOnOneAndTwoThreads) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  const auto reproduce = [](const std::filesystem::path& out, Executor& executor) {
+    return reproduce_f11(
+        {.out = out, .scenes = 2, .runs = 1, .views = 40, .most_views = 100, .columns = 132},
+        executor);
+  };
+  expect_same_on_one_and_two_threads(reproduce, 30, 0);
+}
+
+TEST_F(Reproductions, RefuseWhatMakesNoSenseAndFoldersThatCannotBeMade) {
   Executor executor(1);
-  EXPECT_THROW((void)reproduce_m04({.out = ::testing::TempDir(), .scenes = 1}, executor),
+  const auto out = folder.path();
+  EXPECT_THROW((void)reproduce_m03({.out = out, .scenes = 0}, executor), ContractError);
+  EXPECT_THROW((void)reproduce_m03({.out = out, .runs = 1}, executor), ContractError);
+  EXPECT_THROW((void)reproduce_m03({.out = out, .only = "kitchen"}, executor), ContractError);
+  EXPECT_THROW((void)reproduce_m03({.out = "/dev/null/folder"}, executor), FileError);
+  EXPECT_THROW((void)reproduce_m04({.out = out, .scenes = 1}, executor), ContractError);
+  EXPECT_THROW((void)reproduce_m04({.out = out, .fine_lattice_every = -1}, executor),
                ContractError);
-  EXPECT_THROW(
-      (void)reproduce_m04({.out = ::testing::TempDir(), .fine_lattice_every = -1}, executor),
-      ContractError);
-  EXPECT_THROW((void)reproduce_m04({.out = ::testing::TempDir(), .missions = 3}, executor),
-               ContractError);
-  EXPECT_THROW((void)reproduce_m04({.out = ::testing::TempDir(), .mission_scenes = 0}, executor),
-               ContractError);
+  EXPECT_THROW((void)reproduce_m04({.out = out, .missions = 3}, executor), ContractError);
+  EXPECT_THROW((void)reproduce_m04({.out = out, .mission_scenes = 0}, executor), ContractError);
   EXPECT_THROW((void)reproduce_m04({.out = "/dev/null/folder"}, executor), FileError);
+  EXPECT_THROW((void)reproduce_s06({.out = out, .scenes = 1}, executor), ContractError);
+  EXPECT_THROW((void)reproduce_s06({.out = out, .spacing_m = 0.5}, executor), ContractError);
+  EXPECT_THROW((void)reproduce_s06({.out = "/dev/null/folder"}, executor), FileError);
+  EXPECT_THROW((void)reproduce_f11({.out = out, .scenes = 1}, executor), ContractError);
+  EXPECT_THROW((void)reproduce_y03({.out = out, .scenes = 1}, executor), ContractError);
+  EXPECT_THROW((void)reproduce_y03({.out = out, .runs = 1}, executor), ContractError);
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -15,7 +15,7 @@
 #include "support/skips.hpp"
 #include "support/temporary_folder.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
 TEST(S06Worlds, EveryEndHasItsReason) {
@@ -39,12 +39,13 @@ TEST(S06Worlds, EveryEndHasItsReason) {
 
 TEST(S06Worlds, AWorldGivesItsRowsAndAPictureOfEachFailure) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
-  const char* const data = std::getenv("PANONAV_DATA");
-  if (data == nullptr) GTEST_SKIP() << "PANONAV_DATA is not set";
-  const testing::TemporaryFolder out;
+  const auto scenes = real_data("scenes");
+  PANONAV_REQUIRE_DATA(scenes, "scenes");
+  const TemporaryFolder out;
   Executor executor(2);
   Reproduction result;
-  reproduce_homing_in_world(data, "small_warehouse", out.path(), 5, 30, executor, result);
+  reproduce_homing_in_world(scenes->parent_path(), "small_warehouse", out.path(), 5, 30, executor,
+                            result);
   ASSERT_GE(result.rows.size(), 6U);
   EXPECT_EQ(result.rows.front().id, "s06.world.small_warehouse.success");
   EXPECT_GE(result.rows.front().ours, 0.8);
@@ -57,7 +58,7 @@ TEST(S06Worlds, AWorldGivesItsRowsAndAPictureOfEachFailure) {
 }
 
 TEST(S06Worlds, AWorldThatIsNotThereIsAnError) {
-  const testing::TemporaryFolder out;
+  const TemporaryFolder out;
   Executor executor(1);
   Reproduction result;
   EXPECT_THROW(reproduce_homing_in_world(out.path(), "nowhere", out.path(), 1, 1, executor, result),
@@ -80,4 +81,4 @@ TEST(S06Chains, RowsAreTheSameOnAnyNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -1,14 +1,10 @@
 // Runs of a robot and what a filter makes of them: bookkeeping by hand, then one small office.
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
-#include <filesystem>
 #include <limits>
-#include <set>
 
-#include "experiments/reproduction.hpp"
 #include "experiments/runs/tracking_filter.hpp"
 #include "experiments/runs/tracking_run.hpp"
 #include "panonav/core/error.hpp"
@@ -158,66 +154,6 @@ TEST(Tracking, HardRunsSeeAChangedOfficeThatStaysTheSameForMoreRuns) {
   EXPECT_FALSE(more[1].steps[0].truth == more[0].steps[0].truth);
   walks.variants = 0;
   EXPECT_THROW((void)record_walks(place, *remembered, hard_condition(), walks, two), ContractError);
-}
-
-class TrackingReproduction : public ::testing::Test {
- protected:
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-  [[nodiscard]] Reproduction reproduce(int threads) const {
-    Executor executor(threads);
-    return reproduce_m03({.out = folder_ / std::to_string(threads),
-                          .scenes = 1,
-                          .variants = 1,
-                          .runs = 2,
-                          .rows = 4,
-                          .columns = 64,
-                          .seed = 705,
-                          .only = "office"},
-                         executor);
-  }
-  std::filesystem::path folder_ =
-      std::filesystem::path(::testing::TempDir()) / ("tracking." + std::to_string(getpid()));
-};
-
-TEST_F(TrackingReproduction, SameSeedSameRowsOnOneAndTwoThreads) {
-  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
-  const Reproduction one = reproduce(1);
-  const Reproduction two = reproduce(2);
-  ASSERT_GT(one.rows.size(), 100U);
-  ASSERT_EQ(one.rows.size(), two.rows.size());
-  std::set<std::string> ids;
-  for (std::size_t i = 0; i < one.rows.size(); ++i) {
-    const ResultRow& a = one.rows[i];
-    const ResultRow& b = two.rows[i];
-    EXPECT_TRUE(ids.insert(a.id).second) << a.id << " stands twice";
-    EXPECT_EQ(a.id.rfind("m03.", 0), 0U) << a.id;
-    EXPECT_EQ(a.id, b.id);
-    EXPECT_EQ(a.what, b.what);
-    EXPECT_TRUE(std::isfinite(a.ours)) << a.id;
-    EXPECT_EQ(a.ours, b.ours) << a.id;
-    EXPECT_EQ(a.interval, b.interval) << a.id;
-  }
-  for (const char* const id :
-       {"m03.global.clean.none.images", "m03.global.hard.topological.within_10",
-        "m03.global.hard.ratio.explained", "m03.tracking.hard.explained.known_before",
-        "m03.kidnapped.hard.topological.images", "m03.particles.paper.0.1.within_10"}) {
-    EXPECT_TRUE(ids.contains(id)) << id;
-  }
-  for (const auto& picture : one.pictures) {
-    EXPECT_TRUE(std::filesystem::is_regular_file(folder_ / "1" / picture.file)) << picture.file;
-  }
-  EXPECT_GE(one.pictures.size(), 9U);
-}
-
-TEST(TrackingReproductionOptions, RefusesNoScenesAndFoldersThatCannotBeMade) {
-  Executor executor(1);
-  EXPECT_THROW((void)reproduce_m03({.out = ::testing::TempDir(), .scenes = 0}, executor),
-               ContractError);
-  EXPECT_THROW((void)reproduce_m03({.out = ::testing::TempDir(), .runs = 1}, executor),
-               ContractError);
-  EXPECT_THROW((void)reproduce_m03({.out = ::testing::TempDir(), .only = "kitchen"}, executor),
-               ContractError);
-  EXPECT_THROW((void)reproduce_m03({.out = "/dev/null/folder"}, executor), FileError);
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
 #include "reporting/results_document.hpp"
+#include "support/text.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
 ResultRow row(const std::string& what, double ours, std::optional<Target> target) {
@@ -76,7 +77,7 @@ TEST(ResultsDocument, MarkdownTellsEveryMissAndThenAllRowsWithATarget) {
     ASSERT_NE(found, std::string::npos) << part << " after\n" << text.substr(0, at);
     at = found;
   }
-  EXPECT_EQ(text.find("reported"), std::string::npos) << "it has no target";
+  EXPECT_FALSE(contains(text, "reported")) << "it has no target";
 }
 
 TEST(ResultsDocument, MarkdownTellsAllOfARowOnShortLines) {
@@ -86,20 +87,19 @@ TEST(ResultsDocument, MarkdownTellsAllOfARowOnShortLines) {
   kept.interval = std::pair{0.4, 0.6};
   kept.over = "median of 7";
   kept.what += " over a way whose name is long enough for more than one line, as some names are";
-  EXPECT_NE(to_markdown(made).find(
-                "- **kept over a way whose name is long enough for more than one line, as some "
-                "names are**: 0.5 (0.4 .. 0.6) m, median of\n  7; published 5 .. 6; target at most "
-                "1: holds.\n"),
-            std::string::npos)
-      << to_markdown(made);
+  EXPECT_TRUE(
+      contains(to_markdown(made),
+               "- **kept over a way whose name is long enough for more than one line, as some "
+               "names are**: 0.5 (0.4 .. 0.6) m, median of\n  7; published 5 .. 6; target at most "
+               "1: holds.\n"));
 }
 
 TEST(ResultsDocument, SaysSoWhenNothingIsMissed) {
   ResultsDocument made = document();
   made.papers[0].rows[1].ours = 0.5;
   EXPECT_TRUE(miss_lines(made).empty());
-  EXPECT_NE(to_markdown(made).find("## Rows that do not hold\n\nNone.\n"), std::string::npos);
+  EXPECT_TRUE(contains(to_markdown(made), "## Rows that do not hold\n\nNone.\n"));
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

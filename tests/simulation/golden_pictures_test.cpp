@@ -16,9 +16,9 @@
 #include "panonav/simulation/mirror.hpp"
 #include "panonav/simulation/renderer.hpp"
 #include "panonav/simulation/scenes.hpp"
-#include "simulation/scene_views.hpp"
+#include "support/scene_views.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
 namespace fs = std::filesystem;
@@ -41,7 +41,7 @@ Camera small_mirror_camera() {
 
 // Not looking along any wall.
 Viewpoint viewpoint_in(const Scene& scene) {
-  return testing::viewpoint_on_tour(scene, 0.3, 0.4);
+  return viewpoint_on_tour(scene, 0.3, 0.4);
 }
 
 struct Pictures {
@@ -123,4 +123,4 @@ INSTANTIATE_TEST_SUITE_P(Scenes, GoldenPicture,
                          [](const auto& scene) { return std::string(scene.param); });
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -1,9 +1,9 @@
 #include "panonav/simulation/load_gazebo.hpp"
+#include "support/skips.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 
@@ -12,7 +12,7 @@
 #include "panonav/simulation/internal/mesh_library.hpp"
 #include "support/temporary_folder.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
 namespace fs = std::filesystem;
@@ -63,7 +63,7 @@ class GazeboWorld : public ::testing::Test {
       GTEST_SKIP() << "built without sdformat or assimp";
     }
   }
-  const testing::TemporaryFolder folder_;
+  const TemporaryFolder folder_;
 };
 
 TEST_F(GazeboWorld, PosesScalesAndUnitsAreComposed) {
@@ -94,7 +94,7 @@ TEST_F(GazeboWorld, MaterialsComeFromScriptsColoursAndTextures) {
   ASSERT_NE(material_of(scene, "crate_turned", 0).texture, nullptr);
   EXPECT_EQ(material_of(scene, "stand", 0).texture, nullptr);
   ASSERT_EQ(scene.warnings.size(), 1U);
-  EXPECT_NE(scene.warnings[0].find("lost.png"), std::string::npos);
+  EXPECT_TRUE(contains(scene.warnings[0], "lost.png"));
 }
 
 TEST_F(GazeboWorld, LightsKeepTheirPlaceAndTheirFading) {
@@ -126,12 +126,8 @@ TEST_F(GazeboWorld, ModelFoldersMayLieElsewhere) {
   const std::string text = R"(<sdf version="1.6"><world name="far">
     <include><uri>model://crate</uri></include></world></sdf>)";
   const auto world = folder_.write("far.world", text);
-  try {
-    (void)load_gazebo(world, options());
-    FAIL() << "no error";
-  } catch (const FileError& error) {
-    EXPECT_NE(std::string(error.what()).find("model://crate"), std::string::npos) << error.what();
-  }
+  EXPECT_TRUE(contains(message_of<FileError>([&] { (void)load_gazebo(world, options()); }),
+                       "model://crate"));
   GazeboOptions with_folder = options();
   with_folder.model_folders.push_back(data / "models");
   expect_box(extent_of(load_gazebo(world, with_folder), "crate"), {0.0, 0.0, 0.5},
@@ -192,13 +188,9 @@ TEST_F(GazeboWorld, BrokenFilesGiveOneClearLineAndNothingOnTheConsole) {
   ::testing::internal::CaptureStderr();
   std::vector<std::string> failures;
   for (const fs::path& file : files) {
-    try {
-      (void)load_gazebo(file, options());
-      failures.push_back(file.string() + " was read");
-    } catch (const FileError& error) {
-      const std::string text = error.what();
-      if (text.find(file.string()) != 0 || text.find('\n') != std::string::npos)
-        failures.push_back(text);
+    const auto text = message_of<FileError>([&] { (void)load_gazebo(file, options()); });
+    if (text.find(file.string()) != 0 || text.find('\n') != std::string::npos) {
+      failures.push_back(file.string() + ": " + text);
     }
   }
   EXPECT_EQ(::testing::internal::GetCapturedStdout(), "");
@@ -211,17 +203,13 @@ TEST_F(GazeboWorld, AModelThatIncludesItselfIsRefused) {
     <include><uri>model://loop</uri></include></world></sdf>)");
   GazeboOptions with_folder = options();
   with_folder.model_folders.push_back(data / "models");
-  try {
-    (void)load_gazebo(world, with_folder);
-    FAIL() << "no error";
-  } catch (const FileError& error) {
-    EXPECT_NE(std::string(error.what()).find("includes itself"), std::string::npos) << error.what();
-  }
+  EXPECT_TRUE(contains(message_of<FileError>([&] { (void)load_gazebo(world, with_folder); }),
+                       "includes itself"));
 }
 
 TEST_F(GazeboWorld, RealWorldsLoadWithTheirWalls) {
-  const char* root = std::getenv("PANONAV_DATA");
-  if (root == nullptr) GTEST_SKIP() << "PANONAV_DATA is not set: no Gazebo worlds to read";
+  const auto scenes = real_data("scenes");
+  PANONAV_REQUIRE_DATA(scenes, "scenes");
   struct Expected {
     const char* path;
     std::size_t objects, least_textures, most_warnings;
@@ -229,13 +217,12 @@ TEST_F(GazeboWorld, RealWorldsLoadWithTheirWalls) {
   };
   // Sizes are those that the wall models state; free areas by counting squares of the floor plans.
   for (const Expected& expected :
-       {Expected{"scenes/small_warehouse/worlds/small_warehouse.world", 26, 20, 0, 14.0, 20.9,
+       {Expected{"small_warehouse/worlds/small_warehouse.world", 26, 20, 0, 14.0, 20.9, 170.0,
+                 230.0},
+        Expected{"small_warehouse/worlds/no_roof_small_warehouse.world", 25, 20, 0, 14.0, 20.9,
                  170.0, 230.0},
-        Expected{"scenes/small_warehouse/worlds/no_roof_small_warehouse.world", 25, 20, 0, 14.0,
-                 20.9, 170.0, 230.0},
-        Expected{"scenes/small_house/worlds/small_house.world", 70, 60, 4, 19.0, 11.4, 100.0,
-                 150.0}}) {
-    const fs::path path = fs::path(root) / expected.path;
+        Expected{"small_house/worlds/small_house.world", 70, 60, 4, 19.0, 11.4, 100.0, 150.0}}) {
+    const fs::path path = *scenes / expected.path;
     ASSERT_TRUE(fs::exists(path)) << path;
     const Scene scene = load_gazebo(path, options());
     EXPECT_NO_THROW(validate(scene));
@@ -257,4 +244,4 @@ TEST_F(GazeboWorld, RealWorldsLoadWithTheirWalls) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -1,4 +1,5 @@
 #include "panonav/simulation/scenes.hpp"
+#include "support/text.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,9 +13,9 @@
 #include "panonav/signature/dissimilarity.hpp"
 #include "panonav/simulation/free_space.hpp"
 #include "panonav/simulation/renderer.hpp"
-#include "simulation/scene_views.hpp"
+#include "support/scene_views.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
 constexpr std::uint64_t kSeeds[] = {1, 2, 300};
@@ -26,7 +27,7 @@ class EveryScene : public ::testing::TestWithParam<std::string_view> {
 };
 
 Viewpoint viewpoint_in(const Scene& scene) {
-  return testing::viewpoint_on_tour(scene, 0.5, 0.3);
+  return viewpoint_on_tour(scene, 0.5, 0.3);
 }
 
 double mean_difference(const Panorama& a, const Panorama& b) {
@@ -152,9 +153,9 @@ TEST_P(EveryScene, MovedObjectsMoveAndNothingElseDoes) {
   EXPECT_LT(share, 0.7);
   EXPECT_GT(choices.size(), 2U);
   for (const std::string& object : all) {
-    EXPECT_EQ(object.find("wall"), std::string::npos) << object;
-    EXPECT_EQ(object.find("floor"), std::string::npos) << object;
-    EXPECT_EQ(object.find("lamp"), std::string::npos) << object;
+    EXPECT_FALSE(contains(object, "wall")) << object;
+    EXPECT_FALSE(contains(object, "floor")) << object;
+    EXPECT_FALSE(contains(object, "lamp")) << object;
   }
   // They stay out of the robot's way as they were.
   for (const std::uint64_t seed : kSeeds) {
@@ -309,4 +310,4 @@ TEST(Scenes, BadVariationsAreNamed) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

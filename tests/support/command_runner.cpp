@@ -1,4 +1,4 @@
-#include "command_runner.hpp"
+#include "support/command_runner.hpp"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,6 @@
 #include <array>
 #include <chrono>
 #include <csignal>
-#include <cstdlib>
 #include <sstream>
 #include <stdexcept>
 
@@ -103,23 +102,35 @@ std::vector<std::string> lines(const std::string& text) {
   return found;
 }
 
-TemporaryFolder::TemporaryFolder() {
-  std::string pattern = (std::filesystem::temp_directory_path() / "panonav-test-XXXXXX").string();
-  if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no temporary folder");
-  path_ = pattern;
+std::set<std::string> keys_of(const nlohmann::json& object) {
+  std::set<std::string> keys;
+  for (const auto& [key, value] : object.items()) keys.insert(key);
+  return keys;
 }
 
-TemporaryFolder::~TemporaryFolder() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
+std::vector<std::string> with(std::vector<std::string> arguments,
+                              const std::vector<std::string>& more) {
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
 }
 
-std::optional<std::filesystem::path> real_data(const std::string& folder) {
-  const char* root = std::getenv("PANONAV_DATA");
-  if (root == nullptr) return std::nullopt;
-  const auto path = std::filesystem::path(root) / folder;
-  if (!std::filesystem::is_directory(path)) return std::nullopt;
-  return path;
+nlohmann::json answer_of(const std::vector<std::string>& arguments, int exit_code) {
+  auto all = answers_of(arguments, exit_code);
+  EXPECT_EQ(all.size(), 1U);
+  return all.empty() ? nlohmann::json() : all.front();
+}
+
+std::vector<nlohmann::json> answers_of(const std::vector<std::string>& arguments, int exit_code) {
+  const auto result = run_panonav(arguments);
+  EXPECT_EQ(result.exit_code, exit_code) << result.err;
+  std::vector<nlohmann::json> parsed;
+  for (const auto& line : lines(result.out)) parsed.push_back(nlohmann::json::parse(line));
+  return parsed;
+}
+
+void run_well(const std::vector<std::string>& arguments) {
+  const auto result = run_panonav(arguments);
+  ASSERT_EQ(result.exit_code, 0) << arguments.front() << ": " << result.err;
 }
 
 }  // namespace panonav::testing

@@ -1,11 +1,7 @@
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cmath>
-#include <filesystem>
 
-#include "experiments/reproduction.hpp"
 #include "experiments/runs/mapping_run.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/simulation/scenes.hpp"
@@ -56,35 +52,6 @@ TEST(MappingRun, ARoundTripIsClosedAndMeasured) {
   EXPECT_EQ(alone.estimate.size(), 1U);
   EXPECT_EQ(shape_error(alone.estimate, alone.truth), 1.0);
   EXPECT_THROW((void)map_recording({}, {}), ContractError);
-}
-
-TEST(MappingReproduction, SameRowsOnOneAndTwoThreads) {
-  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
-  const auto folder =
-      std::filesystem::path(::testing::TempDir()) / ("f11." + std::to_string(getpid()));
-  const auto reproduce = [&](int threads) {
-    Executor executor(threads);
-    return reproduce_f11(
-        {.out = folder, .scenes = 2, .runs = 1, .views = 40, .most_views = 100, .columns = 132},
-        executor);
-  };
-  const Reproduction one = reproduce(1);
-  const Reproduction two = reproduce(2);
-  std::filesystem::remove_all(folder);
-  ASSERT_GT(one.rows.size(), 30U);
-  ASSERT_EQ(one.rows.size(), two.rows.size());
-  for (std::size_t i = 0; i < one.rows.size(); ++i) {
-    EXPECT_EQ(one.rows[i].id, two.rows[i].id);
-    EXPECT_TRUE(std::isfinite(one.rows[i].ours)) << one.rows[i].id;
-    EXPECT_EQ(std::ranges::count_if(one.rows,
-                                    [&](const ResultRow& row) { return row.id == one.rows[i].id; }),
-              1)
-        << one.rows[i].id;
-    if (one.rows[i].unit == "ms") continue;
-    EXPECT_EQ(one.rows[i].ours, two.rows[i].ours) << one.rows[i].id;
-  }
-  Executor executor(1);
-  EXPECT_THROW((void)reproduce_f11({.out = folder, .scenes = 1}, executor), ContractError);
 }
 
 }  // namespace

@@ -2,9 +2,14 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
+
+#include "support/skips.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace panonav::testing {
 
@@ -30,25 +35,20 @@ struct CommandOptions {
 [[nodiscard]] std::string refusal(const std::vector<std::string>& arguments,
                                   const CommandOptions& options = {});
 
+/// Runs, expects the exit code and gives the one JSON object that the command printed.
+[[nodiscard]] nlohmann::json answer_of(const std::vector<std::string>& arguments,
+                                       int exit_code = 0);
+/// The same with an object on each line.
+[[nodiscard]] std::vector<nlohmann::json> answers_of(const std::vector<std::string>& arguments,
+                                                     int exit_code = 0);
+
+/// Runs and expects exit code 0.
+void run_well(const std::vector<std::string>& arguments);
+
 [[nodiscard]] std::vector<std::string> lines(const std::string& text);
-
-/// A new empty folder that is removed with the object.
-class TemporaryFolder {
- public:
-  TemporaryFolder();
-  ~TemporaryFolder();
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  [[nodiscard]] const std::filesystem::path& path() const& noexcept { return path_; }
-  [[nodiscard]] std::string operator/(const std::string& name) const {
-    return (path_ / name).string();
-  }
-
- private:
-  std::filesystem::path path_;
-};
-
-/// The folder of real recordings (environment variable PANONAV_DATA); empty when there is none.
-[[nodiscard]] std::optional<std::filesystem::path> real_data(const std::string& folder);
+[[nodiscard]] std::set<std::string> keys_of(const nlohmann::json& object);
+/// The arguments and more.
+[[nodiscard]] std::vector<std::string> with(std::vector<std::string> arguments,
+                                            const std::vector<std::string>& more);
 
 }  // namespace panonav::testing
