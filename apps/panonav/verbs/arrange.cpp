@@ -8,7 +8,7 @@
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/io/dataset.hpp"
-#include "panonav/io/graph_file.hpp"
+#include "panonav/pipeline/graph_file.hpp"
 #include "panonav/io/trajectory_file.hpp"
 #include "panonav/mapping/lattice_map.hpp"
 #include "panonav/storage/memory_file.hpp"
