@@ -5,6 +5,9 @@
 #include <nlohmann/json.hpp>
 
 #include "panonav/geometry/angles.hpp"
+#include "panonav/io/dataset.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav/pipeline/homing_guide.hpp"
 #include "support/command_runner.hpp"
 #include "support/landmark_pictures.hpp"
 
@@ -63,6 +66,40 @@ TEST_F(Home, APictureOfADataSetLiesAsItSays) {
                  "panorama", "--columns-run", "counter-clockwise", "--json"});
   EXPECT_NEAR(mirrored["heading_rad"].get<double>(), -both["heading_rad"].get<double>(), 0.02);
   EXPECT_NEAR(mirrored["eta"].get<double>(), -both["eta"].get<double>(), 0.01);
+}
+
+TEST_F(Home, TheLibraryGivesTheSameBits) {
+  const auto memory = folder / "run.panonav";
+  ASSERT_EQ(run_panonav({"memorise", folder / "run", memory}).exit_code, 0);
+  const auto run = read_dataset(folder.path() / "run");
+  const HomingGuide to_view(memory, view_name(4));
+  const HomingGuide to_picture(read_image(folder / "home.png"), run.source);
+  std::size_t pointing = 0;
+  for (const DatasetEntry& entry : run.entries) {
+    const auto expect_same = [&](const json& answer, const WayHome& way) {
+      EXPECT_EQ(answer["xi"].get<double>(), way.vector.xi);
+      EXPECT_EQ(answer["eta"].get<double>(), way.vector.eta);
+      EXPECT_EQ(answer["length"].get<double>(), way.distance_r);
+      EXPECT_EQ(answer["confidence"].get<double>(), way.confidence);
+      EXPECT_NEAR(angle_difference(answer["heading_rad"], -way.turn_rad), 0.0, 1e-12);
+      ASSERT_EQ(answer["direction_rad"].is_null(), !way.direction_rad);
+      if (!way.direction_rad) return;
+      EXPECT_EQ(answer["direction_rad"].get<double>(), *way.direction_rad);
+      ++pointing;
+    };
+    const auto said = [&](std::vector<std::string> arguments) {
+      return json::parse(lines(run_panonav(arguments).out).at(0));
+    };
+    const Image picture = read_image(entry.path);
+    expect_same(said({"home", view_name(4), entry.path, "--memory", memory, "--json"}),
+                to_view.home(picture));
+    expect_same(said({"home", folder / "home.png", entry.path, "--json"}),
+                to_picture.home(picture));
+  }
+  EXPECT_GE(pointing, 10U);
+  EXPECT_FALSE(to_picture.home(read_image(folder / "home.png")).direction_rad) << "at home itself";
+  EXPECT_THROW(static_cast<void>(to_view.home(Image(97, 12))), ContractError);
+  EXPECT_THROW(HomingGuide(memory, "nowhere.png"), FileError);
 }
 
 TEST_F(Home, AViewOfAMemoryGivesTheSameWithinRounding) {

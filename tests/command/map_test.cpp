@@ -6,6 +6,9 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "panonav/io/dataset.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav/pipeline/mapper.hpp"
 #include "support/command_runner.hpp"
 #include "support/landmark_pictures.hpp"
 
@@ -83,6 +86,32 @@ TEST_F(Map, PruneShrinksTheMemoryAndKeepsTheMapWhole) {
   EXPECT_GE(json::parse(info.out)["links"].get<int>(),
             result["views"].get<int>() - static_cast<int>(said["parts"].size()));
   run_well({"verify", memory()});
+}
+
+TEST_F(Map, TheLibraryMakesTheSameMapOnePictureAtATime) {
+  (void)map();
+  const auto by_verb = MemoryFile::open(memory(), Access::read_only);
+  const auto own = folder_.path() / "own.panonav";
+  MemoryFile::create(own, by_verb.header());
+  Mapper mapper(own);
+  for (const DatasetEntry& entry : read_dataset(folder_.path() / "run").entries) {
+    Observation seen(read_image(entry.path));
+    seen.name = entry.file;
+    seen.pose = entry.pose;
+    seen.stamp_s = entry.stamp_s;
+    mapper.add(seen);
+  }
+  const MappedRun run = mapper.finish();
+  EXPECT_EQ(run.map.nodes.size(), 100U);
+  EXPECT_EQ(run.map, *by_verb.map(map_name));
+  EXPECT_EQ(mapper.memory().links(), by_verb.links());
+  const VisualMemory views = mapper.memory().load();
+  const VisualMemory expected = by_verb.load();
+  for (const ViewId view : expected.views()) {
+    EXPECT_EQ(views.packed(view), expected.packed(view));
+    EXPECT_EQ(views.info(view), expected.info(view));
+  }
+  EXPECT_THROW(mapper.add(Image(97, 12)), ContractError) << "another size than the memory's";
 }
 
 TEST_F(Map, WrongUseIsRefused) {

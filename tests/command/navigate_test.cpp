@@ -7,9 +7,13 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "panonav/core/error.hpp"
 #include "panonav/geometry/pose2.hpp"
+#include "panonav/pipeline/robot_navigator.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "support/command_runner.hpp"
+#include "support/landmark_pictures.hpp"
+#include "support/toy_world.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -207,6 +211,61 @@ TEST_F(Navigate, RefusesInOneLine) {
   const VisualMemory views = MemoryFile::open(lonely, Access::read_only).load();
   const std::string name = views.info(views.views().front()).name;
   EXPECT_TRUE(contains(refusal(ask(lonely, name)), "no passage leads to the view " + name));
+}
+
+// A robot of somebody's own, in a hall that is remembered as three rows of views.
+TEST(NavigateByLibrary, APictureInAndAVelocityOutWithOneAreaAtHand) {
+  const TemporaryFolder folder;
+  const ToyWorld world = landmark_world(4);
+  constexpr std::uint32_t rows = 3;
+  std::vector<Pose2> poses;
+  for (int i = 0; i < 22 * static_cast<int>(rows); ++i) {
+    poses.push_back({-3.5 + 0.5 * (i / 3), 1.0 + 0.5 * (i % 3), 0.0});
+  }
+  write_dataset(folder.path() / "run", world, poses);
+  const auto memory = folder / "hall.panonav";
+  ASSERT_EQ(run_panonav({"memorise", folder / "run", memory}).exit_code, 0);
+  const auto goal = view_name(poses.size() - 2);
+  EXPECT_THROW(RobotNavigator(memory, goal, {.edges = GraphOrigin::links}), FileError)
+      << "no links";
+  {
+    std::vector<Link> links;
+    MemoryFile file = MemoryFile::open(memory, Access::read_write);
+    const auto views = file.views();
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      if (i % rows + 1 < rows) links.push_back({views[i], views[i + 1], LinkKind::neighbour});
+      if (i + rows < views.size())
+        links.push_back({views[i], views[i + rows], LinkKind::neighbour});
+    }
+    file.link(links);
+  }
+  RobotNavigator navigator(
+      memory, goal,
+      {.navigator = {.views_ahead = 0}, .planner = {.areas = {.views_per_area = 12}}});
+  EXPECT_EQ(navigator.origin(), GraphOrigin::links);
+  EXPECT_GE(navigator.navigator().planner().areas().nodes.size(), 4U);
+
+  Pose2 robot{-3.4, 1.4, 1.0};
+  NavigationStep step;
+  std::size_t most_loaded = 0;
+  int decisions = 0;
+  int periods = 0;
+  do {
+    Observation seen(world.picture(robot));
+    seen.odometry = robot;
+    step = navigator.step(seen);
+    decisions += step.decided ? 1 : 0;
+    most_loaded = std::max(most_loaded, navigator.navigator().loaded_views());
+    robot = robot * motion_after(step.velocity, BaseOptions{}.period_s);
+  } while (step.decision.state == NavigationState::moving && ++periods < 5000);
+  EXPECT_EQ(step.decision.state, NavigationState::arrived);
+  EXPECT_EQ(step.velocity, Velocity{});
+  EXPECT_LT(distance(robot.position(), poses[poses.size() - 2].position()), 0.25);
+  EXPECT_GT(decisions, 30);
+  EXPECT_GT(periods, 3 * decisions) << "steps go on between decisions";
+  EXPECT_LT(most_loaded, 45U) << "of " << poses.size();
+  EXPECT_THROW(static_cast<void>(navigator.step(Image(97, 12))), ContractError);
+  EXPECT_THROW(navigator.set_goal("nowhere.png"), FileError);
 }
 
 }  // namespace

@@ -7,12 +7,16 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/trajectory_file.hpp"
 #include "panonav/panorama/panorama.hpp"
+#include "panonav/pipeline/observation_source.hpp"
+#include "panonav/pipeline/route_follower.hpp"
+#include "panonav/pipeline/route_recorder.hpp"
 #include "support/command_runner.hpp"
 #include "support/toy_world.hpp"
 
@@ -209,6 +213,31 @@ TEST_F(RouteVerbs, NamesWhatHasChanged) {
   }
   EXPECT_GE(named, 10);
   EXPECT_LT(worst_error_m(all), 0.04);
+}
+
+TEST_F(RouteVerbs, TheLibraryRecordsAndFollowsTheSameOnePictureAtATime) {
+  (void)record();
+  const auto memory = MemoryFile::open(folder_ / "m.panonav", Access::read_only);
+  const auto own = folder_.path() / "own.panonav";
+  MemoryFile::create(own, memory.header());
+  RouteRecorder recorder(own);
+  for (const DatasetEntry& entry : read_dataset(folder_.path() / "teach").entries) {
+    (void)recorder.add(read_observation(entry));
+  }
+  EXPECT_EQ(recorder.finish().route, *memory.route("route"));
+  EXPECT_THROW((void)recorder.add(Image(360, 3)), ContractError) << "without a pose";
+
+  const auto said = answers({"route", "follow", own.string(), folder_ / "repeat", "--json"});
+  const auto repeat = read_dataset(folder_.path() / "repeat");
+  ASSERT_EQ(said.size(), repeat.entries.size());
+  RouteFollower follower(own);
+  for (std::size_t i = 0; i < said.size(); ++i) {
+    const RouteStep step = follower.step(read_observation(repeat.entries[i]));
+    ASSERT_TRUE(step.fix);
+    EXPECT_EQ(said[i]["pose"]["x_m"].get<double>(), step.fix->fix.pose.x_m);
+    EXPECT_EQ(said[i]["pose"]["y_m"].get<double>(), step.fix->fix.pose.y_m);
+    EXPECT_EQ(said[i]["lateral_m"].get<double>(), step.fix->lateral_m);
+  }
 }
 
 TEST_F(RouteVerbs, WrongUseIsRefused) {

@@ -8,10 +8,6 @@
 
 namespace panonav::command {
 
-bool points_home(const HomeVector& found) {
-  return found.length() > 0.0 && found.confidence >= 0.5;
-}
-
 std::string in_words(double direction_rad) {
   const double off = std::abs(degrees(direction_rad));
   if (off < 0.5) return "straight ahead";

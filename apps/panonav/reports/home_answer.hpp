@@ -5,7 +5,7 @@
 
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav/panorama/panorama.hpp"
-#include "panonav/relative_pose/fourier_homing.hpp"
+#include "panonav/pipeline/homing_guide.hpp"
 #include "panonav/relative_pose/homing_view.hpp"
 
 namespace panonav::command {
@@ -24,10 +24,6 @@ struct HomeAnswer {
   std::optional<ReferencePose> pose;
   HomeVector vector;
 };
-
-/// Whether the vector stands out of what its residual alone would make of it: its length is at
-/// least its own standard deviation.
-[[nodiscard]] bool points_home(const HomeVector& found);
 
 /// "34 degrees to the left", "straight ahead".
 [[nodiscard]] std::string in_words(double direction_rad);

@@ -29,7 +29,7 @@ Nodes nodes_of(const Dataset& recording, const MappedRun& run) {
   for (std::size_t i = 0; i < run.map.nodes.size(); ++i) {
     const MapNode& node = run.map.nodes[i];
     if (node.part != part) continue;
-    const DatasetEntry& entry = recording.entries[run.entries[i]];
+    const DatasetEntry& entry = recording.entries[run.observations[i]];
     nodes.number.emplace(node.view, nodes.map.size());
     nodes.map.push_back(node.pose.position());
     if (entry.pose) nodes.truth.push_back(entry.pose->position());

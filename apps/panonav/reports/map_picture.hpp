@@ -2,7 +2,8 @@
 
 #include <filesystem>
 
-#include "verbs/mapped_run.hpp"
+#include "panonav/io/dataset.hpp"
+#include "panonav/pipeline/mapper.hpp"
 
 namespace panonav::command {
 

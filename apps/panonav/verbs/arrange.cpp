@@ -8,9 +8,9 @@
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/io/dataset.hpp"
-#include "panonav/io/graph_file.hpp"
 #include "panonav/io/trajectory_file.hpp"
 #include "panonav/mapping/lattice_map.hpp"
+#include "panonav/pipeline/graph_file.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "verbs/stored_lattice.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES

@@ -11,6 +11,7 @@
 #include "reports/catchment_report.hpp"
 #include "reports/report_page.hpp"
 #include "verbs/catchment_survey.hpp"
+#include "verbs/recording.hpp"
 
 namespace panonav::command {
 
@@ -210,11 +211,12 @@ ExitCode catchment(const Arguments& arguments, const CatchmentArguments& wanted,
     throw UsageError("--bin-m is " + short_number(*wanted.settings.bin_m) + "; allowed: > 0");
   }
   CatchmentSettings settings = wanted.settings;
-  settings.homing = homing_options(arguments, wanted.homing, wanted.homing.signature.components);
+  settings.homing =
+      homing_options(arguments, wanted.homing, wanted.homing.views.signature.components);
   if (wanted.stages) {
     if (wanted.ahead) throw UsageError("--stages are stages of runs, and --ahead makes none");
     settings.stages =
-        read_stages(*wanted.stages, std::min(62, wanted.homing.signature.components - 2));
+        read_stages(*wanted.stages, std::min(62, wanted.homing.views.signature.components - 2));
   }
   settings.typical_distance_given = arguments.given("run", "typical_distance_m");
   settings.longest_step_given = arguments.given("run", "longest_step_m");

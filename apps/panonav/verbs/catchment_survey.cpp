@@ -11,6 +11,8 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/positions.hpp"
 #include "panonav/geometry/voronoi.hpp"
+#include "panonav/pipeline/observation_source.hpp"
+#include "verbs/recording.hpp"
 
 namespace panonav::command {
 
@@ -127,37 +129,38 @@ void count_pairs(const std::vector<PairVector>& vectors, const CatchmentSettings
 
 RecordedViews read_views(const Dataset& recording, const HomingArguments& wanted,
                          const std::optional<std::uint64_t>& turn_seed, Session& session) {
-  const HomingReader reader(recording, wanted);
+  const HomingEncoder encoder(recording.source, wanted.views);
   const std::size_t total = recording.entries.size();
-  std::vector<std::optional<HomingView>> read(total);
   RecordedViews result;
   result.turned_rad.resize(total);
   Progress progress("reading", total);
-  constexpr std::size_t batch = 32;
-  for (std::size_t begin = 0; begin < total; begin += batch) {
-    const std::size_t count = std::min(batch, total - begin);
-    for_each_entry(session.executor(), count, [&](std::size_t i) {
-      const std::size_t index = begin + i;
-      Panorama panorama = reader.read(recording.entries[index]);
-      if (turn_seed) {
-        Random random(*turn_seed, index);
-        const auto columns = static_cast<std::uint64_t>(panorama.columns());
-        const auto turned = static_cast<int>(random.index(columns));
-        panorama = turn_columns(panorama, turned);
-        result.turned_rad[index] =
-            wrap_angle(2.0 * std::numbers::pi * turned / static_cast<double>(columns));
-      }
-      read[index] = reader.view(panorama);
-    });
-    progress.advance(count);
-  }
-  for (std::size_t i = 0; i < total; ++i) {
-    const DatasetEntry& entry = recording.entries[i];
-    check_same_rows(*read[i], entry, *read.front(), recording.entries.front().file);
-    result.files.push_back(entry.file);
-    result.poses.push_back(entry.pose);
-    result.views.push_back(std::move(*read[i]));
-  }
+  make_in_order(
+      total, session.executor(),
+      [&](std::size_t index) {
+        Panorama panorama = encoder.panorama(read_observation(recording.entries[index]));
+        if (turn_seed) {
+          Random random(*turn_seed, index);
+          const auto columns = static_cast<std::uint64_t>(panorama.columns());
+          const auto turned = static_cast<int>(random.index(columns));
+          panorama = turn_columns(panorama, turned);
+          result.turned_rad[index] =
+              wrap_angle(2.0 * std::numbers::pi * turned / static_cast<double>(columns));
+        }
+        return encoder.view(panorama);
+      },
+      [&](std::size_t index, HomingView&& view) {
+        const DatasetEntry& entry = recording.entries[index];
+        if (index > 0 && view.rows() != result.views.front().rows()) {
+          throw FileError(entry.path.string(),
+                          "rows is " + std::to_string(view.rows()) +
+                              "; allowed: " + std::to_string(result.views.front().rows()) +
+                              ", as in " + result.files.front());
+        }
+        result.files.push_back(entry.file);
+        result.poses.push_back(entry.pose);
+        result.views.push_back(std::move(view));
+        progress.advance();
+      });
   return result;
 }
 

@@ -4,46 +4,34 @@
 #include <cmath>
 
 #include "panonav/geometry/angles.hpp"
-#include "panonav/pipeline/view_encoder.hpp"
+#include "panonav/pipeline/observation_source.hpp"
+#include "verbs/recording.hpp"
 
 namespace panonav::command {
 
-void follow(RouteTracker& tracker, const LineReader& reader, const Dataset& run,
-            const std::vector<Pose2>& truth, const FollowSettings& settings, Executor& executor,
-            const std::function<void(FollowedImage&&)>& report) {
-  const auto odometry = settings.use_odometry ? odometry_poses(run) : std::vector<Pose2>{};
-  const auto every = static_cast<std::size_t>(settings.every);
-  const std::size_t looked_at = (run.entries.size() + every - 1) / every;
-  RouteChanges changes;
-  constexpr std::size_t batch = 32;
-  for (std::size_t begin = 0; begin < looked_at; begin += batch) {
-    const std::size_t count = std::min(batch, looked_at - begin);
-    std::vector<std::vector<float>> lines(count);
-    for_each_entry(executor, count, [&](std::size_t i) {
-      lines[i] = reader.read(run.entries[(begin + i) * every].path);
-    });
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::size_t index = (begin + i) * every;
-      const DatasetEntry& entry = run.entries[index];
-      FollowedImage image{index, entry.file, entry.stamp_s, std::move(lines[i])};
-      if (odometry.empty()) {
-        image.fix = tracker.search(image.line);
-      } else {
-        const Pose2& before = odometry[index - std::min(index, every)];
-        image.fix = tracker.track(image.line, inverse(before) * odometry[index]);
-      }
-      if (image.fix) {
-        image.changed = changes.add(image.fix->fix);
-      } else {
-        changes.reset();
-      }
-      if (!truth.empty()) {
-        image.truth = truth[index];
-        image.true_place = place_on_route(tracker.lines().poses(), truth[index].position());
-      }
-      report(std::move(image));
-    }
-  }
+void follow(RouteFollower& follower, const Dataset& run, const std::vector<Pose2>& truth,
+            int every_nth, Executor& executor, const std::function<void(FollowedImage&&)>& report) {
+  const auto every = static_cast<std::size_t>(every_nth);
+  make_in_order(
+      (run.entries.size() + every - 1) / every, executor,
+      [&](std::size_t i) { return follower.encode(read_observation(run.entries[i * every])); },
+      [&](std::size_t i, std::vector<float>&& line) {
+        const std::size_t index = i * every;
+        const DatasetEntry& entry = run.entries[index];
+        RouteStep step = follower.step(std::move(line), entry.odometry);
+        FollowedImage image{index,
+                            entry.file,
+                            entry.stamp_s,
+                            std::move(step.line),
+                            std::move(step.fix),
+                            std::move(step.changed)};
+        if (!truth.empty()) {
+          image.truth = truth[index];
+          image.true_place =
+              place_on_route(follower.tracker().lines().poses(), truth[index].position());
+        }
+        report(std::move(image));
+      });
 }
 
 FollowSummary summarise_follow(const std::vector<FollowedImage>& images, bool headings_known) {

@@ -9,10 +9,10 @@
 
 #include "panonav/core/executor.hpp"
 #include "panonav/io/dataset.hpp"
+#include "panonav/pipeline/route_follower.hpp"
 #include "panonav/route/route_changes.hpp"
 #include "panonav/route/route_place.hpp"
 #include "panonav/route/route_tracker.hpp"
-#include "verbs/route_reading.hpp"
 
 namespace panonav::command {
 
@@ -28,17 +28,12 @@ struct FollowedImage {
   std::optional<RoutePlace> true_place;
 };
 
-struct FollowSettings {
-  int every = 1;             ///< pictures between those that are looked at, plus one
-  bool use_odometry = true;  ///< where the run has it; else each picture alone
-};
-
-/// Follows a run along a route. Lines are read on all threads, the tracker runs in order; the same
-/// on any number of threads. `truth`: poses of all entries, or empty. `report` is called after each
-/// picture, in order. Throws FileError on a picture that cannot be read.
-void follow(RouteTracker& tracker, const LineReader& reader, const Dataset& run,
-            const std::vector<Pose2>& truth, const FollowSettings& settings, Executor& executor,
-            const std::function<void(FollowedImage&&)>& report);
+/// Follows a run along a route, every N-th picture of it. Lines are read on all threads, the
+/// follower runs in order; the same on any number of threads. `truth`: poses of all entries, or
+/// empty. `report` is called after each picture, in order. Throws FileError on a picture that
+/// cannot be read.
+void follow(RouteFollower& follower, const Dataset& run, const std::vector<Pose2>& truth,
+            int every_nth, Executor& executor, const std::function<void(FollowedImage&&)>& report);
 
 struct FollowSummary {
   std::size_t images = 0;

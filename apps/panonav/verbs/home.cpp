@@ -7,10 +7,13 @@
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/pipeline/homing_guide.hpp"
+#include "panonav/pipeline/named_view.hpp"
+#include "panonav/pipeline/observation_source.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "reports/home_answer.hpp"
 #include "verbs/homing_pictures.hpp"
-#include "verbs/named_view.hpp"
+#include "verbs/recording.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES
 #include "reports/home_report.hpp"
 #include "reports/report_page.hpp"
@@ -76,32 +79,26 @@ std::optional<Panorama> thumbnail_of(const MemoryFile& file, ViewId view) {
                                {.forward_column = picture_forward_column(picture.width())});
 }
 
-ExitCode answer_all(const HomeArguments& wanted, const Goal& goal, const Dataset& recording,
-                    const std::function<Panorama(const DatasetEntry&)>& read,
-                    const std::function<HomingView(const Panorama&)>& view_of,
-                    const FourierHomingOptions& options, Session& session) {
+ExitCode answer_all(const HomeArguments& wanted, const HomingGuide& guide, const Goal& goal,
+                    const Dataset& recording, Session& session) {
   const std::size_t total = recording.entries.size();
   std::vector<HomeAnswer> answers;
   std::size_t pointing = 0;
   Progress progress("homing", total);
-  constexpr std::size_t batch = 32;
-  for (std::size_t begin = 0; begin < total; begin += batch) {
-    const std::size_t count = std::min(batch, total - begin);
-    std::vector<HomeAnswer> some(count);
-    for_each_entry(session.executor(), count, [&](std::size_t i) {
-      const DatasetEntry& entry = recording.entries[begin + i];
-      const HomingView view = view_of(read(entry));
-      check_same_rows(view, entry, goal.view, goal.name);
-      some[i] = {entry.file, entry.pose, home_vector(goal.view, view, options)};
-    });
-    progress.clear();
-    for (HomeAnswer& answer : some) {
-      pointing += points_home(answer.vector) ? 1 : 0;
-      session.print(session.json() ? as_json(goal.name, answer).dump() : as_text(answer, session));
-      answers.push_back(std::move(answer));
-    }
-    progress.advance(count);
-  }
+  make_in_order(
+      total, session.executor(),
+      [&](std::size_t i) {
+        const DatasetEntry& entry = recording.entries[i];
+        return HomeAnswer{entry.file, entry.pose, guide.home(read_observation(entry)).vector};
+      },
+      [&](std::size_t, HomeAnswer&& answer) {
+        progress.clear();
+        pointing += points_home(answer.vector) ? 1 : 0;
+        session.print(session.json() ? as_json(goal.name, answer).dump()
+                                     : as_text(answer, session));
+        answers.push_back(std::move(answer));
+        progress.advance();
+      });
   progress.clear();
   if (!session.json() && total > 1) {
     session.print(session.strong(std::to_string(pointing) + " of " + std::to_string(total)) +
@@ -109,8 +106,9 @@ ExitCode answer_all(const HomeArguments& wanted, const Goal& goal, const Dataset
   }
 #ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) {
-    write_home_report(*wanted.report, goal, answers,
-                      [&](std::size_t i) { return read(recording.entries[i]); });
+    write_home_report(*wanted.report, goal, answers, [&](std::size_t i) {
+      return guide.encoder().panorama(read_observation(recording.entries[i]));
+    });
     tell_report(*wanted.report, session);
   }
 #else
@@ -131,26 +129,16 @@ ExitCode home_from_memory(const Arguments& arguments, const HomeArguments& wante
   }
   int components = header.shape.components;
   if (arguments.given("signature", "components")) {
-    components = wanted.homing.signature.components;
-    if (components < 3 || components > header.shape.components) {
-      throw ContractError("components", components,
-                          "3 to " + std::to_string(header.shape.components) + ", the memory's");
-    }
+    components = wanted.homing.views.signature.components;
   }
-  const auto options = homing_options(arguments, wanted.homing, components);
-  const auto memory = file.load();
-  const ViewId view = named_view(memory, wanted.goal, *wanted.memory);
+  const ViewId view = named_view(file, wanted.goal);
   const auto recording = open_recording(wanted.current, wanted.pictures, header.source);
-  const ViewEncoder pipeline(header, recording.source);
-  const auto view_of = [&](const FourierSignature& signature) {
-    return first_components(view_to_home_with(signature, wanted.homing.horizon), components);
-  };
-  const Goal goal{memory.info(view).name, memory.info(view).pose, view_of(memory.signature(view)),
+  const HomingGuide guide(file, wanted.goal, recording.source,
+                          homing_options(arguments, wanted.homing, components), components,
+                          wanted.homing.views.horizon);
+  const Goal goal{guide.goal_name(), file.load({&view, 1}).info(view).pose, guide.goal(),
                   wanted.report ? thumbnail_of(file, view) : std::nullopt};
-  return answer_all(
-      wanted, goal, recording, [&](const DatasetEntry& entry) { return pipeline.read(entry); },
-      [&](const Panorama& panorama) { return view_of(pipeline.signature(panorama)); }, options,
-      session);
+  return answer_all(wanted, guide, goal, recording, session);
 }
 
 ExitCode home(const Arguments& arguments, const HomeArguments& wanted, Session& session) {
@@ -158,7 +146,8 @@ ExitCode home(const Arguments& arguments, const HomeArguments& wanted, Session& 
   if (wanted.report) prepare_home_report(*wanted.report);
 #endif
   if (wanted.memory) return home_from_memory(arguments, wanted, session);
-  const auto options = homing_options(arguments, wanted.homing, wanted.homing.signature.components);
+  const auto& views = wanted.homing.views;
+  const auto options = homing_options(arguments, wanted.homing, views.signature.components);
   std::error_code ignored;
   if (fs::is_directory(wanted.goal, ignored)) {
     throw FileError(wanted.goal, "is a folder; the goal is one picture, or a view of --memory");
@@ -170,13 +159,11 @@ ExitCode home(const Arguments& arguments, const HomeArguments& wanted, Session& 
   std::optional<PictureSource> goal_source = source_beside(wanted.goal);
   if (!goal_source) goal_source = recording.source;
   const auto goals = open_recording(wanted.goal, wanted.pictures, goal_source);
-  const HomingReader goal_reader(goals, wanted.homing);
-  const HomingReader reader(recording, wanted.homing);
-  const Panorama picture = goal_reader.read(goals.entries.front());
-  const Goal goal{wanted.goal, std::nullopt, goal_reader.view(picture), picture};
-  return answer_all(
-      wanted, goal, recording, [&](const DatasetEntry& entry) { return reader.read(entry); },
-      [&](const Panorama& panorama) { return reader.view(panorama); }, options, session);
+  const HomingEncoder encoder(goals.source, views);
+  const Panorama picture = encoder.panorama(read_observation(goals.entries.front()));
+  const Goal goal{wanted.goal, std::nullopt, encoder.view(picture), picture};
+  const HomingGuide guide(HomingEncoder(recording.source, views), goal.name, goal.view, options);
+  return answer_all(wanted, guide, goal, recording, session);
 }
 
 Run declare(Arguments& arguments) {

@@ -6,11 +6,11 @@
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
-#include "panonav/io/graph_file.hpp"
 #include "panonav/io/trajectory_file.hpp"
+#include "panonav/pipeline/graph_file.hpp"
 #include "panonav/pipeline/known_views.hpp"
-#include "panonav/pipeline/learnt_models.hpp"
-#include "verbs/mapped_run.hpp"
+#include "panonav/pipeline/mapper.hpp"
+#include "panonav/pipeline/observation_source.hpp"
 #include "verbs/memorising.hpp"
 #include "verbs/recording.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES
@@ -23,9 +23,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The name under which a memory file keeps the map of this verb.
-constexpr const char* map_name = "map";
-
 struct MapArguments {
   std::string dataset;
   std::string memory;
@@ -34,7 +31,7 @@ struct MapArguments {
   std::optional<std::string> picture;
   PictureArguments pictures;
   SignatureOptions signature;
-  MapSettings settings;
+  MapperOptions mapper;
   bool no_thumbnails = false;
 };
 
@@ -46,8 +43,8 @@ std::vector<StampedPose> trajectory_of(const Dataset& recording, const MappedRun
   const std::size_t part = largest_part(run.map);
   for (std::size_t i = 0; i < run.map.nodes.size(); ++i) {
     if (run.map.nodes[i].part != part) continue;
-    const DatasetEntry& entry = recording.entries[run.entries[i]];
-    const double stamp_s = entry.stamp_s.value_or(static_cast<double>(run.entries[i]));
+    const DatasetEntry& entry = recording.entries[run.observations[i]];
+    const double stamp_s = entry.stamp_s.value_or(static_cast<double>(run.observations[i]));
     if (!trajectory.empty() && !(stamp_s > trajectory.back().stamp_s)) {
       throw FileError(dataset, "stamp_s of " + entry.file + " is " + to_text(stamp_s) +
                                    "; allowed for --tum: > " + to_text(trajectory.back().stamp_s) +
@@ -56,22 +53,6 @@ std::vector<StampedPose> trajectory_of(const Dataset& recording, const MappedRun
     trajectory.push_back({stamp_s, run.map.nodes[i].pose});
   }
   return trajectory;
-}
-
-/// Links of all edges, and poses for views that have none, in the frame of the largest part.
-void store(const Dataset& recording, const MappedRun& run, MemoryFile& memory) {
-  std::vector<Link> links;
-  for (const MapEdge& edge : run.map.edges) links.push_back({edge.a, edge.b, edge.kind});
-  memory.link(links);
-  memory.save_map(map_name, run.map);
-  const bool posed = std::ranges::any_of(recording.entries,
-                                         [](const auto& entry) { return entry.pose.has_value(); });
-  if (posed) return;
-  const std::size_t part = largest_part(run.map);
-  for (const MapNode& node : run.map.nodes) {
-    if (node.part != part) continue;
-    memory.set_pose(node.view, ReferencePose{node.pose.x_m, node.pose.y_m, node.pose.heading_rad});
-  }
 }
 
 std::vector<std::size_t> part_sizes(const TopologicalMap& map) {
@@ -148,7 +129,7 @@ void print_result(const MapArguments& wanted, const Dataset& recording, const Ma
     session.print(session.bad("The map is in " + std::to_string(sizes.size()) + " parts") +
                   " that nothing connects, of so many places: " + text);
   }
-  const double height_m = wanted.settings.odometry.camera_height_m;
+  const double height_m = wanted.mapper.odometry.camera_height_m;
   if (!run.wheels && height_m > 0.0) {
     session.print("Lengths are read from the ground, " + short_number(height_m) +
                   " m below the camera.");
@@ -159,6 +140,18 @@ void print_result(const MapArguments& wanted, const Dataset& recording, const Ma
 #ifdef PANONAV_COMMAND_SIMULATES
   if (comparison) print_comparison(*comparison, run, session);
 #endif
+}
+
+MappedRun map_recording(const Dataset& recording, Mapper& mapper, Session& session) {
+  Progress progress("mapping", recording.entries.size());
+  make_in_order(
+      recording.entries.size(), session.executor(),
+      [&](std::size_t i) { return mapper.encode(read_observation(recording.entries[i])); },
+      [&](std::size_t, Mapper::EncodedView&& seen) {
+        progress.advance();
+        mapper.add(std::move(seen));
+      });
+  return mapper.finish();
 }
 
 ExitCode map(const Arguments& arguments, const MapArguments& wanted, Session& session) {
@@ -178,19 +171,17 @@ ExitCode map(const Arguments& arguments, const MapArguments& wanted, Session& se
     memory = MemoryFile::create(wanted.memory, header_from_first_views(recording, wanted.signature,
                                                                        {}, session.executor()));
   }
-  const ViewEncoder pipeline(memory->header(), recording.source);
-  if (there) check_known_views(recording, *memory, pipeline, session.executor());
-  MapSettings settings = wanted.settings;
-  settings.thumbnails = !wanted.no_thumbnails;
-  const MappedRun run = map_recording(recording, pipeline, settings, *memory, session);
-  store(recording, run, *memory);
-  keep_models(*memory);
+  MapperOptions options = wanted.mapper;
+  options.thumbnails = !wanted.no_thumbnails;
+  Mapper mapper(std::move(*memory), recording.source, options);
+  if (there) check_known_views(recording, mapper.memory(), mapper.encoder(), session.executor());
+  const MappedRun run = map_recording(recording, mapper, session);
   if (wanted.tum) write_trajectory(*wanted.tum, trajectory_of(recording, run, wanted.dataset));
   if (wanted.graph) {
     write_graph(*wanted.graph, run.map, [&](ViewId view) {
       const auto found = std::ranges::lower_bound(run.map.nodes, view, {}, &MapNode::view);
       const auto number = static_cast<std::size_t>(found - run.map.nodes.begin());
-      return recording.entries[run.entries[number]].file;
+      return recording.entries[run.observations[number]].file;
     });
   }
 #ifdef PANONAV_COMMAND_SIMULATES
@@ -218,10 +209,10 @@ Run declare(Arguments& arguments) {
   arguments.flag("--no-thumbnails", wanted->no_thumbnails,
                  "Do not keep small pictures of the views");
   arguments.options("signature", wanted->signature);
-  arguments.options("mapping", wanted->settings.mapping);
-  arguments.options("visual_odometry", wanted->settings.odometry);
-  arguments.options("loop_closure", wanted->settings.closure, "closure");
-  arguments.options("pose_graph", wanted->settings.graph, "graph");
+  arguments.options("mapping", wanted->mapper.mapping);
+  arguments.options("visual_odometry", wanted->mapper.odometry);
+  arguments.options("loop_closure", wanted->mapper.closure, "closure");
+  arguments.options("pose_graph", wanted->mapper.graph, "graph");
   return [wanted, &arguments](Session& session) { return map(arguments, *wanted, session); };
 }
 

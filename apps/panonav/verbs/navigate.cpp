@@ -12,8 +12,6 @@
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
-#include "panonav/storage/memory_file_views.hpp"
-#include "verbs/named_view.hpp"
 #include "verbs/navigated_run.hpp"
 
 namespace panonav::command {
@@ -61,16 +59,12 @@ Pose2 free_pose(const std::string& flag, const std::string& text, const FreeSpac
 }
 
 /// null where nobody knows.
-std::string file_of(ViewId view, const VisualMemory& memory) {
-  return memory.info(view).name;
-}
-
-ordered_json file_or_null(const std::optional<ViewId>& view, const VisualMemory& memory) {
-  return view ? ordered_json(file_of(*view, memory)) : ordered_json();
+ordered_json file_or_null(const std::optional<ViewId>& view, const RobotNavigator& robot) {
+  return view ? ordered_json(robot.info(*view).name) : ordered_json();
 }
 
 ordered_json as_json(const NavigationDecision& decision, const Pose2& pose,
-                     const VisualMemory& memory) {
+                     const RobotNavigator& robot) {
   auto events = ordered_json::array();
   for (const NavigationEvent event : decision.events) events.push_back(name_of(event));
   return {{"look", decision.step},
@@ -79,8 +73,8 @@ ordered_json as_json(const NavigationDecision& decision, const Pose2& pose,
           {"advance_m", decision.advance_m},
           {"homing", decision.homing},
           {"on_route", decision.on_route},
-          {"nearest", file_or_null(decision.nearest, memory)},
-          {"next", file_or_null(decision.next, memory)},
+          {"nearest", file_or_null(decision.nearest, robot)},
+          {"next", file_or_null(decision.next, robot)},
           {"area", decision.area},
           {"image_difference", decision.difference},
           {"way", or_null(decision.way)},
@@ -118,9 +112,9 @@ std::string in_words(NavigationEvent event) {
   return std::string(name_of(event));
 }
 
-std::string as_text(const NavigationDecision& decision, const VisualMemory& memory) {
+std::string as_text(const NavigationDecision& decision, const RobotNavigator& robot) {
   std::string line = "look " + std::to_string(decision.step) + "  ";
-  if (decision.nearest) line += "at " + file_of(*decision.nearest, memory) + "  ";
+  if (decision.nearest) line += "at " + robot.info(*decision.nearest).name + "  ";
   for (std::size_t i = 0; i < decision.events.size(); ++i) {
     line += (i > 0 ? ", " : "") + in_words(decision.events[i]);
     if (decision.events[i] == NavigationEvent::entered_area) {
@@ -146,15 +140,15 @@ std::string_view reason_of(NavigationState state) {
   return "";
 }
 
-ordered_json summary_json(const NavigateArguments& wanted, const Remembered& remembered,
-                          const AreaPlanner& planner, const std::string& goal, const Pose2& start,
-                          const MissionRun& run) {
-  const NavigationGraph& graph = remembered.place.graph;
+ordered_json summary_json(const NavigateArguments& wanted, RobotNavigator& robot,
+                          const std::string& goal, const Pose2& start, const MissionRun& run) {
+  const NavigationGraph& graph = robot.graph();
+  const AreaPlanner& planner = robot.navigator().planner();
   return {
       {"memory", wanted.memory},
       {"goal", goal},
       {"scene", wanted.scene},
-      {"passages_from", name_of(remembered.origin)},
+      {"passages_from", name_of(robot.origin())},
       {"route", or_null(wanted.route)},
       {"views", graph.size()},
       {"passages", graph.edges().size()},
@@ -207,20 +201,6 @@ Mission mission_of(const NavigateArguments& wanted, ViewId goal, const MissionPl
   return mission;
 }
 
-void check_goal(const NavigateArguments& wanted, const RememberedPlace& remembered, ViewId goal,
-                const std::string& name) {
-  const auto node = remembered.graph.node_of(goal);
-  if (!node || remembered.graph.exits(*node).empty()) {
-    throw FileError(wanted.memory, "no passage leads to the view " + name +
-                                       "; take another goal, or arrange the memory anew");
-  }
-  if (wanted.kidnap && !std::isfinite(remembered.truth[*node].x_m)) {
-    throw FileError(wanted.memory, "does not know where the view " + name +
-                                       " was taken, so half of the way neither; leave out "
-                                       "--kidnap");
-  }
-}
-
 ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, Session& session) {
   const auto given = [&](const std::string& section, const std::string& name) {
     return arguments.given(section, name);
@@ -228,42 +208,39 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
   if (given("odometry", "drive")) {
     throw UsageError("--odometry-drive: the robot's drive is --drive here; leave it out");
   }
-  const MemoryFileViews source(wanted.memory);
-  std::optional<GraphOrigin> origin;
-  if (wanted.passages) origin = graph_origin(*wanted.passages);
-  Remembered remembered = remember(source.file(), origin, session.executor());
-  const VisualMemory& memory = remembered.place.memory;
-  const ViewId goal = named_view(memory, wanted.goal, wanted.memory);
-  const std::string goal_file = file_of(goal, memory);
-  check_goal(wanted, remembered.place, goal, goal_file);
-  std::optional<RouteSource> route;
-  if (wanted.route) {
-    remembered.place.routes.push_back(
-        route_among_views(source.file(), *wanted.route, memory, wanted.known_route));
-    const int columns = remembered.place.routes.front().tracker.lines().columns();
-    route = route_source(source.file(), *wanted.route, columns);
+  RobotNavigatorOptions options{.navigator = wanted.mission.navigator,
+                                .planner = wanted.mission.planner,
+                                .base = wanted.mission.base,
+                                .route = wanted.route,
+                                .known_route = wanted.known_route};
+  if (wanted.passages) options.edges = graph_origin(*wanted.passages);
+  RobotNavigator robot(wanted.memory, wanted.goal, options, std::nullopt, &session.executor());
+  const std::string goal_file = robot.info(robot.goal()).name;
+  const RememberedPlace remembered = remembered_by(robot);
+  if (wanted.kidnap &&
+      !std::isfinite(remembered.truth[*remembered.graph.node_of(robot.goal())].x_m)) {
+    throw FileError(wanted.memory, "does not know where the view " + goal_file +
+                                       " was taken, so half of the way neither; leave out "
+                                       "--kidnap");
   }
   const MissionPlace place =
-      place_as_remembered(wanted.scene, wanted.simulation, source.file(), route, given, session);
+      place_as_remembered(wanted.scene, wanted.simulation, robot, given, session);
   const auto seed = static_cast<std::uint64_t>(wanted.simulation.simulation.scene.seed);
-  const Mission mission = mission_of(wanted, goal, place, seed);
+  const Mission mission = mission_of(wanted, robot.goal(), place, seed);
   if (!session.json()) {
-    session.print(std::to_string(remembered.place.graph.size()) + " views, " +
-                  std::to_string(remembered.place.graph.edges().size()) + " passages from " +
-                  (remembered.origin == GraphOrigin::arrangement
+    session.print(std::to_string(robot.graph().size()) + " views, " +
+                  std::to_string(robot.graph().edges().size()) + " passages from " +
+                  (robot.origin() == GraphOrigin::arrangement
                        ? "an arrangement made now (panonav arrange would keep one)"
-                       : "the memory's " + std::string(name_of(remembered.origin))));
+                       : "the memory's " + std::string(name_of(robot.origin()))));
   }
-  Navigator navigator(source, AreaPlanner(remembered.place.graph, wanted.mission.planner),
-                      wanted.mission.navigator);
-  navigator.set_routes(remembered.place.routes);
   const MissionRun run =
-      run_mission(place, remembered.place, navigator, mission, wanted.mission, seed,
+      run_mission(place, remembered, robot.navigator(), mission, wanted.mission, seed,
                   [&](const NavigationDecision& decision, const Pose2& pose) {
                     if (session.json()) {
-                      session.print(as_json(decision, pose, memory).dump());
+                      session.print(as_json(decision, pose, robot).dump());
                     } else if (!decision.events.empty()) {
-                      session.print(as_text(decision, memory));
+                      session.print(as_text(decision, robot));
                     }
                   });
   if (wanted.log) write_log(*wanted.log, run);
@@ -271,12 +248,10 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
     write_mission_picture(
         *wanted.picture,
         "to " + goal_file + " in " + place.scene.name + ": " + std::string(name_of(run.end)), place,
-        remembered.place, wanted.mission.planner, goal, run);
+        remembered, wanted.mission.planner, robot.goal(), run);
   }
   if (session.json()) {
-    session.print(
-        summary_json(wanted, remembered, navigator.planner(), goal_file, mission.start, run)
-            .dump());
+    session.print(summary_json(wanted, robot, goal_file, mission.start, run).dump());
   } else {
     print_summary(run, session);
   }

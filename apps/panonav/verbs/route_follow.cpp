@@ -10,7 +10,7 @@
 #include "panonav/io/trajectory_file.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "verbs/followed_run.hpp"
-#include "verbs/route_reading.hpp"
+#include "verbs/recording.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES
 #include "reports/report_page.hpp"
 #include "reports/route_report.hpp"
@@ -132,29 +132,23 @@ std::vector<double> seconds_of(const Dataset& run, const FollowArguments& wanted
 }
 
 ExitCode follow_run(const FollowArguments& wanted, Session& session) {
-  const auto memory = MemoryFile::open(wanted.memory, Access::read_only);
-  const std::string name = route_named(memory, wanted.name);
-  const RoutePanorama route = memory.route(name).value();
-  if (route.size() < 2) {
-    throw FileError(wanted.memory, "route '" + name + "' has 1 line; allowed: 2 or more");
-  }
-  const RouteSource source = route_source(memory, name, route.columns());
   const Dataset run = read_dataset(wanted.dataset);
-  const LineReader reader(run.source, source);
+  RouteFollower follower(MemoryFile::open(wanted.memory, Access::read_only), run.source,
+                         {.name = wanted.name,
+                          .tracker = wanted.tracker,
+                          .fit = wanted.fit,
+                          .use_odometry = !wanted.no_odometry && !odometry_poses(run).empty()});
   // A route in its odometry's frame has nothing that a data set's poses could be compared with.
-  const auto truth = source.from_odometry ? std::vector<Pose2>{} : dataset_poses(run);
+  const auto truth = follower.source().from_odometry ? std::vector<Pose2>{} : dataset_poses(run);
   const bool headings_known = !truth.empty() && run.entries.front().pose->heading_rad.has_value();
   std::vector<double> seconds;
   if (wanted.tum) seconds = seconds_of(run, wanted, session);
 #ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) prepare_route_report(*wanted.report, "route follow");
 #endif
-  RouteTracker tracker(route, wanted.tracker, wanted.fit);
-  const FollowSettings settings{wanted.every, !wanted.no_odometry};
-
   std::vector<FollowedImage> images;
   Progress progress("following", (run.entries.size() - 1) / wanted.every + 1);
-  follow(tracker, reader, run, truth, settings, session.executor(), [&](FollowedImage&& image) {
+  follow(follower, run, truth, wanted.every, session.executor(), [&](FollowedImage&& image) {
     progress.clear();
     session.print(session.json() ? as_json(image, headings_known).dump() : as_text(image, session));
     images.push_back(std::move(image));
@@ -173,7 +167,8 @@ ExitCode follow_run(const FollowArguments& wanted, Session& session) {
   if (!session.json()) print_summary(summary, images, session);
 #ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) {
-    write_follow_report(*wanted.report, name, tracker.lines(), images, summary);
+    write_follow_report(*wanted.report, follower.name(), follower.tracker().lines(), images,
+                        summary);
     tell_report(*wanted.report, session);
   }
 #endif

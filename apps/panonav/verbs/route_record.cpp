@@ -7,11 +7,12 @@
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/pipeline/observation_source.hpp"
+#include "panonav/pipeline/route_recorder.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "verbs/memorising.hpp"
 #include "verbs/recording.hpp"
-#include "verbs/route_reading.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES
 #include "reports/route_report.hpp"
 #endif
@@ -55,20 +56,19 @@ std::pair<int, int> rows_from_text(const std::string& text) {
 std::vector<std::size_t> chosen_entries(const std::vector<Pose2>& poses, int every,
                                         double every_m) {
   std::vector<std::size_t> chosen;
-  // A robot that goes every_m from picture to picture takes them a little nearer or farther.
-  const double least_m = 0.999 * every_m;
+  std::optional<Pose2> last;
   for (std::size_t i = 0; i < poses.size(); i += static_cast<std::size_t>(every)) {
-    if (chosen.empty() ||
-        distance(poses[chosen.back()].position(), poses[i].position()) >= least_m) {
-      chosen.push_back(i);
-    }
+    if (!RouteRecorder::is_due(last, poses[i], every_m)) continue;
+    chosen.push_back(i);
+    last = poses[i];
   }
   return chosen;
 }
 
 /// The poses to remember and the frame that they are in.
 std::vector<Pose2> recorded_poses(const RecordArguments& wanted, const Dataset& dataset,
-                                  RouteSource& source, Session& session) {
+                                  bool& from_odometry, Session& session) {
+  from_odometry = false;
   if (!wanted.odometry) {
     auto poses = dataset_poses(dataset);
     if (!poses.empty()) {
@@ -88,65 +88,28 @@ std::vector<Pose2> recorded_poses(const RecordArguments& wanted, const Dataset& 
                         : "has neither positions nor odometry; allowed: a table with the columns "
                           "'x_m' and 'y_m', or 'odom_x_m', 'odom_y_m' and 'odom_heading_deg'");
   }
-  source.from_odometry = true;
+  from_odometry = true;
   return poses;
 }
 
-/// Lines can only go on where the route ends, with the same camera and in the same frame.
-void check_goes_on(const RecordArguments& wanted, const Arguments& arguments,
-                   const MemoryFile& memory, const RoutePanorama& known, const Pose2& start,
-                   RouteSource& source) {
-  const RouteSource before = route_source(memory, wanted.name, known.columns());
-  const std::string route = "the route '" + wanted.name + "' in " + wanted.memory;
-  if (!arguments.given("line")) source.line = before.line;
-  if (!wanted.horizon_rows) source.horizon_rows = before.horizon_rows;
-  if (source.line != before.line || source.horizon_rows != before.horizon_rows) {
-    throw UsageError(route +
-                     " was recorded with other --columns, --half-band-rad or "
-                     "--horizon-rows; leave them out or take another --name");
-  }
-  if (source.from_odometry != before.from_odometry) {
-    throw UsageError(route + " is in the frame of " +
-                     (before.from_odometry ? "its odometry" : "its data set") +
-                     ", these poses are not; take another --name");
-  }
-  constexpr double farthest_m = 1.0;
-  const double gap_m = distance(known.poses().back().position(), start.position());
-  if (gap_m > farthest_m) {
-    throw FileError(wanted.dataset, "begins " + short_number(gap_m) + " m from the end of " +
-                                        route + "; allowed: at most " + short_number(farthest_m) +
-                                        " m, or another --name");
-  }
-}
-
-struct Recorded {
-  std::size_t appended = 0;
-  RoutePanorama route{};
-};
-
-Recorded record_lines(const RecordArguments& wanted, const Dataset& dataset,
-                      const std::vector<Pose2>& poses, const RouteSource& source,
-                      MemoryFile& memory, Session& session) {
-  const LineReader reader(dataset.source, source);
+RecordedRoute record_lines(const RecordArguments& wanted, const Dataset& dataset,
+                           const std::vector<Pose2>& poses, bool from_odometry,
+                           RouteRecorder& recorder, Session& session) {
   const auto chosen = chosen_entries(poses, wanted.every, wanted.every_m.value_or(0.1));
-  Recorded recorded;
   Progress progress("recording", chosen.size());
-  constexpr std::size_t batch = 64;
-  for (std::size_t begin = 0; begin < chosen.size(); begin += batch) {
-    const std::size_t count = std::min(batch, chosen.size() - begin);
-    std::vector<std::vector<float>> lines(count);
-    for_each_entry(session.executor(), count, [&](std::size_t i) {
-      lines[i] = reader.read(dataset.entries[chosen[begin + i]].path);
-    });
-    RoutePanorama more(source.line.columns);
-    for (std::size_t i = 0; i < count; ++i) {
-      static_cast<void>(more.append(poses[chosen[begin + i]], std::span<const float>(lines[i])));
-    }
-    recorded.appended += memory.append_route(wanted.name, more);
-    progress.advance(count);
-  }
-  recorded.route = memory.route(wanted.name).value();
-  return recorded;
+  make_in_order(
+      chosen.size(), session.executor(),
+      [&](std::size_t i) {
+        Observation seen = read_observation(dataset.entries[chosen[i]]);
+        const Pose2& pose = poses[chosen[i]];
+        if (!from_odometry) seen.pose = ReferencePose{pose.x_m, pose.y_m, pose.heading_rad};
+        return recorder.encode(seen);
+      },
+      [&](std::size_t, RouteRecorder::EncodedLine&& line) {
+        recorder.add(std::move(line));
+        progress.advance();
+      });
+  return recorder.finish();
 }
 
 ExitCode record(const Arguments& arguments, const RecordArguments& wanted, Session& session) {
@@ -154,27 +117,23 @@ ExitCode record(const Arguments& arguments, const RecordArguments& wanted, Sessi
     throw UsageError("--every-m is " + to_text(*wanted.every_m) + "; allowed: 0 or more");
   }
   const Dataset dataset = read_dataset(wanted.dataset);
-  RouteSource source{.line = wanted.line};
-  if (wanted.horizon_rows) source.horizon_rows = rows_from_text(*wanted.horizon_rows);
-  const auto poses = recorded_poses(wanted, dataset, source, session);
+  RouteRecorderOptions options{.name = wanted.name, .every_m = wanted.every_m.value_or(0.1)};
+  if (arguments.given("line")) options.line = wanted.line;
+  if (wanted.horizon_rows) options.horizon_rows = rows_from_text(*wanted.horizon_rows);
+  const auto poses = recorded_poses(wanted, dataset, options.odometry, session);
 #ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) prepare_route_report(*wanted.report, "route record");
 #endif
-  std::optional<MemoryFile> memory;
-  if (fs::exists(wanted.memory)) memory = MemoryFile::open(wanted.memory, Access::read_write);
-  if (memory) {
-    const auto known = memory->route(wanted.name);
-    if (known) check_goes_on(wanted, arguments, *memory, *known, poses.front(), source);
-  } else {
-    // Views can be memorised into the same file later; what they need of the pictures is known now.
-    memory = MemoryFile::create(wanted.memory,
-                                header_from_first_views(dataset, {}, {}, session.executor()));
-  }
-  remember_route_source(*memory, wanted.name, source);
-  const auto recorded = record_lines(wanted, dataset, poses, source, *memory, session);
+  // Views can be memorised into a new file later; what they need of the pictures is known now.
+  RouteRecorder recorder(
+      fs::exists(wanted.memory)
+          ? MemoryFile::open(wanted.memory, Access::read_write)
+          : MemoryFile::create(wanted.memory,
+                               header_from_first_views(dataset, {}, {}, session.executor())),
+      dataset.source, options);
+  const auto recorded = record_lines(wanted, dataset, poses, options.odometry, recorder, session);
   const double length_m = recorded.route.length_m();
-  const auto bytes = memory->route_bytes(wanted.name);
-  const double bytes_per_km = length_m > 0.0 ? 1000.0 * static_cast<double>(bytes) / length_m : 0.0;
+  const double bytes_per_km = recorded.bytes_per_km();
 #ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) write_record_report(*wanted.report, wanted.name, recorded.route, bytes_per_km);
 #endif
@@ -185,9 +144,9 @@ ExitCode record(const Arguments& arguments, const RecordArguments& wanted, Sessi
                                {"lines", recorded.route.size()},
                                {"columns", recorded.route.columns()},
                                {"length_m", length_m},
-                               {"bytes", bytes},
+                               {"bytes", recorded.bytes},
                                {"bytes_per_km", bytes_per_km},
-                               {"file_bytes", memory->info().file_bytes}}
+                               {"file_bytes", recorder.memory().info().file_bytes}}
                       .dump());
     return ExitCode::done;
   }
@@ -196,7 +155,7 @@ ExitCode record(const Arguments& arguments, const RecordArguments& wanted, Sessi
                 std::to_string(recorded.route.size()) + " over " + fixed(length_m, 2) + " m, " +
                 fixed(1e-6 * bytes_per_km, 2) + " MB a kilometre");
   if (dataset.source.kind == PictureKind::panorama && !dataset.source.layout.elevations &&
-      !source.horizon_rows) {
+      !recorder.source().horizon_rows) {
     session.print(
         "The pictures' elevations are not known: all rows are averaged into a line. Say which show "
         "the horizon with --horizon-rows.");

@@ -6,6 +6,7 @@
 #include <utility>
 #include <variant>
 
+#include "panonav/core/error.hpp"
 #include "panonav/core/image.hpp"
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/memory/visual_memory.hpp"
@@ -45,5 +46,20 @@ struct Observation {
   /// degree is refused with ContractError until unwarping compensates it.
   std::optional<Tilt> tilt;
 };
+
+/// Throws ContractError on a tilt of more than half a degree.
+void require_upright(const Observation& observation);
+
+/// What `make` makes of the picture. Where that was read from a file, a ContractError becomes a
+/// FileError that names it.
+template <class Make>
+auto about_picture(const Observation& observation, const Make& make) {
+  try {
+    return make();
+  } catch (const ContractError& error) {
+    if (observation.file.empty()) throw;
+    throw FileError(observation.file.string(), error.what());
+  }
+}
 
 }  // namespace panonav

@@ -59,6 +59,17 @@ void require_same(std::string_view field, int value, int remembered) {
   }
 }
 
+/// What `encode` makes of the picture, an Image or a Panorama.
+template <class Encode>
+auto encoded(const Observation& observation, Encode encode) {
+  return about_picture(observation, [&] {
+    require_upright(observation);
+    return std::visit(encode, observation.picture);
+  });
+}
+
+}  // namespace
+
 void require_upright(const Observation& observation) {
   const auto& tilt = observation.tilt;
   if (!tilt) return;
@@ -68,20 +79,6 @@ void require_upright(const Observation& observation) {
                           short_number(degrees(tilt->pitch_rad)) + " degrees",
                       "-0.5 to 0.5 degrees, as pictures are taken as upright");
 }
-
-/// What `encode` makes of the picture, an Image or a Panorama.
-template <class Encode>
-auto encoded(const Observation& observation, Encode encode) {
-  try {
-    require_upright(observation);
-    return std::visit(encode, observation.picture);
-  } catch (const ContractError& error) {
-    if (observation.file.empty()) throw;
-    throw FileError(observation.file.string(), error.what());
-  }
-}
-
-}  // namespace
 
 /// Buffers of the threads that encode at the moment, kept for those that will.
 class ViewEncoder::Workspaces {

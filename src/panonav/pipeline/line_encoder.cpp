@@ -1,14 +1,13 @@
-#include "verbs/route_reading.hpp"
+#include "panonav/pipeline/line_encoder.hpp"
 
 #include <algorithm>
 #include <sstream>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/geometry/positions.hpp"
-#include "panonav/motion/headed_path.hpp"
 
-namespace panonav::command {
+namespace panonav {
 
 namespace {
 
@@ -69,26 +68,25 @@ void remember_route_source(MemoryFile& memory, const std::string& name, const Ro
   memory.set_parameter(parameter_of(name), text);
 }
 
-LineReader::LineReader(const PictureSource& pictures, const RouteSource& route)
+LineEncoder::LineEncoder(const PictureSource& pictures, const RouteSource& route)
     : route_(route), reader_(cut_to_horizon(pictures, route), shape_of(pictures, route)) {
   if (route.horizon_rows &&
       (pictures.kind != PictureKind::panorama || pictures.layout.elevations)) {
-    throw UsageError(
+    throw ContractError(
         "--horizon-rows goes with panoramas whose elevations are not known; these pictures say "
         "where the horizon is");
   }
 }
 
-std::vector<float> LineReader::read(const std::filesystem::path& picture) const {
-  const Panorama panorama = reader_.read(picture);
-  try {
-    return line_of(panorama);
-  } catch (const ContractError& error) {
-    throw FileError(picture.string(), error.what());
-  }
+std::vector<float> LineEncoder::line(const Observation& observation) const {
+  return about_picture(observation, [&] {
+    require_upright(observation);
+    if (const auto* ready = std::get_if<Panorama>(&observation.picture)) return line_of(*ready);
+    return line_of(reader_.convert(std::get<Image>(observation.picture).view()));
+  });
 }
 
-std::vector<float> LineReader::line_of(const Panorama& panorama) const {
+std::vector<float> LineEncoder::line_of(const Panorama& panorama) const {
   if (!route_.horizon_rows) return horizon_line(panorama, route_.line);
   const auto [first, last] = *route_.horizon_rows;
   if (last >= panorama.rows()) {
@@ -122,25 +120,12 @@ std::string route_named(const MemoryFile& memory, const std::optional<std::strin
   return *name;
 }
 
-std::vector<Pose2> dataset_poses(const Dataset& dataset) {
-  std::vector<Pose2> poses;
-  bool headings = true;
-  for (const auto& entry : dataset.entries) {
-    if (!entry.pose) return {};
-    headings = headings && entry.pose->heading_rad;
-    poses.push_back({entry.pose->x_m, entry.pose->y_m, entry.pose->heading_rad.value_or(0.0)});
+RoutePanorama route_to_follow(const MemoryFile& memory, const std::string& name) {
+  RoutePanorama route = memory.route(name).value();
+  if (route.size() < 2) {
+    throw FileError(memory.path().string(), "route '" + name + "' has 1 line; allowed: 2 or more");
   }
-  if (headings || poses.size() < 2) return headings ? poses : std::vector<Pose2>{};
-  return headed_along_way(positions_of(poses));
+  return route;
 }
 
-std::vector<Pose2> odometry_poses(const Dataset& dataset) {
-  std::vector<Pose2> poses;
-  for (const auto& entry : dataset.entries) {
-    if (!entry.odometry) return {};
-    poses.push_back(*entry.odometry);
-  }
-  return poses;
-}
-
-}  // namespace panonav::command
+}  // namespace panonav

@@ -1,4 +1,4 @@
-#include "panonav/io/graph_file.hpp"
+#include "panonav/pipeline/graph_file.hpp"
 
 #include <string_view>
 

@@ -1,18 +1,16 @@
 #pragma once
 
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "cli/arguments.hpp"
-#include "panonav/io/dataset.hpp"
 #include "panonav/io/panorama_reader.hpp"
+#include "panonav/pipeline/observation.hpp"
 #include "panonav/route/horizon_line.hpp"
 #include "panonav/storage/memory_file.hpp"
 
-namespace panonav::command {
+namespace panonav {
 
 /// What a route says of its lines beyond their bytes: how pictures became lines, and where the
 /// poses came from. Kept in the memory beside it.
@@ -31,17 +29,14 @@ struct RouteSource {
                                        int columns);
 void remember_route_source(MemoryFile& memory, const std::string& name, const RouteSource& source);
 
-/// From pictures to horizon lines. Several threads may use one.
-class LineReader {
+/// From observations to horizon lines, as a route has them. Several threads may use one.
+class LineEncoder {
  public:
-  /// Throws UsageError on horizon rows for pictures whose elevations are known.
-  LineReader(const PictureSource& pictures, const RouteSource& route);
-  /// Throws FileError on a picture that cannot be read or does not show the horizon.
-  [[nodiscard]] std::vector<float> read(const std::filesystem::path& picture) const;
-  /// The same of a picture that is not in a file. Throws ContractError.
-  [[nodiscard]] std::vector<float> convert(ImageView picture) const {
-    return line_of(reader_.convert(picture));
-  }
+  /// Throws ContractError on horizon rows for pictures whose elevations are known.
+  LineEncoder(const PictureSource& pictures, const RouteSource& route);
+  /// Throws ContractError (FileError where the observation has a file) on a picture that does not
+  /// show the horizon, and on a tilt.
+  [[nodiscard]] std::vector<float> line(const Observation& observation) const;
 
  private:
   [[nodiscard]] std::vector<float> line_of(const Panorama& panorama) const;
@@ -55,11 +50,7 @@ class LineReader {
 [[nodiscard]] std::string route_named(const MemoryFile& memory,
                                       const std::optional<std::string>& name);
 
-/// Poses of all entries in the data set's frame. Where it knows positions but no headings, those
-/// along the way: the tangent fitted to the positions within 0.3 m of way to either side. Empty
-/// where it knows no positions.
-[[nodiscard]] std::vector<Pose2> dataset_poses(const Dataset& dataset);
-/// Likewise by its odometry; empty where it has none.
-[[nodiscard]] std::vector<Pose2> odometry_poses(const Dataset& dataset);
+/// The route itself. Throws FileError when it has fewer than two lines: nothing can be followed.
+[[nodiscard]] RoutePanorama route_to_follow(const MemoryFile& memory, const std::string& name);
 
-}  // namespace panonav::command
+}  // namespace panonav

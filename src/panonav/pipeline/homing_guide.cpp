@@ -1,0 +1,134 @@
+#include "panonav/pipeline/homing_guide.hpp"
+
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/pipeline/named_view.hpp"
+
+namespace panonav {
+
+namespace {
+
+int components_for(const SignatureShape& shape, int wanted) {
+  if (wanted == 0) return shape.components;
+  if (wanted < 3 || wanted > shape.components) {
+    throw ContractError("components", wanted,
+                        "3 to " + std::to_string(shape.components) + ", the memory's");
+  }
+  return wanted;
+}
+
+/// That view alone.
+VisualMemory goal_in(const MemoryFile& memory, const std::string& goal) {
+  const ViewId view = named_view(memory, goal);
+  return memory.load({&view, 1});
+}
+
+}  // namespace
+
+HomingEncoder::HomingEncoder(const PictureSource& source, const HomingViewOptions& options)
+    : pictures_(OwnPictures{PanoramaReader(source, wanted_shape(source, options.signature)),
+                            options.preprocessing}),
+      components_(options.signature.components),
+      horizon_(options.horizon) {}
+
+HomingEncoder::HomingEncoder(const MemoryHeader& header, const PictureSource& source,
+                             int components, bool horizon)
+    : pictures_(std::in_place_type<ViewEncoder>, header, source),
+      components_(components_for(header.shape, components)),
+      horizon_(horizon) {}
+
+Panorama HomingEncoder::own_panorama(const OwnPictures& own, const Observation& observation) const {
+  require_upright(observation);
+  const auto* ready = std::get_if<Panorama>(&observation.picture);
+  Panorama panorama =
+      ready ? *ready : own.reader.convert(std::get<Image>(observation.picture).view());
+  const int most = panorama.columns() / 2;
+  if (components_ > most) {
+    throw ContractError("components", components_,
+                        "3 to " + std::to_string(most) + ", half the columns of the picture");
+  }
+  if (own.preprocessing.masked_rows_top + own.preprocessing.masked_rows_bottom >= panorama.rows()) {
+    throw ContractError("has " + std::to_string(panorama.rows()) +
+                        " rows, and the masks leave none of them");
+  }
+  return panorama;
+}
+
+Panorama HomingEncoder::panorama(const Observation& observation) const {
+  if (const auto* memory = std::get_if<ViewEncoder>(&pictures_)) {
+    return memory->panorama(observation);
+  }
+  return about_picture(observation,
+                       [&] { return own_panorama(std::get<OwnPictures>(pictures_), observation); });
+}
+
+HomingView HomingEncoder::view(const Panorama& panorama) const {
+  if (const auto* memory = std::get_if<ViewEncoder>(&pictures_)) {
+    return view(memory->signature(panorama));
+  }
+  const auto& own = std::get<OwnPictures>(pictures_);
+  return view(compute_signature(preprocess(panorama, own.preprocessing), components_));
+}
+
+HomingView HomingEncoder::view(const FourierSignature& signature) const {
+  return first_components(horizon_ ? horizon_view(signature) : homing_view(signature), components_);
+}
+
+HomingGuide::HomingGuide(const std::filesystem::path& memory, const std::string& goal,
+                         const FourierHomingOptions& options)
+    : HomingGuide(MemoryFile::open(memory, Access::read_only), goal, std::nullopt, options) {}
+
+HomingGuide::HomingGuide(const MemoryFile& memory, const std::string& goal,
+                         const std::optional<PictureSource>& source,
+                         const FourierHomingOptions& options, int components, bool horizon)
+    : HomingGuide(HomingEncoder(memory.header(), source.value_or(memory.header().source),
+                                components, horizon),
+                  goal_in(memory, goal), options) {}
+
+HomingGuide::HomingGuide(const Observation& goal, const PictureSource& source,
+                         const HomingViewOptions& views, const FourierHomingOptions& options)
+    : HomingGuide(HomingEncoder(source, views), goal, options) {}
+
+HomingGuide::HomingGuide(HomingEncoder encoder, const VisualMemory& goal,
+                         const FourierHomingOptions& options)
+    : encoder_(std::move(encoder)),
+      goal_name_(goal.info(goal.views().front()).name),
+      goal_(encoder_.view(goal.signature(goal.views().front()))),
+      options_(options) {
+  validate(options_);
+}
+
+HomingGuide::HomingGuide(HomingEncoder encoder, const Observation& goal,
+                         const FourierHomingOptions& options)
+    : encoder_(std::move(encoder)),
+      goal_name_(goal.name),
+      goal_(encoder_.view(encoder_.panorama(goal))),
+      options_(options) {
+  validate(options_);
+}
+
+HomingGuide::HomingGuide(HomingEncoder encoder, std::string goal_name, HomingView goal,
+                         const FourierHomingOptions& options)
+    : encoder_(std::move(encoder)),
+      goal_name_(std::move(goal_name)),
+      goal_(std::move(goal)),
+      options_(options) {
+  validate(options_);
+}
+
+WayHome HomingGuide::home(const Observation& observation) const {
+  const HomingView view = encoder_.view(encoder_.panorama(observation));
+  return about_picture(observation, [&] {
+    if (view.rows() != goal_.rows()) {
+      throw ContractError("rows", view.rows(),
+                          std::to_string(goal_.rows()) + ", as in " + goal_name_);
+    }
+    const HomeVector found = home_vector(goal_, view, options_);
+    return WayHome{points_home(found) ? std::optional(found.direction_rad()) : std::nullopt,
+                   found.length(), wrap_angle(-found.heading_rad), found.confidence, found};
+  });
+}
+
+}  // namespace panonav

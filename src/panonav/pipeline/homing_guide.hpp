@@ -1,0 +1,111 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <variant>
+
+#include "panonav/io/panorama_reader.hpp"
+#include "panonav/panorama/preprocessing.hpp"
+#include "panonav/pipeline/observation.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
+#include "panonav/relative_pose/homing_view.hpp"
+#include "panonav/storage/memory_file.hpp"
+
+namespace panonav {
+
+/// How observations become views to home with where no memory says it.
+struct HomingViewOptions {
+  SignatureOptions signature;
+  PreprocessingOptions preprocessing;
+  /// One row, the mean of the rows within 5 degrees of the horizon (all rows where elevations are
+  /// not known), as [S06] has it; else all rows.
+  bool horizon = false;
+};
+
+/// From observations to views to home with. Several threads may use one at a time.
+class HomingEncoder {
+ public:
+  /// Without a memory; ready-made panoramas keep their size unless the options say otherwise.
+  HomingEncoder(const PictureSource& source, const HomingViewOptions& options);
+  /// As the views of a memory, of which the first `components` count; 0: all. Throws ContractError
+  /// unless the memory has them and they are 3 or more; else as `ViewEncoder`.
+  HomingEncoder(const MemoryHeader& header, const PictureSource& source, int components = 0,
+                bool horizon = false);
+
+  /// Throws ContractError (FileError where the observation has a file) on a picture that is too
+  /// small for the components wanted or that the masks cover; else as `ViewEncoder::panorama`.
+  [[nodiscard]] Panorama panorama(const Observation& observation) const;
+  [[nodiscard]] HomingView view(const Panorama& panorama) const;
+  [[nodiscard]] HomingView view(const FourierSignature& signature) const;
+
+ private:
+  struct OwnPictures {
+    PanoramaReader reader;
+    PreprocessingOptions preprocessing;
+  };
+  [[nodiscard]] Panorama own_panorama(const OwnPictures& own, const Observation& observation) const;
+
+  std::variant<OwnPictures, ViewEncoder> pictures_;
+  int components_;
+  bool horizon_;
+};
+
+/// Whether there is a direction home at all: the vector stands out of what its residual alone would
+/// make of it, as its length is at least its own standard deviation.
+[[nodiscard]] inline bool points_home(const HomeVector& found) noexcept {
+  return found.length() > 0.0 && found.confidence >= 0.5;
+}
+
+/// What an observation tells of the way home.
+struct WayHome {
+  /// In the frame of the robot as it stands now, counter-clockwise from straight ahead. Empty where
+  /// the views tell no direction: at home itself, or with too little in common (`points_home`).
+  std::optional<double> direction_rad;
+  double distance_r = 0.0;  ///< in units of R, the typical distance of the things around
+  double turn_rad = 0.0;    ///< by which the robot has turned since it was home
+  double confidence = 0.0;  ///< 0 .. 1
+  HomeVector vector;        ///< all that was found
+};
+
+/// Tells the way back to a goal from one observation: a view of a memory, or an observation made
+/// there. The heading need not be known. Several threads may ask one at a time. Cost: that of the
+/// encoding, and of `home_vector`.
+class HomingGuide {
+ public:
+  /// The goal: a view of the memory file, by name or id; the memory's own camera takes the
+  /// pictures. Throws FileError, also when there is no such view. Reads no other view.
+  HomingGuide(const std::filesystem::path& memory, const std::string& goal,
+              const FourierHomingOptions& options = {});
+  /// Pictures lie as `source` says; empty: as the memory's own. `components`, `horizon`: as
+  /// `HomingEncoder`.
+  HomingGuide(const MemoryFile& memory, const std::string& goal,
+              const std::optional<PictureSource>& source, const FourierHomingOptions& options,
+              int components = 0, bool horizon = false);
+  /// Without a memory: both pictures lie as `source` says.
+  HomingGuide(const Observation& goal, const PictureSource& source,
+              const HomingViewOptions& views = {}, const FourierHomingOptions& options = {});
+  /// A goal that another encoder made, as where its picture lies otherwise.
+  HomingGuide(HomingEncoder encoder, std::string goal_name, HomingView goal,
+              const FourierHomingOptions& options = {});
+
+  /// Throws as `HomingEncoder::panorama`, and ContractError (likewise) where the view has other
+  /// rows than the goal.
+  [[nodiscard]] WayHome home(const Observation& observation) const;
+
+  [[nodiscard]] const HomingEncoder& encoder() const noexcept { return encoder_; }
+  [[nodiscard]] const std::string& goal_name() const noexcept { return goal_name_; }
+  [[nodiscard]] const HomingView& goal() const noexcept { return goal_; }
+
+ private:
+  HomingGuide(HomingEncoder encoder, const Observation& goal, const FourierHomingOptions& options);
+  HomingGuide(HomingEncoder encoder, const VisualMemory& goal, const FourierHomingOptions& options);
+
+  HomingEncoder encoder_;
+  std::string goal_name_;
+  HomingView goal_;
+  FourierHomingOptions options_;
+};
+
+}  // namespace panonav

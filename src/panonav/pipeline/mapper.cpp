@@ -1,0 +1,107 @@
+#include "panonav/pipeline/mapper.hpp"
+
+#include <chrono>
+#include <map>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/pipeline/learnt_models.hpp"
+
+namespace panonav {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+}  // namespace
+
+std::size_t largest_part(const TopologicalMap& map) {
+  std::map<std::size_t, std::size_t> sizes;
+  for (const MapNode& node : map.nodes) ++sizes[node.part];
+  std::size_t largest = 0;
+  for (const auto& [part, size] : sizes) {
+    if (size > sizes[largest]) largest = part;
+  }
+  return largest;
+}
+
+Mapper::Mapper(const std::filesystem::path& memory, const MapperOptions& options)
+    : Mapper(MemoryFile::open(memory, Access::read_write), std::nullopt, options) {}
+
+// The nodes are a memory of their own: one that knew what is still to come would be asked another
+// question.
+Mapper::Mapper(MemoryFile memory, const std::optional<PictureSource>& source,
+               const MapperOptions& options)
+    : options_(options),
+      file_(std::move(memory)),
+      encoder_(file_.header(), source.value_or(file_.header().source)),
+      seen_(file_.header().shape, file_.header().full_scale, file_.header().elevations),
+      mapper_(seen_, options.mapping, options.odometry, options.closure, options.graph) {}
+
+Mapper::EncodedView Mapper::encode(const Observation& observation) const {
+  const ReferenceInfo info{observation.name, observation.pose, observation.stamp_s};
+  if (!options_.thumbnails) {
+    return {encoder_.signature(observation), info, observation.odometry, {}};
+  }
+  const Panorama panorama = encoder_.panorama(observation);
+  return {encoder_.signature(panorama), info, observation.odometry, thumbnail_png(panorama)};
+}
+
+bool Mapper::add(EncodedView seen) {
+  const std::size_t number = count_++;
+  all_odometry_ = all_odometry_ && seen.odometry.has_value();
+  any_pose_ = any_pose_ || seen.info.pose.has_value();
+  OdometryView view(std::move(seen.signature));
+  auto start = Clock::now();
+  const bool is_node = mapper_.is_new(view);
+  run_.mapping_s += seconds_since(start);
+  if (!is_node) {
+    ++run_.skipped;
+    return false;
+  }
+  const NewView added{std::move(seen.info), pack(view.signature, file_.header().full_scale),
+                      std::move(seen.thumbnail)};
+  const auto known = file_.find(added.info.name);
+  const ViewId id = known ? *known : file_.append(added);
+  std::optional<Pose2> moved;
+  if (odometry_of_node_ && seen.odometry) moved = inverse(*odometry_of_node_) * *seen.odometry;
+  start = Clock::now();
+  try {
+    seen_.append_as(id, added.signature, added.info);
+    static_cast<void>(mapper_.add(id, std::move(view), moved));
+  } catch (const ContractError& error) {
+    throw FileError(file_.path().string(), added.info.name + ": " + error.what());
+  }
+  run_.mapping_s += seconds_since(start);
+  run_.observations.push_back(number);
+  odometry_of_node_ = seen.odometry;
+  return true;
+}
+
+MappedRun Mapper::finish() {
+  const auto start = Clock::now();
+  mapper_.finish();
+  run_.mapping_s += seconds_since(start);
+  run_.map = mapper_.map();
+  run_.scale_m = mapper_.scale_m();
+  run_.wheels = options_.mapping.wheel_lengths && all_odometry_;
+  std::vector<Link> links;
+  for (const MapEdge& edge : run_.map.edges) links.push_back({edge.a, edge.b, edge.kind});
+  file_.link(links);
+  file_.save_map(map_name, run_.map);
+  if (!any_pose_) {
+    const std::size_t part = largest_part(run_.map);
+    for (const MapNode& node : run_.map.nodes) {
+      if (node.part != part) continue;
+      file_.set_pose(node.view, ReferencePose{node.pose.x_m, node.pose.y_m, node.pose.heading_rad});
+    }
+  }
+  keep_models(file_);
+  return run_;
+}
+
+}  // namespace panonav

@@ -1,0 +1,94 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "panonav/mapping/topological_map.hpp"
+#include "panonav/pipeline/observation.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
+#include "panonav/storage/memory_file.hpp"
+
+namespace panonav {
+
+/// The name under which a memory file keeps the map of a `Mapper`.
+inline constexpr const char* map_name = "map";
+
+/// How a map is made of observations.
+struct MapperOptions {
+  MappingOptions mapping;
+  VisualOdometryOptions odometry;
+  LoopClosureOptions closure;
+  PoseGraphOptions graph;
+  bool thumbnails = true;  ///< keep small pictures of the views
+};
+
+/// What a `Mapper` made of its observations.
+struct MappedRun {
+  TopologicalMap map;
+  std::vector<std::size_t> observations;  ///< by node: its number, counted from 0
+  std::size_t skipped = 0;                ///< observations that differed too little from a node
+  double scale_m = 0.0;                   ///< metres for each unit of length of the views
+  bool wheels = false;     ///< all observations had odometry, and lengths come from it
+  double mapping_s = 0.0;  ///< time of the mapping itself, without pictures and files
+};
+
+/// Makes a map of observations in the order in which they were taken: the views that become nodes
+/// are appended to a memory file, and the map is stored there as "map". Views that the file knows
+/// by name are not appended again; their ids must ascend in the order of the observations. What was
+/// appended stays, whatever happens later. `docs/equations.md` and `TopologicalMapper` have the
+/// method. One thread at a time, except `encode`.
+class Mapper {
+ public:
+  /// An observation on its way into the map.
+  struct EncodedView {
+    FourierSignature signature;
+    ReferenceInfo info;
+    std::optional<Pose2> odometry;
+    std::vector<std::uint8_t> thumbnail;
+  };
+
+  /// The memory's own camera takes the pictures. Throws FileError as `MemoryFile::open`,
+  /// OptionError.
+  explicit Mapper(const std::filesystem::path& memory, const MapperOptions& options = {});
+  /// A file open for writing. Pictures lie as `source` says; empty: as the memory's own. Throws
+  /// ContractError as `ViewEncoder`, OptionError.
+  Mapper(MemoryFile memory, const std::optional<PictureSource>& source,
+         const MapperOptions& options = {});
+  Mapper(const Mapper&) = delete;
+  Mapper& operator=(const Mapper&) = delete;
+
+  /// The part of `add` that several threads may do beside each other for observations to come.
+  /// Throws as `ViewEncoder::panorama`.
+  [[nodiscard]] EncodedView encode(const Observation& observation) const;
+  /// The next observation; whether it became a node. Throws as `encode`, FileError.
+  bool add(EncodedView seen);
+  bool add(const Observation& observation) { return add(encode(observation)); }
+
+  /// Optimises what is not yet, and stores the map and a link for each of its edges. Where no
+  /// observation had a pose, the views of the largest part get those of the map. More observations
+  /// may follow. Throws FileError.
+  MappedRun finish();
+
+  [[nodiscard]] const MemoryFile& memory() const noexcept { return file_; }
+  [[nodiscard]] const ViewEncoder& encoder() const noexcept { return encoder_; }
+
+ private:
+  MapperOptions options_;
+  MemoryFile file_;
+  ViewEncoder encoder_;
+  VisualMemory seen_;  // the nodes so far
+  TopologicalMapper mapper_;
+  MappedRun run_;
+  std::size_t count_ = 0;
+  std::optional<Pose2> odometry_of_node_;
+  bool all_odometry_ = true;
+  bool any_pose_ = false;
+};
+
+/// The part with the most nodes, of equal ones the first.
+[[nodiscard]] std::size_t largest_part(const TopologicalMap& map);
+
+}  // namespace panonav

@@ -1,0 +1,194 @@
+#include "panonav/pipeline/robot_navigator.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav/mapping/lattice.hpp"
+#include "panonav/pipeline/mapper.hpp"
+#include "panonav/pipeline/named_view.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr std::array<std::string_view, 4> origin_names{"map", "lattice", "links", "arrangement"};
+
+/// Empty when the file has nothing of the kind.
+std::optional<NavigationGraph> graph_from(GraphOrigin origin, const MemoryFileViews& source,
+                                          Executor& executor) {
+  const MemoryFile& file = source.file();
+  switch (origin) {
+    case GraphOrigin::map: {
+      const auto map = file.map(map_name);
+      if (!map) return std::nullopt;
+      std::vector<ViewId> views;
+      for (const MapNode& node : map->nodes) views.push_back(node.view);
+      return graph_of_map_and_neighbours(*map, file.load(views), executor);
+    }
+    case GraphOrigin::lattice: {
+      const auto map = file.map("lattice");
+      if (!map) return std::nullopt;
+      return graph_of_stored_lattice(*map, source, executor);
+    }
+    case GraphOrigin::links: {
+      const std::vector<Link> links = file.links();
+      if (links.empty()) return std::nullopt;
+      return graph_of_links(source, links, {}, executor);
+    }
+    case GraphOrigin::arrangement:
+      return graph_of_lattice(arrange(file.load(), {}, {}, executor));
+  }
+  return std::nullopt;
+}
+
+NavigationGraph graph_of(const MemoryFileViews& source, const std::optional<GraphOrigin>& wanted,
+                         GraphOrigin& origin, Executor& executor) {
+  const std::string path = source.file().path().string();
+  if (source.views().empty()) throw FileError(path, "holds no views; allowed: 2 or more");
+  if (wanted) {
+    origin = *wanted;
+    auto graph = graph_from(origin, source, executor);
+    if (graph) return std::move(*graph);
+    throw FileError(path, "has no " + std::string(name_of(origin)) +
+                              "; leave out --passages for what there is");
+  }
+  for (std::size_t i = 0;; ++i) {
+    origin = static_cast<GraphOrigin>(i);
+    auto graph = graph_from(origin, source, executor);
+    if (graph) return std::move(*graph);
+  }
+}
+
+/// The route with those of the views that lie beside it, by their poses: both must have been
+/// recorded with the poses of one data set.
+KnownRoute route_among_views(const MemoryFileViews& source, const std::string& name,
+                             const KnownRouteOptions& options) {
+  const MemoryFile& file = source.file();
+  const std::string path = file.path().string();
+  if (!file.route(name)) {
+    std::string all;
+    for (const auto& known : file.route_names()) all += (all.empty() ? "" : ", ") + known;
+    throw FileError(path, "holds no route '" + name + "'; allowed for --route: " +
+                              (all.empty() ? "none, as panonav route record made none" : all));
+  }
+  const RoutePanorama route = route_to_follow(file, name);
+  if (route_source(file, name, route.columns()).from_odometry) {
+    throw FileError(path, "route '" + name +
+                              "' is in the frame of its odometry, where no view is known to lie; "
+                              "allowed: one recorded with the poses of a data set");
+  }
+  std::vector<RouteView> views;
+  constexpr std::size_t at_once = 1024;
+  for (std::size_t begin = 0; begin < source.views().size(); begin += at_once) {
+    const auto some =
+        source.views().subspan(begin, std::min(at_once, source.views().size() - begin));
+    const VisualMemory loaded = source.load(some);
+    for (const ViewId view : some) {
+      const auto& pose = loaded.info(view).pose;
+      if (pose) views.push_back({view, {pose->x_m, pose->y_m, pose->heading_rad.value_or(0.0)}});
+    }
+  }
+  KnownRoute known = known_route(route, views, options);
+  if (known.references.empty()) {
+    throw FileError(
+        path, "none of the " + std::to_string(views.size()) + " views with a pose lies within " +
+                  short_number(options.beside_m) + " m of the route '" + name +
+                  "'; allowed: views and a route in one frame, or a larger --route-beside-m");
+  }
+  return known;
+}
+
+}  // namespace
+
+std::string_view name_of(GraphOrigin origin) {
+  return origin_names.at(static_cast<std::size_t>(origin));
+}
+
+std::optional<GraphOrigin> graph_origin(std::string_view name) {
+  const auto found = std::ranges::find(origin_names, name);
+  if (found == origin_names.end()) return std::nullopt;
+  return static_cast<GraphOrigin>(found - origin_names.begin());
+}
+
+RobotNavigator::RobotNavigator(const std::filesystem::path& memory, const std::string& goal,
+                               const RobotNavigatorOptions& options,
+                               const std::optional<PictureSource>& source, Executor* executor)
+    : options_(options),
+      views_(memory),
+      encoder_(views_.file().header(), source.value_or(views_.file().header().source)) {
+  validate(options_.base);
+  Executor own(1);
+  NavigationGraph graph =
+      graph_of(views_, options_.edges, origin_, executor == nullptr ? own : *executor);
+  navigator_.emplace(views_, AreaPlanner(std::move(graph), options_.planner), options_.navigator);
+  set_goal(goal);
+  if (!options_.route) return;
+  routes_.push_back(route_among_views(views_, *options_.route, options_.known_route));
+  const int columns = routes_.front().tracker.lines().columns();
+  route_source_ = route_source(views_.file(), *options_.route, columns);
+  line_encoder_.emplace(source.value_or(encoder_.header().source), *route_source_);
+  navigator_->set_routes(routes_);
+}
+
+void RobotNavigator::set_goal(const std::string& goal) {
+  const ViewId view = named_view(views_.file(), goal);
+  const auto node = graph().node_of(view);
+  if (!node || graph().exits(*node).empty()) {
+    throw FileError(views_.file().path().string(),
+                    "no passage leads to the view " + info(view).name +
+                        "; take another goal, or arrange the memory anew");
+  }
+  goal_ = view;
+  navigator_->set_goal(view);
+  time_left_s_ = 0.0;
+}
+
+ReferenceInfo RobotNavigator::info(ViewId view) const {
+  return views_.load({&view, 1}).info(view);
+}
+
+NavigationDecision RobotNavigator::look(const Observation& observation, RobotReport report) {
+  std::vector<float> line;
+  if (line_encoder_ && report.line.empty()) {
+    line = line_encoder_->line(observation);
+    report.line = line;
+  }
+  report.moved = moved_;
+  return navigator_->observe(encoder_.signature(observation), report);
+}
+
+NavigationStep RobotNavigator::step(const Observation& observation, RobotReport report) {
+  constexpr double near_m = 0.003;
+  const BaseOptions& base = options_.base;
+  const Pose2 moved = odometry_ && observation.odometry
+                          ? inverse(*odometry_) * *observation.odometry
+                          : motion_after(last_.velocity, base.period_s);
+  odometry_ = observation.odometry;
+  moved_ = moved_ * moved;
+  target_ = remaining_way(target_, moved);
+  time_left_s_ -= base.period_s;
+  last_.decided =
+      report.obstacle || time_left_s_ <= 0.0 || std::hypot(target_.x_m, target_.y_m) <= near_m;
+  if (last_.decided) {
+    last_.decision = look(observation, report);
+    moved_ = {};
+    const double way_m = last_.decision.advance_m;
+    const double direction_rad = last_.decision.direction_rad;
+    target_ = {way_m * std::cos(direction_rad), way_m * std::sin(direction_rad)};
+    // Twice as long as it takes: wheels may slip.
+    time_left_s_ = 2.0 * (std::numbers::pi / base.turn_rad_s + way_m / base.speed_m_s) + 1.0;
+  }
+  last_.velocity = {};
+  const double left_m = std::hypot(target_.x_m, target_.y_m);
+  if (last_.decision.state == NavigationState::moving && left_m > 0.0) {
+    last_.velocity = command_towards(std::atan2(target_.y_m, target_.x_m), left_m, base);
+  }
+  return last_;
+}
+
+}  // namespace panonav

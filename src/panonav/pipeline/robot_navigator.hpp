@@ -1,0 +1,110 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "panonav/core/executor.hpp"
+#include "panonav/motion/velocity.hpp"
+#include "panonav/navigation/known_route.hpp"
+#include "panonav/navigation/navigation_graph.hpp"
+#include "panonav/navigation/navigator.hpp"
+#include "panonav/pipeline/line_encoder.hpp"
+#include "panonav/pipeline/observation.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
+#include "panonav/storage/memory_file_views.hpp"
+
+namespace panonav {
+
+/// What the edges between the views of a memory are taken from.
+enum class GraphOrigin {
+  map,          ///< stored by a `Mapper`: motions as the map has them
+  lattice,      ///< stored by the verb `arrange`: directions from the views' phases
+  links,        ///< of the memory: lengths, too
+  arrangement,  ///< none of these is there: the views are arranged first
+};
+/// "map", "lattice", "links", "arrangement".
+[[nodiscard]] std::string_view name_of(GraphOrigin origin);
+[[nodiscard]] std::optional<GraphOrigin> graph_origin(std::string_view name);
+
+struct RobotNavigatorOptions {
+  NavigatorOptions navigator;
+  PlannerOptions planner;
+  BaseOptions base;                  ///< what velocity commands are made for
+  std::optional<GraphOrigin> edges;  ///< empty: the first that the memory has
+  /// A recorded route of the memory to go along where the way leads along it.
+  std::optional<std::string> route;
+  KnownRouteOptions known_route;
+};
+
+/// What a robot is to do after an observation.
+struct NavigationStep {
+  NavigationDecision decision;  ///< the last one
+  Velocity velocity;            ///< for the next period of the base (`BaseOptions::period_s`)
+  bool decided = false;         ///< by this observation; else the step decided before goes on
+};
+
+/// Sends a robot to a remembered view by what it sees: a picture in, a velocity out. The views are
+/// read from the memory file when they are needed: those of one area and around it are held, of
+/// the rest the graph. While the graph is made, a map needs the views of its nodes and an
+/// arrangement all views at once; these are let go then. One thread at a time.
+class RobotNavigator {
+ public:
+  /// `goal`: name or id of a view. Pictures lie as `source` says; empty: as the memory's own.
+  /// Throws FileError when the memory holds no views, not what is asked for, or no edge leads to
+  /// the goal; OptionError.
+  RobotNavigator(const std::filesystem::path& memory, const std::string& goal,
+                 const RobotNavigatorOptions& options = {},
+                 const std::optional<PictureSource>& source = std::nullopt,
+                 Executor* executor = nullptr);
+  RobotNavigator(const RobotNavigator&) = delete;
+  RobotNavigator& operator=(const RobotNavigator&) = delete;
+
+  /// Another goal; where the robot is stays known. Throws FileError as the constructor.
+  void set_goal(const std::string& goal);
+
+  /// To be called once in each period of the base. The robot decides anew when the step decided
+  /// before is done, by odometry or else as commanded, and when `report` says that something
+  /// stopped it; only then the picture is looked at. Throws as `ViewEncoder::signature` and
+  /// `Navigator::look`.
+  [[nodiscard]] NavigationStep step(const Observation& observation, RobotReport report = {});
+
+  [[nodiscard]] GraphOrigin origin() const noexcept { return origin_; }
+  [[nodiscard]] ViewId goal() const noexcept { return goal_; }
+  [[nodiscard]] const NavigationGraph& graph() const noexcept {
+    return navigator_->planner().graph();
+  }
+  [[nodiscard]] const MemoryFile& memory() const noexcept { return views_.file(); }
+  /// What the memory knows of a view besides its signature; read from the file.
+  [[nodiscard]] ReferenceInfo info(ViewId view) const;
+  /// For those who look and drive themselves.
+  [[nodiscard]] Navigator& navigator() noexcept { return *navigator_; }
+  [[nodiscard]] const ViewEncoder& encoder() const noexcept { return encoder_; }
+  /// How lines are taken along its route; null without one.
+  [[nodiscard]] const RouteSource* route() const noexcept {
+    return route_source_ ? &*route_source_ : nullptr;
+  }
+
+ private:
+  [[nodiscard]] NavigationDecision look(const Observation& observation, RobotReport report);
+
+  RobotNavigatorOptions options_;
+  MemoryFileViews views_;
+  ViewEncoder encoder_;
+  GraphOrigin origin_ = GraphOrigin::map;
+  ViewId goal_;
+  std::vector<KnownRoute> routes_;
+  std::optional<RouteSource> route_source_;
+  std::optional<LineEncoder> line_encoder_;
+  std::optional<Navigator> navigator_;
+  // The step that is under way.
+  NavigationStep last_;
+  Point2 target_;                  // in the current robot frame
+  double time_left_s_ = 0.0;       // after which it counts as done
+  Pose2 moved_;                    // since the decision
+  std::optional<Pose2> odometry_;  // of the last observation
+};
+
+}  // namespace panonav

@@ -1,0 +1,127 @@
+#include "panonav/pipeline/route_recorder.hpp"
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr std::size_t lines_at_once = 64;
+/// Between the end of a route and the line that goes on with it.
+constexpr double most_gap_m = 1.0;
+
+std::string route_text(const MemoryFile& file, const std::string& name) {
+  return "the route '" + name + "' in " + file.path().string();
+}
+
+/// Lines can only go on with the same camera and in the same frame.
+RouteSource source_for(const MemoryFile& file, const RouteRecorderOptions& options) {
+  require(options.every_m >= 0.0, "every_m", options.every_m, ">= 0");
+  RouteSource wanted{.line = options.line.value_or(HorizonLineOptions{}),
+                     .horizon_rows = options.horizon_rows,
+                     .from_odometry = options.odometry};
+  const auto known = file.route(options.name);
+  if (!known) return wanted;
+  const RouteSource before = route_source(file, options.name, known->columns());
+  if (!options.line) wanted.line = before.line;
+  if (!options.horizon_rows) wanted.horizon_rows = before.horizon_rows;
+  if (wanted.line != before.line || wanted.horizon_rows != before.horizon_rows) {
+    throw ContractError(route_text(file, options.name) +
+                        " was recorded with other --columns, --half-band-rad or "
+                        "--horizon-rows; leave them out or take another --name");
+  }
+  if (wanted.from_odometry != before.from_odometry) {
+    throw ContractError(route_text(file, options.name) + " is in the frame of " +
+                        (before.from_odometry ? "its odometry" : "its data set") +
+                        ", these poses are not; take another --name");
+  }
+  return wanted;
+}
+
+std::optional<Pose2> end_of(const MemoryFile& file, const std::string& name) {
+  const auto known = file.route(name);
+  if (!known || known->size() == 0) return std::nullopt;
+  return known->poses().back();
+}
+
+}  // namespace
+
+double RecordedRoute::bytes_per_km() const {
+  const double length_m = route.length_m();
+  return length_m > 0.0 ? 1000.0 * static_cast<double>(bytes) / length_m : 0.0;
+}
+
+RouteRecorder::RouteRecorder(const std::filesystem::path& memory,
+                             const RouteRecorderOptions& options)
+    : RouteRecorder(MemoryFile::open(memory, Access::read_write), std::nullopt, options) {}
+
+RouteRecorder::RouteRecorder(MemoryFile memory, const std::optional<PictureSource>& source,
+                             const RouteRecorderOptions& options)
+    : options_(options),
+      file_(std::move(memory)),
+      source_(source_for(file_, options)),
+      encoder_(source.value_or(file_.header().source), source_),
+      end_(end_of(file_, options.name)) {
+  remember_route_source(file_, options_.name, source_);
+}
+
+bool RouteRecorder::is_due(const std::optional<Pose2>& last, const Pose2& next, double every_m) {
+  // A robot that goes every_m from picture to picture takes them a little nearer or farther.
+  return !last || distance(last->position(), next.position()) >= 0.999 * every_m;
+}
+
+Pose2 RouteRecorder::pose_of(const Observation& observation) const {
+  if (source_.from_odometry && observation.odometry) return *observation.odometry;
+  const auto& known = observation.pose;
+  if (!source_.from_odometry && known && known->heading_rad) {
+    return {known->x_m, known->y_m, *known->heading_rad};
+  }
+  throw ContractError(
+      source_.from_odometry ? "odometry of the observation" : "pose of the observation", "unknown",
+      "known, with a heading, for each line of a route");
+}
+
+RouteRecorder::EncodedLine RouteRecorder::encode(const Observation& observation) const {
+  return {pose_of(observation), encoder_.line(observation)};
+}
+
+void RouteRecorder::add(EncodedLine line) {
+  if (!last_ && end_) {
+    const double gap_m = distance(end_->position(), line.pose.position());
+    if (gap_m > most_gap_m) {
+      throw FileError(file_.path().string(), "the first line lies " + short_number(gap_m) +
+                                                 " m from the end of the route '" + options_.name +
+                                                 "'; allowed: at most " + short_number(most_gap_m) +
+                                                 " m, or another --name");
+    }
+  }
+  last_ = line.pose;
+  waiting_.push_back(std::move(line));
+  if (waiting_.size() >= lines_at_once) flush();
+}
+
+bool RouteRecorder::add(const Observation& observation) {
+  if (!is_due(last_, pose_of(observation), options_.every_m)) return false;
+  add(encode(observation));
+  return true;
+}
+
+void RouteRecorder::flush() {
+  if (waiting_.empty()) return;
+  RoutePanorama more(source_.line.columns);
+  for (const EncodedLine& line : waiting_) {
+    static_cast<void>(more.append(line.pose, std::span<const float>(line.line)));
+  }
+  waiting_.clear();
+  appended_ += file_.append_route(options_.name, more);
+}
+
+RecordedRoute RouteRecorder::finish() {
+  flush();
+  auto route = file_.route(options_.name);
+  if (!route) throw ContractError("lines of the route", 0.0, "1 or more");
+  return {std::move(*route), appended_, file_.route_bytes(options_.name)};
+}
+
+}  // namespace panonav

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "panonav/pipeline/line_encoder.hpp"
+#include "panonav/pipeline/observation.hpp"
+#include "panonav/storage/memory_file.hpp"
+
+namespace panonav {
+
+struct RouteRecorderOptions {
+  std::string name = "route";  ///< of the route; it grows if it is there
+  double every_m = 0.1;        ///< way between lines, >= 0
+  /// Empty: as the route has them that is there, else the defaults.
+  std::optional<HorizonLineOptions> line;
+  /// First and last row that show the horizon, counted from 0 at the top, of panoramas whose
+  /// elevations are not known. Empty: as the route has them, else all.
+  std::optional<std::pair<int, int>> horizon_rows;
+  bool odometry = false;  ///< remember the odometry's poses, even where observations have poses
+};
+
+/// What a memory file has of a route, and what a recorder added to it.
+struct RecordedRoute {
+  RoutePanorama route;
+  std::size_t appended = 0;  ///< lines
+  std::uint64_t bytes = 0;   ///< of the route's lines and poses as they are kept
+  [[nodiscard]] double bytes_per_km() const;
+};
+
+/// Remembers a route as a line of pixels a step [Y03] in a memory file, where it is on the disk 64
+/// lines at a time. Poses are those of the observations, which must know their headings, or of
+/// their odometry, as the options say. One thread at a time, except `encode`.
+class RouteRecorder {
+ public:
+  /// A line on its way into the route.
+  struct EncodedLine {
+    Pose2 pose;
+    std::vector<float> line;
+  };
+
+  /// The memory's own camera takes the pictures. Throws as the other.
+  explicit RouteRecorder(const std::filesystem::path& memory,
+                         const RouteRecorderOptions& options = {});
+  /// A file open for writing. Pictures lie as `source` says; empty: as the memory's own. Throws
+  /// ContractError when the route is there and was recorded otherwise, FileError.
+  RouteRecorder(MemoryFile memory, const std::optional<PictureSource>& source,
+                const RouteRecorderOptions& options = {});
+
+  /// Whether a line is due at the place: so far from the last one.
+  [[nodiscard]] static bool is_due(const std::optional<Pose2>& last, const Pose2& next,
+                                   double every_m);
+  /// The part of `add` that several threads may do beside each other for observations to come.
+  /// Throws as `LineEncoder::line`, ContractError on an observation with neither pose nor odometry.
+  [[nodiscard]] EncodedLine encode(const Observation& observation) const;
+  /// Whatever its distance from the line before. Throws FileError; at the first line also when the
+  /// route is there and ends farther than a metre from it.
+  void add(EncodedLine line);
+  /// The next observation; whether a line was due. Throws as `encode` and the other.
+  bool add(const Observation& observation);
+  /// What was added is on the disk. Throws FileError; ContractError when nothing ever was added.
+  RecordedRoute finish();
+
+  [[nodiscard]] const MemoryFile& memory() const noexcept { return file_; }
+  [[nodiscard]] const RouteSource& source() const noexcept { return source_; }
+
+ private:
+  [[nodiscard]] Pose2 pose_of(const Observation& observation) const;
+  void flush();
+
+  RouteRecorderOptions options_;
+  MemoryFile file_;
+  RouteSource source_;
+  LineEncoder encoder_;
+  std::optional<Pose2> end_;   // of the route that was there
+  std::optional<Pose2> last_;  // of the lines added
+  std::vector<EncodedLine> waiting_;
+  std::size_t appended_ = 0;
+};
+
+}  // namespace panonav
