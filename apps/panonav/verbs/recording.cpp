@@ -6,7 +6,6 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/positions.hpp"
 #include "panonav/io/camera_file.hpp"
-#include "panonav/io/image_file.hpp"
 #include "panonav/motion/headed_path.hpp"
 
 namespace panonav::command {
