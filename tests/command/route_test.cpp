@@ -227,7 +227,7 @@ TEST_F(RouteVerbs, TheLibraryRecordsAndFollowsTheSameOnePictureAtATime) {
   EXPECT_EQ(recorder.finish().route, *memory.route("route"));
   EXPECT_THROW((void)recorder.add(Image(360, 3)), ContractError) << "without a pose";
 
-  const auto said = answers({"route", "follow", own.string(), folder_ / "repeat", "--json"});
+  const auto said = answers_of({"route", "follow", own.string(), folder_ / "repeat", "--json"});
   const auto repeat = read_dataset(folder_.path() / "repeat");
   ASSERT_EQ(said.size(), repeat.entries.size());
   RouteFollower follower(own);

@@ -115,9 +115,9 @@ std::vector<std::string> with(std::vector<std::string> arguments,
 }
 
 nlohmann::json answer_of(const std::vector<std::string>& arguments, int exit_code) {
-  auto all = answers_of(arguments, exit_code);
-  EXPECT_EQ(all.size(), 1U);
-  return all.empty() ? nlohmann::json() : all.front();
+  const auto result = run_panonav(arguments);
+  EXPECT_EQ(result.exit_code, exit_code) << result.err;
+  return nlohmann::json::parse(result.out);
 }
 
 std::vector<nlohmann::json> answers_of(const std::vector<std::string>& arguments, int exit_code) {

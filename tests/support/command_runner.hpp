@@ -35,7 +35,7 @@ struct CommandOptions {
 [[nodiscard]] std::string refusal(const std::vector<std::string>& arguments,
                                   const CommandOptions& options = {});
 
-/// Runs, expects the exit code and gives the one JSON object that the command printed.
+/// Runs, expects the exit code and gives what the command printed, one JSON value.
 [[nodiscard]] nlohmann::json answer_of(const std::vector<std::string>& arguments,
                                        int exit_code = 0);
 /// The same with an object on each line.

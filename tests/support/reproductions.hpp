@@ -16,7 +16,7 @@
 namespace panonav::testing {
 
 /// The rows of an experiment, none of them twice. `reproduce(folder, executor)` is run with one and
-/// with two threads: rows that are no times and all pictures must be the same, to the byte.
+/// with two threads: rows and pictures must be the same, to the byte, but for those of times.
 class ReproductionTest : public InTemporaryFolder {
  protected:
   template <class Reproduce>
@@ -52,7 +52,8 @@ class ReproductionTest : public InTemporaryFolder {
     for (const auto& picture : one.pictures) {
       const std::string bytes = bytes_of(folder / "1" / picture.file);
       EXPECT_GT(bytes.size(), 2000U) << picture.file;
-      EXPECT_EQ(bytes, bytes_of(folder / "2" / picture.file)) << picture.file;
+      const bool of_times = picture.file.string().find("time") != std::string::npos;
+      EXPECT_TRUE(of_times || bytes == bytes_of(folder / "2" / picture.file)) << picture.file;
     }
   }
 

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "panonav/localisation/localiser.hpp"
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav/panorama/panorama.hpp"
 #include "panonav/signature/compass.hpp"
@@ -20,6 +21,9 @@ int main() {
       memory.append(here, {.name = "here", .pose = std::nullopt, .stamp_s = std::nullopt});
   const auto turned = panonav::compute_signature(panonav::turn_columns(view, 16), 8);
   const auto result = memory.search(panonav::pack(turned, memory.full_scale()));
+  const auto place =
+      panonav::Localiser(memory).localise(panonav::pack(turned, memory.full_scale()));
+  if (place.matches.size() != 1 || place.matches.front().view != id) return 1;
   const auto heading = panonav::compass(turned, here);
   if (result.matches.size() != 1 || result.matches.front().view != id || !heading) return 1;
   std::printf("found again, turned by %.1f degrees\n", panonav::degrees(heading->heading_rad));
