@@ -149,8 +149,10 @@ Run declare(Arguments& arguments) {
 Verb memorise_verb() {
   return {
       "memorise", "Remember what the places of a recording look like",
-      "Views reach the disk in batches of 16, a new memory's first 32 together, each batch whole or\n"
-      "not at all; after an interruption the same command goes on where it stopped. Views that the\n"
+      "Views reach the disk in batches of 16, a new memory's first 32 together, each batch whole "
+      "or\n"
+      "not at all; after an interruption the same command goes on where it stopped. Views that "
+      "the\n"
       "memory knows by name must be the same views: another pose, stamp or picture under a known\n"
       "name is refused.",
       "  panonav memorise office_run office.panonav\n"
