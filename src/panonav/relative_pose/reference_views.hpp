@@ -10,8 +10,8 @@ namespace panonav {
 
 /// The Fourier coefficients of reference views, made once when the views are loaded and not at each
 /// comparison. It holds whole views: compared with a view of fewer components, only the common ones
-/// count. Memory: 8 bytes a coefficient, 4 times what the memory itself needs; it is bounded by what
-/// the caller loads.
+/// count. Memory: 8 bytes a coefficient, 4 times what the memory itself needs; it is bounded by
+/// what the caller loads.
 class ReferenceViews {
  public:
   /// Adds all views of a memory. Throws ContractError unless its ids are above those held.
