@@ -56,12 +56,13 @@ void match_by_sad(const uint8_t* query, const uint8_t* reference, uint16_t* cost
   using Vector = ByteVector<set>;
   using Register = typename Vector::Register;
   using Ints = typename Vectors<lanes_of<set>>::Ints;
+  using Words = typename Vectors<lanes_of<set>>::Words;  // sums wrap round
   using Floats = typename Vectors<lanes_of<set>>::Floats;
   constexpr int width = sizeof(Register) / sizeof(uint64_t);
   HalvedColumns halved;
   halve_columns(reference, halved);
   for (int first = 0; first < matched_query_columns; first += width) {
-    Ints sums[2] = {};  // turns of f = 0 and 1, side by side; of 2 and 3
+    Words sums[2] = {};  // turns of f = 0 and 1, side by side; of 2 and 3
     for (int c = 0; c < matched_query_columns; ++c) {
       const uint8_t* const column = query + c * matched_bands;
       const Register upper = Vector::repeat(load_group(column));
@@ -75,7 +76,7 @@ void match_by_sad(const uint8_t* query, const uint8_t* reference, uint16_t* cost
         const Floats root =
             Vector::root(__builtin_convertvector(reinterpret_cast<Ints>(both), Floats));
         // 1.5 * 2^23: adding it rounds to a whole number, which the last bits then hold.
-        sums[pair] += reinterpret_cast<Ints>(root * 16.0F + 12582912.0F);
+        sums[pair] += reinterpret_cast<Words>(root * 16.0F + 12582912.0F);
       }
     }
     for (int e = 0; e < width; ++e) {

@@ -19,6 +19,7 @@ struct Vectors {
   typedef float Floats __attribute__((vector_size(4 * lanes)));
   typedef float UnalignedFloats __attribute__((vector_size(4 * lanes), aligned(4)));
   typedef int32_t Ints __attribute__((vector_size(4 * lanes)));
+  typedef uint32_t Words __attribute__((vector_size(4 * lanes)));
   typedef int64_t Longs __attribute__((vector_size(4 * lanes)));
 };
 
