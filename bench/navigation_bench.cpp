@@ -10,18 +10,19 @@
 #include <utility>
 #include <vector>
 
-#include "navigation/fifty_rooms.hpp"
 #include "panonav/memory/view_source.hpp"
 #include "panonav/navigation/area_planner.hpp"
+#include "panonav/navigation/area_views.hpp"
 #include "panonav/navigation/navigator.hpp"
 #include "panonav/storage/memory_file_views.hpp"
+#include "support/fifty_rooms.hpp"
 
 namespace {
 
 using namespace panonav;
 
 const NavigationGraph& graph() {
-  static const NavigationGraph rooms = test::graph_of_rooms();
+  static const NavigationGraph rooms = testing::graph_of_rooms();
   return rooms;
 }
 
@@ -31,7 +32,7 @@ const AreaPlanner& planner() {
 }
 
 const VisualMemory& memory() {
-  static const VisualMemory views = test::memory_of(graph().size());
+  static const VisualMemory views = testing::memory_of(graph().size());
   return views;
 }
 

@@ -7,8 +7,10 @@
 #include <cmath>
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "mirror_images.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
@@ -17,31 +19,9 @@ namespace {
 
 using namespace panonav;
 
-/// The hyperboloidal mirror of the simulation in a 640 x 480 image.
-Camera mirror_camera() {
-  Camera camera;
-  camera.model = HyperboloidalModel{9.365, 7.804, 320.0};
-  camera.image_size = {640, 480};
-  camera.centre = {320.0, 240.0};
-  camera.rim_radius_px = 228.0;
-  camera.inner_radius_px = 40.0;
-  return camera;
-}
-
 std::vector<Observation> pictures() {
-  Random random(1);
   std::vector<Observation> result;
-  for (int i = 0; i < 8; ++i) {
-    Image image(640, 480);
-    for (int v = 0; v < 480; ++v) {
-      for (int u = 0; u < 640; ++u) {
-        const double value =
-            120.0 + 60.0 * std::sin(0.02 * u + i) * std::cos(0.03 * v) + random.normal(0.0, 12.0);
-        image.at(u, v) = static_cast<std::uint8_t>(std::fmax(0.0, std::fmin(255.0, value)));
-      }
-    }
-    result.emplace_back(std::move(image));
-  }
+  for (Image& image : images()) result.emplace_back(std::move(image));
   return result;
 }
 
