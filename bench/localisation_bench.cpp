@@ -33,9 +33,8 @@ const TrackingPlace& place_with(std::size_t references) {
 }
 
 MonteCarloLocaliser localiser_of(const TrackingPlace& place, int particles) {
-  return MonteCarloLocaliser(
-      place.ranking(), place.model(),
-      {.least_particles = particles, .most_particles = particles, .seed = 1});
+  return MonteCarloLocaliser(place.ranking(), place.model(),
+                             {.min_particles = particles, .max_particles = particles, .seed = 1});
 }
 
 /// Goes through the walks again and again. Only `update(walk, step)` is timed: not `start(walk)`,
@@ -76,7 +75,7 @@ void time_tracking(benchmark::State& state, const TrackingPlace& place,
   double compared = 0.0;
   double localised = 0.0;
   double resampled = 0.0;
-  double redrawn = 0.0;
+  double injected = 0.0;
   double error = 0.0;
   along_walks(
       state, walks,
@@ -93,14 +92,14 @@ void time_tracking(benchmark::State& state, const TrackingPlace& place,
         compared += static_cast<double>(estimate.views_compared);
         localised += estimate.state == LocalisationState::localised ? 1.0 : 0.0;
         resampled += estimate.resampled ? 1.0 : 0.0;
-        redrawn += static_cast<double>(estimate.redrawn);
+        injected += static_cast<double>(estimate.injected);
         if (!estimate.modes.empty()) error += error_m(estimate.modes.front().mean, walk, step);
       });
   const auto runs = static_cast<double>(state.iterations());
   state.counters["compared"] = compared / runs;
   state.counters["localised"] = localised / runs;
   state.counters["resampled"] = resampled / runs;
-  state.counters["redrawn"] = redrawn / runs;
+  state.counters["injected"] = injected / runs;
   state.counters["error_m"] = error / runs;
 }
 

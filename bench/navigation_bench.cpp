@@ -1,4 +1,4 @@
-// What planning and a look cost over 10,000 references in 50 rooms, and what is held in memory.
+// What planning and a step cost over 10,000 references in 50 rooms, and what is held in memory.
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 
@@ -121,7 +121,7 @@ void look(benchmark::State& state, bool border, bool from_file, bool all = false
   Navigator navigator(*views, planner(), options);
   double bytes_read = 0.0;
   std::size_t next = way.size();
-  std::size_t most_loaded = 0;
+  std::size_t max_loaded = 0;
   for (auto _ : state) {
     for (bool measured = false; !measured;) {
       if (next >= way.size()) {
@@ -140,14 +140,14 @@ void look(benchmark::State& state, bool border, bool from_file, bool all = false
         state.SetIterationTime(passed.count());
         bytes_read += static_cast<double>(decision.bytes_read);
       }
-      most_loaded = std::max(most_loaded, navigator.loaded_views());
+      max_loaded = std::max(max_loaded, navigator.loaded_views());
     }
   }
   state.counters["kB_read"] =
       benchmark::Counter(bytes_read / 1000.0, benchmark::Counter::kAvgIterations);
-  state.counters["most_loaded_views"] = static_cast<double>(most_loaded);
-  state.counters["most_loaded_kB"] =
-      static_cast<double>(most_loaded * 2 * memory().shape().size()) / 1000.0;
+  state.counters["max_loaded_views"] = static_cast<double>(max_loaded);
+  state.counters["max_loaded_kB"] =
+      static_cast<double>(max_loaded * 2 * memory().shape().size()) / 1000.0;
 }
 BENCHMARK_CAPTURE(look, within_an_area, false, false)
     ->UseManualTime()

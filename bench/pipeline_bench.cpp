@@ -12,7 +12,9 @@
 
 #include "mirror_images.hpp"
 #include "panonav/core/random.hpp"
+#include "panonav/io/image_file.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
 
 namespace {
@@ -61,12 +63,105 @@ void view_encoder(benchmark::State& state) {
 }
 BENCHMARK(view_encoder);
 
+/// A folder of its own under the system's folder for temporary files; removed at the end.
+class Folder {
+ public:
+  explicit Folder(const std::string& name)
+      : path_(std::filesystem::temp_directory_path() /
+              ("panonav_" + name + "_" + std::to_string(::getpid()))) {
+    std::filesystem::create_directories(path_);
+  }
+  ~Folder() { std::filesystem::remove_all(path_); }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// Reading one PNG of 640 x 480 from the system's cache: the share of decoding end to end.
+void decode(benchmark::State& state) {
+  const Folder folder("decode");
+  std::vector<std::filesystem::path> paths;
+  for (const Image& image : images()) {
+    paths.push_back(folder.path() / (std::to_string(paths.size()) + ".png"));
+    write_png(paths.back(), image.view());
+  }
+  std::size_t next = 0;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(read_image(paths[next]));
+    next = (next + 1) % paths.size();
+  }
+  count_pictures(state);
+}
+BENCHMARK(decode);
+
+/// Decoded pictures into a new memory file, as the command adds them: 16 in a transaction, and the
+/// models learnt at the end.
+void memorise(benchmark::State& state, bool thumbnails) {
+  constexpr std::size_t views = 256;
+  constexpr std::size_t batch = 16;
+  const Folder folder("memorise");
+  const auto seen = pictures();
+  Executor executor(1);
+  for (auto _ : state) {
+    const auto path = folder.path() / "memory.panonav";
+    std::filesystem::remove(path);
+    MemoriserOptions options{.source = PictureSource{}, .thumbnails = thumbnails};
+    options.source->kind = PictureKind::mirror;
+    options.source->camera = mirror_camera();
+    Memoriser memoriser(path, options);
+    for (std::size_t first = 0; first < views; first += batch) {
+      std::vector<Observation> observations;
+      for (std::size_t i = first; i < first + batch; ++i) {
+        observations.push_back(seen[i % seen.size()]);
+        observations.back().name = std::to_string(i);
+      }
+      memoriser.add(std::move(observations), executor);
+    }
+    memoriser.finish(executor);
+  }
+  state.counters["pictures/s"] = benchmark::Counter(static_cast<double>(state.iterations() * views),
+                                                    benchmark::Counter::kIsRate);
+}
+BENCHMARK_CAPTURE(memorise, signatures, false)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(memorise, signatures_and_thumbnails, true)->Unit(benchmark::kMillisecond);
+
+/// A decoded picture to a place in a memory of 1,000 views.
+void localise(benchmark::State& state) {
+  const Folder folder("localise");
+  const auto path = folder.path() / "memory.panonav";
+  const auto seen = pictures();
+  {
+    MemoriserOptions options{.source = PictureSource{}, .thumbnails = false};
+    options.source->kind = PictureKind::mirror;
+    options.source->camera = mirror_camera();
+    Memoriser memoriser(path, options);
+    Executor executor(1);
+    std::vector<Observation> observations;
+    for (int i = 0; i < 1000; ++i) {
+      observations.push_back(seen[static_cast<std::size_t>(i) % seen.size()]);
+      observations.back().name = std::to_string(i);
+      observations.back().pose = ReferencePose{0.25 * (i % 40), 0.25 * (i / 40), 0.0};
+    }
+    memoriser.add(std::move(observations), executor);
+    memoriser.finish(executor);
+  }
+  const PlaceRecogniser recogniser(path);
+  std::size_t next = 0;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(recogniser.localise(seen[next]).known);
+    next = (next + 1) % seen.size();
+  }
+  count_pictures(state);
+}
+BENCHMARK(localise);
+
 /// A file of views on a meander, 0.25 m apart, whose signatures walk at random; removed at the end.
 class LargeFile {
  public:
-  explicit LargeFile(int views)
-      : path_(std::filesystem::temp_directory_path() /
-              ("panonav_pipeline_bench_" + std::to_string(::getpid()) + ".panonav")) {
+  explicit LargeFile(int views) : folder_("large"), path_(folder_.path() / "memory.panonav") {
     MemoryHeader header;
     header.shape = {20, 15};
     header.panorama_columns = 128;
@@ -99,12 +194,10 @@ class LargeFile {
       }
     }
   }
-  ~LargeFile() { std::filesystem::remove(path_); }
-  LargeFile(const LargeFile&) = delete;
-  LargeFile& operator=(const LargeFile&) = delete;
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
 
  private:
+  Folder folder_;
   std::filesystem::path path_;
 };
 

@@ -1,5 +1,5 @@
-// One horizon line to a pose: the direct fit and its rival, the dual contours as published, on a
-// route of 5 m with a line every 2 cm or 10 cm. One core.
+// One horizon scanline to a pose: the direct fit and its rival, the dual contours as published, on
+// a route of 5 m with a line every 2 cm or 10 cm. One core.
 
 #include <benchmark/benchmark.h>
 

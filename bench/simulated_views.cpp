@@ -107,7 +107,7 @@ ViewSet render(Places places, std::size_t views, std::size_t queries) {
   static constexpr std::string_view kinds[] = {"office", "lab", "hall"};
   // Rooms of 10 .. 49 square metres; no more than this many views of one, so that there are enough
   // rooms.
-  const std::size_t most_per_room = places == Places::rooms ? 2000 : 4000;
+  const std::size_t max_per_room = places == Places::rooms ? 2000 : 4000;
   std::vector<float> view_magnitudes;
   std::vector<float> query_magnitudes;
   Executor executor(0);
@@ -117,7 +117,7 @@ ViewSet render(Places places, std::size_t views, std::size_t queries) {
   for (std::uint64_t seed = 1; made < views; ++seed) {
     Random random(seed, 77);
     const Room room(kinds[seed % std::size(kinds)], seed);
-    const std::size_t most = std::min(most_per_room, views - made);
+    const std::size_t most = std::min(max_per_room, views - made);
     const std::vector<Point2> at =
         places == Places::rooms ? grid_of(room, most) : path_through(room, random, most);
     for (const Point2 place : at) {

@@ -107,7 +107,7 @@ struct HomingReproductionOptions {
 /// Visual homing as in [S06] sections 2 to 5: figures 3 and 6 to 16, over all pairs of places of
 /// the toy house arena, recorded twice; Fourier homing as published and as ours, and homing by
 /// expected images. Then what S06 leaves to others: closed-loop runs home in built-in scenes,
-/// leaning too, and in Gazebo worlds, and chains of snapshots. Same options: same rows, but for
+/// tilted too, and in Gazebo worlds, and chains of snapshots. Same options: same rows, but for
 /// times (unit us) and what is made of them (unit x), and same pictures on any number of threads.
 /// Throws ContractError, FileError.
 [[nodiscard]] Reproduction reproduce_s06(const HomingReproductionOptions& options,
@@ -119,7 +119,7 @@ struct MappingReproductionOptions {
   int scenes = 20;            ///< variants of `loop` and of `lab`, >= 2; fewer of the others
   int runs = 20;              ///< paths in each Gazebo world, >= 1
   int views = 200;            ///< of the first set, >= 10; the second has three quarters of them
-  int most_views = 10'000;    ///< of the largest map, >= 100
+  int max_views = 10'000;     ///< of the largest map, >= 100
   int columns = 512;          ///< of the views
   std::uint64_t seed = 1;     ///< of the first scene; the others follow it
   /// Folder of the recordings and Gazebo worlds (docs/formats.md); empty: these are left out.
@@ -175,8 +175,8 @@ struct NavigationReproductionOptions {
 
 /// Going somewhere over the memory as in [M04] section 3.5, where its authors left it to later
 /// work: drives through corridors and Gazebo worlds mapped by visual odometry, other light and
-/// moved objects, a robot that is carried away, tours of several goals, people who walk about, a
-/// recorded route, blocked passages. Same options: same rows and pictures on any number of threads.
+/// moved objects, a robot that is kidnapped, tours of several goals, people who walk about, a
+/// recorded route, blocked edges. Same options: same rows and pictures on any number of threads.
 /// Throws ContractError, FileError.
 [[nodiscard]] Reproduction reproduce_navigation(const NavigationReproductionOptions& options,
                                                 Executor& executor,

@@ -30,7 +30,7 @@ void reproduce_mapping_in_world(const MappingReproductionOptions& options, const
 /// The recordings of `options.data`: a route outdoors, a walk through a building.
 void reproduce_mapped_recordings(const MappingReproductionOptions& options, Executor& executor,
                                  Reproduction& result);
-/// Time and memory at 100 views and at more, ten times each, up to `options.most_views`.
+/// Time and memory at 100 views and at more, ten times each, up to `options.max_views`.
 void measure_large_maps(const MappingReproductionOptions& options, Executor& executor,
                         Reproduction& result);
 

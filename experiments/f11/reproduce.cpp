@@ -11,7 +11,7 @@ namespace panonav {
 MappingReproductionOptions quick_run(MappingReproductionOptions options) {
   options.scenes = 2;
   options.runs = 1;
-  options.most_views = 1000;
+  options.max_views = 1000;
   options.columns = 256;
   return options;
 }
@@ -21,7 +21,7 @@ Reproduction reproduce_f11(const MappingReproductionOptions& options, Executor& 
   require(options.scenes >= 2, "scenes", options.scenes, ">= 2");
   require(options.runs >= 1, "runs", options.runs, ">= 1");
   require(options.views >= 10, "views", options.views, ">= 10");
-  require(options.most_views >= 100, "most_views", options.most_views, ">= 100");
+  require(options.max_views >= 100, "max_views", options.max_views, ">= 100");
   require(options.columns >= 132, "columns", options.columns, ">= 132, twice the components");
   make_folder(options.out);
 
@@ -38,7 +38,7 @@ Reproduction reproduce_f11(const MappingReproductionOptions& options, Executor& 
   }
   stages.push_back(
       {"recordings", 5.0, [&] { reproduce_mapped_recordings(options, executor, result); }});
-  stages.push_back({"large maps", 0.02 * options.most_views,
+  stages.push_back({"large maps", 0.02 * options.max_views,
                     [&] { measure_large_maps(options, executor, result); }});
 
   run_stages(stages, progress);

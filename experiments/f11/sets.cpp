@@ -34,7 +34,7 @@ constexpr double capture_difference = 0.015;
 constexpr std::size_t second_pictures = 3;
 constexpr std::array<int, 7> k1_values{2, 4, 8, 16, 26, 40, 64};
 constexpr std::array<int, 6> k2_values{4, 8, 14, 20, 40, 64};
-constexpr int most_components = 64;
+constexpr int max_components = 64;
 constexpr int default_components = 15;
 constexpr std::array<int, 5> other_components{6, 10, 20, 32, 64};
 
@@ -102,7 +102,7 @@ MapPlot plot_of(const std::string& title, const PlaceRecording& place,
   MapPlot plot{.title = title, .layers = furniture_layers(place.scene)};
   std::vector<Point2> wheels;
   for (const std::size_t i : open.number) wheels.push_back(recording.wheels[i].position());
-  plot.layers.push_back({.label = "truth", .colour = "#777777", .lines = {open.truth}});
+  plot.layers.push_back({.label = "ground truth", .colour = "#777777", .lines = {open.truth}});
   plot.layers.push_back(
       {.label = "wheels", .colour = "#d62728", .lines = {laid_over(wheels, open.truth)}});
   plot.layers.push_back({.label = "visual odometry",
@@ -180,7 +180,7 @@ void reproduce_first_set(const MappingReproductionOptions& options, Executor& ex
         empty_place(make_scene("loop", {.seed = seed}), seed, options.columns, executor);
     const MappingRecording recording = record_for_mapping(
         place, drive(place, {}, first_spacing_m, static_cast<std::size_t>(options.views)),
-        most_components + 2, cheap_wheels(), 1000 * seed, executor);
+        max_components + 2, cheap_wheels(), 1000 * seed, executor);
     const auto open = map_recording(recording, {.mapping = {.close_loops = false}});
     const auto closed = map_recording(recording, {});
     errors.add(recording, open, closed, map_recording(recording, {.wheels = true}));
@@ -280,9 +280,9 @@ void reproduce_second_set(const MappingReproductionOptions& options, Executor& e
     way.insert(way.end(), place.scene.tour.begin(), place.scene.tour.end());
     const MappingRecording recording =
         record_for_mapping(place, drive(place, way, second_spacing_m, second_pictures * views),
-                           most_components + 2, cheap_wheels(), 1000 * seed, executor);
+                           max_components + 2, cheap_wheels(), 1000 * seed, executor);
     MappingRunOptions run{.mapping = {.capture_difference = capture_difference},
-                          .most_nodes = views * 3 / 4};
+                          .max_nodes = views * 3 / 4};
     const auto closed = map_recording(recording, run);
     run.wheels = true;
     const auto with_wheels = map_recording(recording, run);

@@ -47,13 +47,13 @@ double rms_m(std::span<const Point2> estimate, std::span<const Point2> truth, bo
 std::vector<Pose2> two_loops(const PlaceRecording& place, double length_m, double spacing_m,
                              Random& random) {
   const FreeSpace& space = *place.free_space;
-  constexpr double shortest_side_m = 2.0;
+  constexpr double min_side_m = 2.0;
   const auto far_from = [&](const std::vector<Point2>& others) {
     Point2 point = space.random_pose(random).position();
     constexpr int trials = 200;
     for (int i = 0; i < trials; ++i) {
       const bool near = std::ranges::any_of(
-          others, [&](const Point2& other) { return distance(other, point) < shortest_side_m; });
+          others, [&](const Point2& other) { return distance(other, point) < min_side_m; });
       if (!near) break;
       point = space.random_pose(random).position();
     }
@@ -63,7 +63,7 @@ std::vector<Pose2> two_loops(const PlaceRecording& place, double length_m, doubl
   while (places.size() < 5) places.push_back(far_from(places));
   std::vector<Point2> way;
   // Each round is 2 m or longer, so that this is enough.
-  const auto rounds = static_cast<int>(std::ceil(length_m / shortest_side_m));
+  const auto rounds = static_cast<int>(std::ceil(length_m / min_side_m));
   for (int round = 0; round < rounds && round < 20; ++round) {
     for (const std::size_t i : {0U, 1U, 2U, 0U, 3U, 4U}) way.push_back(places[i]);
   }
@@ -158,9 +158,9 @@ void map_indoor_walk(const MappingReproductionOptions& options, Executor& execut
   add_row(result, "f11.indoor_walk.closures", "indoor_walk_360: loops closed",
           static_cast<double>(closures_of(bridged).size()), "closures");
   // What single views would close: for the eye.
-  const auto single = map_recording(
-      walk.recording,
-      {.mapping = {.bridge_m = 1.5}, .closure = {.sequence = 1, .most_drift = 100.0}});
+  const auto single =
+      map_recording(walk.recording,
+                    {.mapping = {.bridge_m = 1.5}, .closure = {.sequence = 1, .max_drift = 100.0}});
   const auto refused = closures_of(single);
   add_row(result, "f11.indoor_walk.without_sequence",
           "indoor_walk_360: loops that single views would close, were no sequence asked for",
@@ -185,9 +185,9 @@ void map_indoor_walk(const MappingReproductionOptions& options, Executor& execut
   const Dataset dataset = read_dataset(folder);
   const PanoramaReader reader(dataset.source, shape);
   std::vector<std::pair<Panorama, Panorama>> pairs;
-  constexpr std::size_t most_pairs = 12;
+  constexpr std::size_t max_pairs = 12;
   for (const MapEdge& edge : refused) {
-    if (pairs.size() == most_pairs) break;
+    if (pairs.size() == max_pairs) break;
     const std::uint64_t first = single.map.nodes[0].view.value;
     pairs.emplace_back(reader.read(dataset.entries[edge.a.value - first].path),
                        reader.read(dataset.entries[edge.b.value - first].path));
@@ -342,7 +342,7 @@ void reproduce_mapping_in_world(const MappingReproductionOptions& options, const
       const FreeSpace& space = *place.free_space;
       MapPlot map{.title = name + ", path " + std::to_string(run + 1),
                   .layers = {obstacle_layer(space, space.low(), space.high(), 0.1)}};
-      map.layers.push_back({.label = "truth", .colour = "#000000", .lines = {open.truth}});
+      map.layers.push_back({.label = "ground truth", .colour = "#000000", .lines = {open.truth}});
       std::vector<Point2> wheel_line;
       const Alignment wheel_alignment = align(wheels, open.truth);
       for (const Point2& p : wheels) wheel_line.push_back(wheel_alignment.apply(p));
@@ -415,23 +415,23 @@ void measure_large_maps(const MappingReproductionOptions& options, Executor& exe
       empty_place(make_scene("loop", {.seed = options.seed}), options.seed, columns, executor);
   Random random(options.seed, 400);
   std::vector<Point2> way;
-  const auto rounds = options.most_views / 180 + 2;
+  const auto rounds = options.max_views / 180 + 2;
   for (int round = 0; round < rounds; ++round) {
     const double aside_m = random.uniform(-0.15, 0.15);
     for (const Point2& p : place.scene.tour) way.push_back({p.x_m + aside_m, p.y_m + aside_m});
   }
-  const auto recording = record_for_mapping(
-      place, drive(place, way, 0.1, static_cast<std::size_t>(options.most_views)), components + 2,
-      cheap_wheels(), 1000 * options.seed, executor);
+  const auto recording =
+      record_for_mapping(place, drive(place, way, 0.1, static_cast<std::size_t>(options.max_views)),
+                         components + 2, cheap_wheels(), 1000 * options.seed, executor);
   for (std::size_t views = 100; views <= recording.views.size(); views *= 10) {
-    const auto mapped = map_recording(recording, {.most_nodes = views});
+    const auto mapped = map_recording(recording, {.max_nodes = views});
     const std::string id = "f11.large." + std::to_string(views);
     const std::string what = "map of " + std::to_string(views) + " views";
     add_row(result, id + ".step",
             what + ": time of a view, mean, all optimisation shared among them",
             1e3 * mapped.mean_step_s, "ms",
             views == 10'000 ? std::optional(at_most(20.0)) : std::nullopt);
-    add_row(result, id + ".longest", what + ": longest time of a view", 1e3 * mapped.longest_step_s,
+    add_row(result, id + ".longest", what + ": longest time of a view", 1e3 * mapped.max_step_s,
             "ms");
     add_row(result, id + ".finish", what + ": the last optimisation of the whole",
             1e3 * mapped.finish_s, "ms");

@@ -18,7 +18,7 @@ namespace panonav {
 namespace {
 
 constexpr std::uint64_t seed_of_corridor = 70'000;
-constexpr int most_images = 64;  // 16 m: more than lies between two distinct things of the ring
+constexpr int max_images = 64;  // 16 m: more than lies between two distinct things of the ring
 constexpr std::size_t images_after = 10;
 constexpr double right_m = 0.5;
 
@@ -98,7 +98,7 @@ std::vector<Pose2> drive_around(const Scene& scene, Random& random) {
   const auto lap = dense.size() / 2;
   const auto start = static_cast<std::size_t>(random.index(lap));
   std::vector<Pose2> poses;
-  for (int i = 0; i < most_images; ++i) {
+  for (int i = 0; i < max_images; ++i) {
     const std::size_t at = start + 25 * static_cast<std::size_t>(i);
     if (at + 1 >= dense.size()) break;
     Pose2 pose = dense[at];

@@ -17,26 +17,26 @@ constexpr std::uint64_t seed_of_hard = 20'000;
 struct Rule {
   std::string id;
   std::string name;
-  Redraw redraw;
+  ParticleInjection injection;
 };
 
 const std::array<Rule, 4>& rules() {
   static const std::array<Rule, 4> all{
-      Rule{"none", "nothing redrawn", Redraw::none},
-      Rule{"uniform", "50 redrawn anywhere", Redraw::uniform},
-      Rule{"topological", "the paper's redraw", Redraw::topological},
-      Rule{"explained", "our rule of redrawing", Redraw::explained}};
+      Rule{"none", "nothing injected", ParticleInjection::none},
+      Rule{"uniform", "50 injected anywhere", ParticleInjection::uniform},
+      Rule{"topological", "the paper's injection", ParticleInjection::topological},
+      Rule{"explained", "our rule of injection", ParticleInjection::explained}};
   return all;
 }
 
 void paper_rows(std::span<const RunSet> sets, Executor& executor, Reproduction& result) {
   for (const Rule& rule : {rules()[0], rules()[2]}) {
     FilterSetting setting = paper_setting();
-    setting.options.redraw = rule.redraw;
+    setting.options.injection = rule.injection;
     const auto runs = track_sets(sets, setting, seed_of_clean, executor);
     const std::string id = "m03.global.clean." + rule.id;
     const std::string name = "global localisation as the paper's, clean, " + rule.name;
-    const bool judged = rule.redraw == Redraw::none;
+    const bool judged = rule.injection == ParticleInjection::none;
     const auto target = [&](Target value) { return judged ? std::optional(value) : std::nullopt; };
     add_median(result, id + ".images",
                name + ": images until the error is below 25 cm from then on", "images",
@@ -57,7 +57,8 @@ void hard_rows(std::span<const RunSet> sets, const Rule& rule, std::span<const T
                Reproduction& result) {
   const std::string id = "m03.global.hard." + rule.id;
   const std::string name = "global localisation, heading unknown, compass on, hard, " + rule.name;
-  const bool judged = rule.redraw == Redraw::topological || rule.redraw == Redraw::explained;
+  const bool judged = rule.injection == ParticleInjection::topological ||
+                      rule.injection == ParticleInjection::explained;
   const auto target = [&](Target value) { return judged ? std::optional(value) : std::nullopt; };
   const auto images = capped_images(runs, m03_spacing_m);
   add_median(result, id + ".images", name + ": images until the error is below 25 cm from then on",
@@ -88,11 +89,12 @@ void ratio_row(const Rule& rule, const std::vector<double>& with,
   for (std::size_t i = 0; i < with.size(); ++i) saved.push_back(with[i] / mean(without));
   add_row(result, "m03.global.hard.ratio." + rule.id,
           "global localisation on hard: mean number of images with " + rule.name +
-              ", over that with nothing redrawn (" + std::to_string(m03_most_images) +
+              ", over that with nothing injected (" + std::to_string(m03_most_images) +
               " for runs that need more)",
           mean_figure(saved), "",
-          rule.redraw == Redraw::uniform ? std::nullopt : std::optional(at_most(0.5)),
-          rule.redraw == Redraw::topological ? std::optional(std::pair{0.5, 0.6}) : std::nullopt);
+          rule.injection == ParticleInjection::uniform ? std::nullopt : std::optional(at_most(0.5)),
+          rule.injection == ParticleInjection::topological ? std::optional(std::pair{0.5, 0.6})
+                                                           : std::nullopt);
 }
 
 }  // namespace
@@ -115,10 +117,10 @@ void reproduce_global_localisation(const TrackingReproductionOptions& options,
                   .x_range = std::pair{0.5, 15.5}};
   std::vector<double> without;
   for (const Rule& rule : rules()) {
-    const auto runs = track_sets(hard, compass_setting(rule.redraw), seed_of_hard, executor);
+    const auto runs = track_sets(hard, compass_setting(rule.injection), seed_of_hard, executor);
     hard_rows(hard, rule, runs, result);
     const auto images = capped_images(runs, m03_spacing_m);
-    if (rule.redraw == Redraw::none) {
+    if (rule.injection == ParticleInjection::none) {
       without = images;
     } else {
       ratio_row(rule, images, without, result);
@@ -130,15 +132,16 @@ void reproduce_global_localisation(const TrackingReproductionOptions& options,
   }
   add_plot(result, options.out, "global_error.png",
            "Error of the heaviest mode over the images, from no knowledge of position and heading, "
-           "for four rules of redrawing.",
+           "for four rules of injection.",
            curves);
   const std::array<std::size_t, 3> steps{0, 2, 8};
   const OfficeRuns& shown = offices.front();
   add_plot(result, options.out, "fig07_global_localisation.png",
-           "Global localisation with as many particles as references and nothing redrawn, heading "
+           "Global localisation with as many particles as references and nothing injected, heading "
            "unknown, hard ([M03] figure 7, 1 to 3).",
            particle_maps(*shown.hard.place, shown.furniture, shown.hard.runs.front(),
-                         compass_setting(Redraw::none), seed_of_hard, steps, "Global localisation"),
+                         compass_setting(ParticleInjection::none), seed_of_hard, steps,
+                         "Global localisation"),
            3);
 }
 

@@ -23,41 +23,42 @@ void reproduce_kidnapping(const TrackingReproductionOptions& options,
   for (const OfficeRuns& office : offices) sets.push_back(office.kidnapped);
   if (number_of_runs(sets) == 0) return;
   LinePlot curves{.title = "Kidnapped robot, hard: error over images (bars: 5 to 95 %)",
-                  .x_label = "images after it was carried away",
+                  .x_label = "images after it was kidnapped",
                   .y_label = "error [m]",
                   .series = {},
                   .x_range = std::pair{0.5, 15.5}};
   std::vector<MapPlot> maps;
   std::vector<double> topological;
-  for (const auto& [redraw, id, name] :
-       {std::tuple{Redraw::uniform, "uniform", "50 redrawn anywhere"},
-        {Redraw::topological, "topological", "the paper's redraw"},
-        {Redraw::explained, "explained", "our rule of redrawing"}}) {
-    const FilterSetting setting = compass_setting(redraw);
+  for (const auto& [injection, id, name] :
+       {std::tuple{ParticleInjection::uniform, "uniform", "50 injected anywhere"},
+        {ParticleInjection::topological, "topological", "the paper's injection"},
+        {ParticleInjection::explained, "explained", "our rule of injection"}}) {
+    const FilterSetting setting = compass_setting(injection);
     const auto runs = track_sets(sets, setting, seed_of_kidnapping, executor);
     const std::string row = std::string("m03.kidnapped.hard.") + id;
     const std::string what = std::string("kidnapped, hard, ") + name;
-    const bool judged = redraw != Redraw::uniform;
+    const bool judged = injection != ParticleInjection::uniform;
     const auto target = [&](Target value) { return judged ? std::optional(value) : std::nullopt; };
     const auto images = capped_images(runs, m03_spacing_m, first_after);
     add_median(result, row + ".images",
                what + ": images until the error is below 25 cm from then on", "images", images,
                target(at_most(3.0)),
-               redraw == Redraw::topological ? std::optional(std::pair{3.0, 4.0}) : std::nullopt);
+               injection == ParticleInjection::topological ? std::optional(std::pair{3.0, 4.0})
+                                                           : std::nullopt);
     tell_single_images(result.rows.back(), sets);
     add_mean(result, row + ".images_mean", what + ": images", "images", images);
     add_rate(result, row + ".within_8", what + ": runs localised within 8 images",
              localised_within(runs, m03_spacing_m, 8, first_after), runs.size(),
              target(at_least(0.99)));
     add_confidently_wrong(result, row + ".wrong", what, runs);
-    if (redraw == Redraw::topological) topological = images;
-    if (redraw == Redraw::explained) {
+    if (injection == ParticleInjection::topological) topological = images;
+    if (injection == ParticleInjection::explained) {
       std::vector<double> difference;
       for (std::size_t i = 0; i < images.size(); ++i) {
         difference.push_back(images[i] - topological[i]);
       }
       add_row(result, row + ".images_less",
-              "kidnapped, hard: images with our rule less those with the paper's redraw (mean, "
+              "kidnapped, hard: images with our rule less those with the paper's injection (mean, "
               "same runs)",
               mean_figure(difference), "images", at_most(0.0));
     }
@@ -74,10 +75,11 @@ void reproduce_kidnapping(const TrackingReproductionOptions& options,
     }
   }
   add_plot(result, options.out, "kidnapped_error.png",
-           "Error of the heaviest mode after the robot was carried at least 1 m away.", curves);
+           "Error of the heaviest mode after the robot was kidnapped by at least 1 m away.",
+           curves);
   if (maps.empty()) return;
   add_plot(result, options.out, "fig08_kidnapped.png",
-           "The kidnapped robot 1, 3 and 6 images after it was carried away: redrawn anywhere "
+           "The kidnapped robot 1, 3 and 6 images after it was kidnapped: injected anywhere "
            "([M03] figure 8), around the best matches ([M03] figure 9), and by our rule.",
            maps, 3);
 }

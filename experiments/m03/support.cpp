@@ -146,7 +146,7 @@ std::vector<MapPlot> particle_maps(const TrackingPlace& place, std::span<const M
                                    std::uint64_t seed, std::span<const std::size_t> steps,
                                    const std::string& title) {
   std::vector<MapPlot> maps;
-  // The estimate's line is cut where the robot was carried away.
+  // The estimate's line is cut where the robot was kidnapped.
   std::vector<std::vector<Point2>> truths;
   std::vector<std::vector<Point2>> estimates;
   std::size_t images = 0;
@@ -171,7 +171,7 @@ std::vector<MapPlot> particle_maps(const TrackingPlace& place, std::span<const M
         const Particles& held = filter.particles();
         for (std::size_t i = 0; i < held.size(); ++i) particles.dots.push_back(held.position(i));
         map.layers.push_back(std::move(particles));
-        map.layers.push_back({.label = "true path",
+        map.layers.push_back({.label = "ground truth",
                               .colour = "#0072b2",
                               .crosses = {run.steps[step].truth.position()},
                               .lines = truths});

@@ -44,7 +44,7 @@ struct OfficeRuns {
   std::vector<MapLayer> furniture;
   RunSet constant_heading;  ///< clean
   RunSet hard;
-  RunSet kidnapped;  ///< hard; 10 images, then carried at least 1 m
+  RunSet kidnapped;  ///< hard; 10 images, then kidnapped by at least 1 m
 };
 inline constexpr std::size_t m03_images_before_kidnapping = 10;
 [[nodiscard]] OfficeRuns record_office(const TrackingReproductionOptions& options, int number,

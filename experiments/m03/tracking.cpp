@@ -17,8 +17,8 @@ constexpr std::size_t first_after = images_before + blind_steps;
 constexpr std::uint64_t seed_of_tracking = 30'000;
 
 // "Large odometric errors": 20 % of the distance and 10 degrees a metre.
-FilterSetting large_error_setting(Redraw redraw) {
-  FilterSetting setting = compass_setting(redraw);
+FilterSetting large_error_setting(ParticleInjection injection) {
+  FilterSetting setting = compass_setting(injection);
   setting.odometry.translation_from_translation = 0.05;
   setting.odometry.translation_scale_error = 0.2;
   setting.odometry.rotation_from_translation = radians(10.0);
@@ -47,11 +47,11 @@ void reproduce_position_tracking(const TrackingReproductionOptions& options,
                   .y_label = "error [m]",
                   .series = {},
                   .x_range = std::pair{0.5, 5.5}};
-  for (const auto& [redraw, id, name] :
-       {std::tuple{Redraw::topological, "topological", "the paper's redraw"},
-        {Redraw::explained, "explained", "our rule of redrawing"},
-        {Redraw::none, "none", "nothing redrawn"}}) {
-    const auto runs = track_sets(sets, large_error_setting(redraw), seed_of_tracking, executor);
+  for (const auto& [injection, id, name] :
+       {std::tuple{ParticleInjection::topological, "topological", "the paper's injection"},
+        {ParticleInjection::explained, "explained", "our rule of injection"},
+        {ParticleInjection::none, "none", "nothing injected"}}) {
+    const auto runs = track_sets(sets, large_error_setting(injection), seed_of_tracking, executor);
     const std::string row = std::string("m03.tracking.hard.") + id;
     const std::string what = std::string(
                                  "tracking through 2 m without images, odometry off by 20 % of the "
@@ -71,7 +71,7 @@ void reproduce_position_tracking(const TrackingReproductionOptions& options,
     }
     add_rate(result, row + ".back_2", what + ": error below 25 cm at the first or second image",
              back, known.size(),
-             redraw == Redraw::none ? std::nullopt : std::optional(at_least(0.99)));
+             injection == ParticleInjection::none ? std::nullopt : std::optional(at_least(0.99)));
     tell_single_images(result.rows.back(), sets);
     add_rate(result, row + ".back_2_for_good",
              what + ": error below 25 cm within 2 images and from then on",
@@ -93,7 +93,8 @@ void reproduce_position_tracking(const TrackingReproductionOptions& options,
       "Position tracking: before, at the end of, and one image after 2 m without images ([M03] "
       "figure 7, 4 to 6).",
       particle_maps(*sets.front().place, offices.front().furniture, sets.front().runs.front(),
-                    large_error_setting(Redraw::explained), seed_of_tracking, steps, "Tracking"),
+                    large_error_setting(ParticleInjection::explained), seed_of_tracking, steps,
+                    "Tracking"),
       3);
 }
 

@@ -125,22 +125,22 @@ std::vector<CoarseMotion> coarse_motion(const ViewGrid& grid, double distance_sh
   Random random(seed, 92);
   // Deviation of what is spread evenly over -1 .. 1.
   const double even = 1.0 / std::sqrt(3.0);
-  const double most_rad = direction_share * std::numbers::pi;
+  const double max_rad = direction_share * std::numbers::pi;
   const auto views = grid.memory.views();
   std::vector<CoarseMotion> motions;
   for (std::size_t i = 0; i + 1 < grid.poses.size(); ++i) {
     const Pose2 step = inverse(grid.poses[i]) * grid.poses[i + 1];
     const double length_m = std::hypot(step.x_m, step.y_m);
     const double said_m = length_m * (1.0 + random.uniform(-distance_share, distance_share));
-    const double said_rad = std::atan2(step.y_m, step.x_m) + random.uniform(-most_rad, most_rad);
-    const double turned_rad = step.heading_rad + random.uniform(-most_rad, most_rad);
+    const double said_rad = std::atan2(step.y_m, step.x_m) + random.uniform(-max_rad, max_rad);
+    const double turned_rad = step.heading_rad + random.uniform(-max_rad, max_rad);
     motions.push_back(
         {.from = views[i],
          .to = views[i + 1],
          .step = {said_m * std::cos(said_rad), said_m * std::sin(said_rad), wrap_angle(turned_rad)},
          .distance_deviation_m = even * distance_share * said_m,
-         .direction_deviation_rad = even * most_rad,
-         .turn_deviation_rad = even * most_rad});
+         .direction_deviation_rad = even * max_rad,
+         .turn_deviation_rad = even * max_rad});
   }
   return motions;
 }
@@ -149,8 +149,8 @@ GridComparison compare_with_grid(const ViewGrid& grid, const Lattice& lattice) {
   const auto truth = positions_of(grid.poses);
   std::vector<Point2> arranged;
   for (const auto& node : lattice.nodes) {
-    // Views of other parts have no place among these; the frame's origin stands for none.
-    arranged.push_back(node.part == 0 ? node.pose.position() : Point2{});
+    // Views of other components have no place among these; the frame's origin stands for none.
+    arranged.push_back(node.component == 0 ? node.pose.position() : Point2{});
   }
   GridComparison result;
   if (coincide(arranged)) {
@@ -177,7 +177,7 @@ GridComparison compare_with_grid(const ViewGrid& grid, const Lattice& lattice) {
     const GridPlace at = place_in(grid, view);
     if (is_inside(grid, at)) {
       ++inner;
-      bool all = lattice.nodes[view].part == 0;
+      bool all = lattice.nodes[view].component == 0;
       for (const GridPlace next : {GridPlace{at.i - 1, at.j}, GridPlace{at.i + 1, at.j},
                                    GridPlace{at.i, at.j - 1}, GridPlace{at.i, at.j + 1}}) {
         all = all && std::ranges::find(near[view], view_at(grid, next)) != near[view].end();

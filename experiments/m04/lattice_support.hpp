@@ -45,7 +45,8 @@ struct GridComparison {
   double border_pull = 0.0;       ///< how far border views lie inwards, in spacings, mean
   std::vector<Point2> aligned;    ///< arranged positions laid over the true ones
 };
-/// Views that are not in the largest part lie where they lie in their own: they count as wrong.
+/// Views that are not in the largest component lie where they lie in their own: they count as
+/// wrong.
 [[nodiscard]] GridComparison compare_with_grid(const ViewGrid& grid, const Lattice& lattice);
 
 /// Error of the turns that phases tell between views one spacing apart, rad.

@@ -45,8 +45,8 @@ struct Measures {
   std::size_t wrongly = 0;  // says that it arrived, but is elsewhere
   std::map<NavigationState, std::size_t> ends;
   std::vector<double> lengths;  // of those that arrived, over the shortest
-  std::vector<double> looks;
-  double bytes_read = 0.0;  // by all looks
+  std::vector<double> steps;
+  double bytes_read = 0.0;  // by all steps
 
   void add(const std::vector<MissionRun>& missions, double radius_m) {
     for (const MissionRun& run : missions) {
@@ -55,16 +55,16 @@ struct Measures {
       arrived += static_cast<std::size_t>(arrives);
       wrongly += static_cast<std::size_t>(!arrives && run.end == NavigationState::arrived);
       ++ends[run.end];
-      looks.push_back(static_cast<double>(run.decisions.size()));
-      for (const NavigationDecision& look : run.decisions) {
-        bytes_read += static_cast<double>(look.bytes_read);
+      steps.push_back(static_cast<double>(run.decisions.size()));
+      for (const NavigationDecision& step : run.decisions) {
+        bytes_read += static_cast<double>(step.bytes_read);
       }
       if (arrives && run.shortest_m > 0.0) lengths.push_back(run.travelled_m / run.shortest_m);
     }
   }
 
-  [[nodiscard]] double bytes_a_look() const {
-    return bytes_read / std::accumulate(looks.begin(), looks.end(), 0.0);
+  [[nodiscard]] double bytes_per_step() const {
+    return bytes_read / std::accumulate(steps.begin(), steps.end(), 0.0);
   }
 };
 
@@ -100,7 +100,7 @@ void report(const std::string& id, const std::string& what, const Measures& meas
     add_rate(result, id + "." + std::string(name_of(end)),
              what + ": end as " + std::string(name_of(end)), count, measured.runs);
   }
-  add_median(result, id + ".looks", what + ": looks", "", measured.looks);
+  add_median(result, id + ".steps", what + ": steps", "", measured.steps);
 }
 
 int runs_of(const NavigationReproductionOptions& options, int scene) {
@@ -162,15 +162,15 @@ Scene with_screens(Scene scene, std::span<const Pose2> across, double width_m) {
 }
 
 // How wide screens must be so that no way leads past them; empty: none of these widths does it and
-// leaves room at both ends. At a corner a way leads past screens that shut a straight passage.
+// leaves room at both ends. At a corner a way leads past screens that shut a straight way.
 std::optional<double> shutting_width_m(const Scene& scene, std::span<const Pose2> across,
                                        Point2 from, Point2 to) {
   for (const double width_m : {2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0}) {
     const Scene shut = with_screens(scene, across, width_m);
     const FreeSpaceOptions room = free_space_options(shut);
     const FreeSpace largest(shut, room);
-    const double least_m = room.robot_radius_m + 2.0 * room.cell_m;
-    if (largest.clearance_m(from) < least_m || largest.clearance_m(to) < least_m) break;
+    const double min_m = room.robot_radius_m + 2.0 * room.cell_m;
+    if (largest.clearance_m(from) < min_m || largest.clearance_m(to) < min_m) break;
     if (!FreeSpace(shut, room, from).is_free(to)) return width_m;
   }
   return std::nullopt;
@@ -197,7 +197,7 @@ void reproduce_grid_missions(const NavigationReproductionOptions& options, const
   }
   report("m04.fig18." + scene,
          "figure 18: " + scene + ", references every " + centimetres(spacing_m) +
-             " arranged by likeness alone",
+             " arranged by similarity alone",
          measured, at_least(0.98), at_most(1.3), result);
 }
 
@@ -205,7 +205,7 @@ void reproduce_drive_missions(const NavigationReproductionOptions& options,
                               const std::string& scene, Executor& executor, Reproduction& result) {
   Measures same;
   Measures changed;
-  Measures carried;
+  Measures kidnapped;
   Measures believed;
   for (int i = 0; i < options.scenes; ++i) {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
@@ -220,11 +220,11 @@ void reproduce_drive_missions(const NavigationReproductionOptions& options,
     MissionOptions mission;
     mission.base.drive = i % 2 == 0 ? DriveKind::differential : DriveKind::holonomic;
     const double radius_m = 0.5 * remembered.spacing_m;
-    const auto run = [&](const MissionPlace& where, bool is_carried, std::uint64_t stream,
+    const auto run = [&](const MissionPlace& where, bool is_kidnapped, std::uint64_t stream,
                          Measures& measures) {
       const auto missions = random_missions(
           where, remembered,
-          {.count = runs_of(options, i), .beside_m = beside_drive_m, .carried = is_carried},
+          {.count = runs_of(options, i), .beside_m = beside_drive_m, .kidnapped = is_kidnapped},
           Random(seed, stream).next());
       const auto runs = run_missions(where, remembered, missions, mission,
                                      Random(seed, stream + 1).next(), executor);
@@ -235,7 +235,7 @@ void reproduce_drive_missions(const NavigationReproductionOptions& options,
     };
     run(place, false, 5, same);
     run(other, false, 7, changed);
-    run(place, true, 9, carried);
+    run(place, true, 9, kidnapped);
     if (scene == "corridor") {
       // The missions of before, so that both can be compared.
       mission.monte_carlo = true;
@@ -249,7 +249,7 @@ void reproduce_drive_missions(const NavigationReproductionOptions& options,
          what + (movable ? ", light changed by 30 % and 10 % of the objects moved"
                          : ", light changed by 30 %"),
          changed, at_least(0.9), std::nullopt, result);
-  report("navigation." + scene + ".carried", what + ", carried away half way", carried,
+  report("navigation." + scene + ".kidnapped", what + ", kidnapped half way", kidnapped,
          at_least(0.9), std::nullopt, result);
   if (believed.runs > 0) {
     report("navigation." + scene + ".monte_carlo",
@@ -271,7 +271,7 @@ void reproduce_tours(const NavigationReproductionOptions& options, Executor& exe
   std::vector<Kind> kinds{
       {"tour", "one goal after the other", {}, {}},
       {"people", "the same with three people who walk about", {}, {}},
-      {"accurate", "the same with all components compared at each look", {}, {}}};
+      {"accurate", "the same with all components compared at each step", {}, {}}};
   kinds[1].options.people = people;
   kinds[2].options.navigator.coarse_components = 0;
   for (int i = 0; i < options.scenes; ++i) {
@@ -303,8 +303,8 @@ void reproduce_tours(const NavigationReproductionOptions& options, Executor& exe
            std::nullopt, std::nullopt, result);
     add_row(result, "navigation." + kind.id + ".read",
             "loop, tours of five goals, " + kind.what +
-                ": read of signatures and index by a look, mean",
-            1e-3 * kind.measures.bytes_a_look(), "kB");
+                ": read of signatures and index by a step, mean",
+            1e-3 * kind.measures.bytes_per_step(), "kB");
   }
 }
 
@@ -335,11 +335,11 @@ void reproduce_route_missions(const NavigationReproductionOptions& options, Exec
           run_missions(place, remembered, missions, {}, Random(seed, 14).next(), executor);
       kind.measures.add(runs, 0.5 * remembered.spacing_m);
       for (const MissionRun& run : runs) {
-        for (std::size_t look = 0; look < run.decisions.size(); ++look) {
-          const double off_m = std::abs(place_on_route(drive, run.path[look].position()).lateral_m);
+        for (std::size_t step = 0; step < run.decisions.size(); ++step) {
+          const double off_m = std::abs(place_on_route(drive, run.path[step].position()).lateral_m);
           kind.off_m.push_back(off_m);
-          if (run.decisions[look].on_route) on_route_m.push_back(off_m);
-          for (const NavigationEvent event : run.decisions[look].events) ++events[event];
+          if (run.decisions[step].on_route) on_route_m.push_back(off_m);
+          for (const NavigationEvent event : run.decisions[step].events) ++events[event];
         }
       }
       remembered.routes.clear();
@@ -353,7 +353,7 @@ void reproduce_route_missions(const NavigationReproductionOptions& options, Exec
                map + kind.what + ": distance from the way that was driven", "m", kind.off_m);
   }
   const std::string what = map + kinds.front().what;
-  add_rate(result, "navigation.route.share", what + ": looks on a leg along the route",
+  add_rate(result, "navigation.route.share", what + ": steps on a leg along the route",
            on_route_m.size(), kinds.front().off_m.size());
   if (on_route_m.empty()) return;
   add_rate(result, "navigation.route.left", what + ": legs that did not come to their end",
@@ -405,7 +405,7 @@ void reproduce_blocked_missions(const NavigationReproductionOptions& options, Ex
       ++k;
     }
   }
-  const std::string what = "loop, a screen across the passage";
+  const std::string what = "loop, a screen across the way";
   report("navigation.blocked", what + ", another way round", around, at_least(0.9), std::nullopt,
          result);
   add_rate(result, "navigation.shut.unreachable", what + " on both sides: told unreachable",
@@ -413,10 +413,10 @@ void reproduce_blocked_missions(const NavigationReproductionOptions& options, Ex
   result.rows.back().reason = other_ends(shut, NavigationState::unreachable);
   add_rate(result, "navigation.shut.arrived", what + " on both sides: say that they arrived",
            shut.ends[NavigationState::arrived], shut.runs);
-  add_median(result, "navigation.shut.looks", what + " on both sides: looks until told", "",
-             shut.looks);
-  add_row(result, "navigation.shut.most_looks", what + " on both sides: looks, most",
-          *std::ranges::max_element(shut.looks), "");
+  add_median(result, "navigation.shut.steps", what + " on both sides: steps until told", "",
+             shut.steps);
+  add_row(result, "navigation.shut.max_steps", what + " on both sides: steps, most",
+          *std::ranges::max_element(shut.steps), "");
 }
 
 }  // namespace panonav

@@ -33,7 +33,7 @@ Reproduction reproduce_navigation(const NavigationReproductionOptions& options, 
   stages.push_back({"tours", 4.0, [&] { reproduce_tours(options, executor, result); }});
   stages.push_back({"routes", 3.0, [&] { reproduce_route_missions(options, executor, result); }});
   stages.push_back(
-      {"blocked passages", 2.0, [&] { reproduce_blocked_missions(options, executor, result); }});
+      {"blocked edges", 2.0, [&] { reproduce_blocked_missions(options, executor, result); }});
   run_stages(stages, progress);
   return result;
 }

@@ -79,9 +79,10 @@ void visit_options(HomingSurveyOptions& options, OptionVisitor& visitor) {
   constexpr OptionTable table{
       option<&T::typical_distance_m>("distance of things: what a home vector of length 1 is worth",
                                      1e-3, 1e3),
-      option<&T::longest_step_m>("the robot takes a new view after this way at most", 1e-3, 1e3),
+      option<&T::max_step_m>("the robot takes a new view after this way at most", 1e-3, 1e3)
+          .formerly("longest_step_m"),
       option<&T::obstacle_m>("a step that ends farther from all places stops the run", 1e-3, 1e3),
-      option<&T::most_steps>("steps after which a run stops", 1, 1e6),
+      option<&T::max_steps>("steps after which a run stops", 1, 1e6).formerly("most_steps"),
   };
   table.visit(options, visitor);
 }
@@ -119,8 +120,7 @@ HomingSurvey survey_homing(std::span<const Pose2> goals, std::span<const Pose2> 
                 : std::numeric_limits<float>::quiet_NaN();
         auto next = static_cast<std::uint32_t>(p);
         if (length > 0.0) {
-          const double step_m =
-              std::min(options.longest_step_m, options.typical_distance_m * length);
+          const double step_m = std::min(options.max_step_m, options.typical_distance_m * length);
           next = finder.nearest({here.x_m + step_m * x / length, here.y_m + step_m * y / length},
                                 next);
         }
@@ -173,7 +173,7 @@ std::vector<HomewardBin> homeward_by_distance(const HomingSurvey& survey, double
   return bins;
 }
 
-double mean_homeward(const HomingSurvey& survey, double most_m) {
+double mean_homeward(const HomingSurvey& survey, double max_m) {
   double sum = 0.0;
   std::size_t pairs = 0;
   for (std::size_t g = 0; g < survey.goals.size(); ++g) {
@@ -181,7 +181,7 @@ double mean_homeward(const HomingSurvey& survey, double most_m) {
     for (std::size_t p = 0; p < homeward.size(); ++p) {
       if (std::isnan(homeward[p])) continue;
       const double away_m = distance(survey.goals[g].position(), survey.places[p].position());
-      if (away_m > most_m + rounding_m) continue;
+      if (away_m > max_m + rounding_m) continue;
       ++pairs;
       sum += static_cast<double>(homeward[p]);
     }
@@ -204,7 +204,7 @@ std::vector<std::uint32_t> final_places(std::span<const HomingSurvey* const> sta
     auto place = static_cast<std::uint32_t>(p);
     for (const HomingSurvey* const stage : stages) {
       const auto next = stage->next_of(goal);
-      for (int step = 0; step < options.most_steps; ++step) {
+      for (int step = 0; step < options.max_steps; ++step) {
         const std::uint32_t to = next[place];
         if (to == place) break;
         place = to;

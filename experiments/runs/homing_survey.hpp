@@ -26,9 +26,9 @@ using HomingRule = std::function<HomeVector(std::size_t goal, std::size_t place)
 /// Simulated runs over the places of a recording [S06 section 4.4].
 struct HomingSurveyOptions {
   double typical_distance_m = 0.5;  ///< R^typ: what a home vector of length 1 is worth, > 0
-  double longest_step_m = 0.05;     ///< l^max, > 0
+  double max_step_m = 0.05;         ///< l^max, > 0
   double obstacle_m = 0.02;         ///< a step that ends farther from all places stops the run, > 0
-  int most_steps = 30;              ///< of one stage of a run, >= 1
+  int max_steps = 30;               ///< of one stage of a run, >= 1
 };
 void visit_options(HomingSurveyOptions& options, OptionVisitor& visitor);
 
@@ -81,8 +81,8 @@ struct HomewardBin {
 [[nodiscard]] std::vector<HomewardBin> homeward_by_distance(const HomingSurvey& survey,
                                                             double bin_m = 0.025);
 
-/// Over all pairs above 0 and up to `most_m`; NaN when there is none.
-[[nodiscard]] double mean_homeward(const HomingSurvey& survey, double most_m);
+/// Over all pairs above 0 and up to `max_m`; NaN when there is none.
+[[nodiscard]] double mean_homeward(const HomingSurvey& survey, double max_m);
 
 /// Where runs to the goal end that start at each place. With several stages a run goes on with the
 /// next one where the last has stopped [S06 section 5]: surveys of the same goals and places.

@@ -28,7 +28,7 @@ double radius_at(const Camera& camera, double elevation_rad) {
 
 LineCamera make_line_camera(double height_m, int columns) {
   const Camera camera = simulated_mirror_camera();
-  const HorizonLineOptions line{.columns = columns};
+  const HorizonScanlineOptions line{.columns = columns};
   UnwarperOptions cylinder{.rows = 3, .columns = 2 * columns};
   cylinder.elevations = ElevationBand{-line.half_band_rad, line.half_band_rad};
   LineCamera result{camera, Unwarper(camera, cylinder), {}, line, height_m, 0.0, {}, {}};
@@ -85,7 +85,7 @@ std::vector<float> take_line(const Renderer& renderer, const Pose2& pose, const 
     picture.pixels()[camera.pixels[i]] =
         static_cast<std::uint8_t>(std::lround(255.0F * seen.row(0)[i]));
   }
-  return horizon_line(camera.unwarper.unwrap(picture.view()), camera.line);
+  return horizon_scanline(camera.unwarper.unwrap(picture.view()), camera.line);
 }
 
 }  // namespace panonav

@@ -6,7 +6,7 @@
 
 #include "panonav/camera/camera.hpp"
 #include "panonav/panorama/unwarper.hpp"
-#include "panonav/route/horizon_line.hpp"
+#include "panonav/route/horizon_scanline.hpp"
 #include "panonav/simulation/mirror.hpp"
 #include "panonav/simulation/renderer.hpp"
 #include "panonav/simulation/sensor.hpp"
@@ -20,7 +20,7 @@ struct LineCamera {
   Camera camera;
   Unwarper unwarper;
   SensorOptions sensor;  ///< vignetting and light from one side have no meaning here
-  HorizonLineOptions line;
+  HorizonScanlineOptions line;
   double height_m = 0.6;
   double spread_rad = 0.0;          ///< between neighbouring rays
   std::vector<std::size_t> pixels;  ///< of the image, row by row
@@ -30,8 +30,8 @@ struct LineCamera {
 /// `height_m` above the floor, `columns` in a line, usual noise.
 [[nodiscard]] LineCamera make_line_camera(double height_m, int columns = 360);
 
-/// The horizon line of the picture that the robot takes at `pose`. The same pose and seed give the
-/// same bits. May be called from several threads. Cost: some milliseconds.
+/// The horizon scanline of the picture that the robot takes at `pose`. The same pose and seed give
+/// the same bits. May be called from several threads. Cost: some milliseconds.
 [[nodiscard]] std::vector<float> take_line(const Renderer& renderer, const Pose2& pose,
                                            const LineCamera& camera, std::uint64_t seed);
 

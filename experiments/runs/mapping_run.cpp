@@ -116,7 +116,7 @@ MappedRecording map_recording(const MappingRecording& recording, const MappingRu
   double total_s = 0.0;
   std::size_t looked_at = 0;
   for (std::size_t i = 0; i < recording.views.size(); ++i) {
-    if (options.most_nodes > 0 && result.number.size() == options.most_nodes) break;
+    if (options.max_nodes > 0 && result.number.size() == options.max_nodes) break;
     ++looked_at;
     const FourierSignature view = first_components(recording.views[i], options.components);
     const auto start = Clock::now();
@@ -132,7 +132,7 @@ MappedRecording map_recording(const MappingRecording& recording, const MappingRu
     }
     const double step_s = seconds_since(start);
     total_s += step_s;
-    result.longest_step_s = std::max(result.longest_step_s, step_s);
+    result.max_step_s = std::max(result.max_step_s, step_s);
   }
   const auto start = Clock::now();
   mapper.finish();

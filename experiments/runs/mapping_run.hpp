@@ -58,7 +58,7 @@ struct MappedRecording {
   std::size_t right_closures = 0;   ///< views at most 1 m apart
   std::size_t wrong_closures = 0;
   double mean_step_s = 0.0;  ///< of a view, the last optimisation shared among them
-  double longest_step_s = 0.0;
+  double max_step_s = 0.0;
   double finish_s = 0.0;  ///< the last optimisation
 };
 
@@ -67,8 +67,8 @@ struct MappingRunOptions {
   VisualOdometryOptions odometry;
   LoopClosureOptions closure;
   int components = 15;
-  bool wheels = false;         ///< steps of the wheels are known
-  std::size_t most_nodes = 0;  ///< the run ends with so many; 0: all views
+  bool wheels = false;        ///< steps of the wheels are known
+  std::size_t max_nodes = 0;  ///< the run ends with so many; 0: all views
 };
 [[nodiscard]] MappedRecording map_recording(const MappingRecording& recording,
                                             const MappingRunOptions& options);

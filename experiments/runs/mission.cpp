@@ -47,8 +47,8 @@ VisualMemory empty_memory(const std::vector<FourierSignature>& views) {
           views.front().elevations()};
 }
 
-// Of a drive whose poses the map has placed, from the first one in its largest part until one is
-// not.
+// Of a drive whose poses the map has placed, from the first one in its largest component until one
+// is not.
 RoutePanorama record_route(const MissionPlace& place, const std::vector<Pose2>& poses,
                            const TopologicalMap& map, std::uint64_t seed, Executor& executor) {
   struct Stop {
@@ -57,7 +57,7 @@ RoutePanorama record_route(const MissionPlace& place, const std::vector<Pose2>& 
   };
   std::vector<Stop> stops;
   for (std::size_t i = 0; i < map.nodes.size(); ++i) {
-    if (map.nodes[i].part != 0) {
+    if (map.nodes[i].component != 0) {
       if (stops.empty()) continue;
       break;
     }
@@ -158,7 +158,7 @@ RememberedPlace remember_drive(const MissionPlace& place, const std::vector<Pose
   mapper.finish();
   const TopologicalMap map = mapper.map();
   for (const MapNode& node : map.nodes) {
-    if (node.part != 0) continue;
+    if (node.component != 0) continue;
     memory.set_pose(node.view, ReferencePose{node.pose.x_m, node.pose.y_m, node.pose.heading_rad});
   }
   const double way_m = path_length_m(poses);
@@ -167,7 +167,7 @@ RememberedPlace remember_drive(const MissionPlace& place, const std::vector<Pose
   if (place.line) {
     std::vector<RouteView> placed;
     for (const MapNode& node : map.nodes) {
-      if (node.part == 0) placed.push_back({node.view, node.pose});
+      if (node.component == 0) placed.push_back({node.view, node.pose});
     }
     const std::uint64_t seed_of_lines = Random(seed, 1).next();
     routes.push_back(known_route(record_route(place, poses, map, seed_of_lines, executor), placed));
@@ -279,13 +279,13 @@ class Estimator {
     const auto estimate = filter_.observe(pack(view, memory_->full_scale()));
     if (estimate.state != LocalisationState::localised || !estimate.pose) return std::nullopt;
     std::optional<ViewId> nearest;
-    double least_m = std::numeric_limits<double>::infinity();
+    double min_m = std::numeric_limits<double>::infinity();
     for (const ViewId id : memory_->views()) {
       const auto& pose = memory_->info(id).pose;
       if (!pose) continue;
       const double far_m = distance(pose->position(), estimate.pose->position());
-      if (far_m < least_m) {
-        least_m = far_m;
+      if (far_m < min_m) {
+        min_m = far_m;
         nearest = id;
       }
     }
@@ -311,30 +311,30 @@ class Voyage {
     if (options.monte_carlo) estimator_.emplace(remembered.memory, options.motion);
   }
 
-  MissionRun run(Navigator& navigator, ViewId goal_view, const std::optional<Pose2>& carried_to,
-                 const LookReport& report_look) {
+  MissionRun run(Navigator& navigator, ViewId goal_view, const std::optional<Pose2>& kidnapped_to,
+                 const StepReport& report_step) {
     const Point2 goal = remembered_.truth.at(*remembered_.graph.node_of(goal_view)).position();
     const FreeSpace& space = *place_.free_space;
     MissionRun run;
     run.shortest_m = shortest_way_m(space, robot_.pose().position(), goal);
     const double begins_at_m = robot_.travelled_m();
-    const double carried_at_m = begins_at_m + 0.5 * run.shortest_m;
+    const double kidnapped_at_m = begins_at_m + 0.5 * run.shortest_m;
     navigator.set_goal(goal_view);
     for (;;) {
       run.path.push_back(robot_.pose());
-      const NavigationDecision decision = look(navigator);
+      const NavigationDecision decision = step(navigator);
       run.decisions.push_back(decision);
-      if (report_look) report_look(decision, robot_.pose());
+      if (report_step) report_step(decision, robot_.pose());
       if (decision.state != NavigationState::moving) {
         run.end = decision.state;
         break;
       }
       move(decision);
-      if (carried_to && !run.carried_at && robot_.travelled_m() >= carried_at_m) {
-        run.carried_at = run.path.size() - 1;
-        run.shortest_m += shortest_way_m(space, carried_to->position(), goal) -
+      if (kidnapped_to && !run.kidnapped_at && robot_.travelled_m() >= kidnapped_at_m) {
+        run.kidnapped_at = run.path.size() - 1;
+        run.shortest_m += shortest_way_m(space, kidnapped_to->position(), goal) -
                           shortest_way_m(space, robot_.pose().position(), goal);
-        robot_.carry_to(*carried_to);
+        robot_.carry_to(*kidnapped_to);
         obstacle_ = false;
       }
     }
@@ -344,7 +344,7 @@ class Voyage {
   }
 
  private:
-  NavigationDecision look(Navigator& navigator) {
+  NavigationDecision step(Navigator& navigator) {
     const FourierSignature view =
         see(place_, robot_.pose(), noise_of_views_.next(), &robot_.people());
     RobotReport report{.obstacle = std::exchange(obstacle_, false)};
@@ -388,7 +388,7 @@ class Voyage {
   Random noise_of_views_;
   Random noise_of_lines_;
   std::optional<Estimator> estimator_;
-  bool in_doubt_ = true;  // where it is, after the last look
+  bool in_doubt_ = true;  // where it is, after the last step
   bool obstacle_ = false;
 };
 
@@ -401,11 +401,11 @@ void require_goal(const RememberedPlace& remembered, ViewId goal) {
 
 MissionRun run_mission(const MissionPlace& place, const RememberedPlace& remembered,
                        Navigator& navigator, const Mission& mission, const MissionOptions& options,
-                       std::uint64_t seed, const LookReport& report_look) {
+                       std::uint64_t seed, const StepReport& report_step) {
   require_goal(remembered, mission.goal);
   navigator.forget_place();
   return Voyage(place, remembered, mission.start, options, seed)
-      .run(navigator, mission.goal, mission.carried_to, report_look);
+      .run(navigator, mission.goal, mission.kidnapped_to, report_step);
 }
 
 std::vector<MissionRun> run_tour(const MissionPlace& place, const RememberedPlace& remembered,
@@ -455,12 +455,12 @@ std::vector<Mission> random_missions(const MissionPlace& place, const Remembered
     }
   };
   std::vector<Mission> missions;
-  const double least_m = 2.0 * remembered.spacing_m;
+  const double min_m = 2.0 * remembered.spacing_m;
   while (missions.size() < static_cast<std::size_t>(options.count)) {
     const std::size_t goal = random.index(remembered.truth.size());
     Mission mission{remembered.graph.view(goal), anywhere(), {}};
-    if (options.carried) mission.carried_to = anywhere();
-    if (distance(mission.start.position(), remembered.truth[goal].position()) < least_m) continue;
+    if (options.kidnapped) mission.kidnapped_to = anywhere();
+    if (distance(mission.start.position(), remembered.truth[goal].position()) < min_m) continue;
     missions.push_back(mission);
   }
   return missions;

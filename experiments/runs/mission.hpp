@@ -36,13 +36,13 @@ struct MissionPlace {
   /// What a robot sees through another camera or preprocessing than that of `see`, which then asks
   /// this instead; any number of threads may ask. Empty: as `see` says.
   std::function<FourierSignature(const Pose2& pose, std::uint64_t seed)> sight;
-  /// The horizon line that a robot takes at a pose, to record and to follow routes; any number of
-  /// threads may ask. Empty: it takes none.
+  /// The horizon scanline that a robot takes at a pose, to record and to follow routes; any number
+  /// of threads may ask. Empty: it takes none.
   std::function<std::vector<float>(const Pose2& pose, std::uint64_t seed)> line;
 };
 
-/// `inside`: of a place in several parts, a position in the part that is meant; empty: the largest.
-/// Throws ContractError as the parts.
+/// `inside`: of a place in several components, a position in the component that is meant; empty:
+/// the largest. Throws ContractError as the components.
 [[nodiscard]] MissionPlace make_mission_place(Scene scene, Executor& executor,
                                               std::optional<Point2> inside = std::nullopt);
 
@@ -67,14 +67,14 @@ struct RememberedPlace {
 };
 
 /// Views on a grid, 20 cm or more from all things, each in a heading at random, arranged by their
-/// likeness alone: no positions, no order, no motion [M04 section 3].
+/// similarity alone: no positions, no order, no motion [M04 section 3].
 [[nodiscard]] RememberedPlace remember_grid(const MissionPlace& place, double spacing_m,
                                             std::uint64_t seed, Executor& executor);
 
 /// Views along a drive, mapped by visual odometry and closure of loops, lengths by `wheels`
-/// [F11 section 4]. The memory gets the poses of the map's largest part. Where the place has lines
-/// the robot records a route, too, as far as that part goes without a gap: a line every 10 cm at
-/// most [Y03 section 2.2], posed between the map's views, so that both lie in one frame.
+/// [F11 section 4]. The memory gets the poses of the map's largest component. Where the place has
+/// lines the robot records a route, too, as far as that component goes without a gap: a line every
+/// 10 cm at most [Y03 section 2.2], posed between the map's views, so that both lie in one frame.
 [[nodiscard]] RememberedPlace remember_drive(const MissionPlace& place,
                                              const std::vector<Pose2>& poses,
                                              const OdometryNoise& wheels, std::uint64_t seed,
@@ -139,15 +139,15 @@ struct Mission {
   ViewId goal;
   Pose2 start;
   /// Where somebody carries the robot once half of the way is driven; empty: nobody does.
-  std::optional<Pose2> carried_to;
+  std::optional<Pose2> kidnapped_to;
 };
 
 struct RandomMissionOptions {
   int count = 100;
-  /// Starts, and places that the robot is carried to, lie within so much of a reference at random;
-  /// infinite: anywhere.
+  /// Starts, and places that the robot is kidnapped to, lie within so much of a reference at
+  /// random; infinite: anywhere.
   double beside_m = std::numeric_limits<double>::infinity();
-  bool carried = false;  ///< somebody carries the robot away on its way
+  bool kidnapped = false;  ///< somebody kidnaps the robot on its way
 };
 
 /// Missions from random free places, in any heading, to references at random that are at least two
@@ -159,12 +159,12 @@ struct RandomMissionOptions {
 
 struct MissionRun {
   NavigationState end = NavigationState::moving;
-  std::vector<Pose2> path;  ///< true poses at the looks, and the last one
+  std::vector<Pose2> path;  ///< true poses at the steps, and the last one
   std::vector<NavigationDecision> decisions;
-  std::optional<std::size_t> carried_at;  ///< the look after which the robot was carried away
-  double end_distance_m = 0.0;            ///< from where the goal's view was taken; NaN: unknown
+  std::optional<std::size_t> kidnapped_at;  ///< the step after which the robot was kidnapped
+  double end_distance_m = 0.0;              ///< from where the goal's view was taken; NaN: unknown
   double travelled_m = 0.0;
-  /// Shortest way through free places, in parts when carried away; NaN: unknown.
+  /// Shortest way through free places, in components when kidnapped; NaN: unknown.
   double shortest_m = 0.0;
 
   /// The robot says that it arrived, and is within `radius_m` of the goal.
@@ -173,8 +173,8 @@ struct MissionRun {
   }
 };
 
-/// Called after each look, with the true pose.
-using LookReport = std::function<void(const NavigationDecision& decision, const Pose2& pose)>;
+/// Called after each step, with the true pose.
+using StepReport = std::function<void(const NavigationDecision& decision, const Pose2& pose)>;
 
 /// Sends a robot over what is remembered; `place` may differ from the place that was remembered.
 /// Where it is not known where the goal's view was taken, nobody carries the robot away. The robot
@@ -183,7 +183,7 @@ using LookReport = std::function<void(const NavigationDecision& decision, const 
 [[nodiscard]] MissionRun run_mission(const MissionPlace& place, const RememberedPlace& remembered,
                                      Navigator& navigator, const Mission& mission,
                                      const MissionOptions& options, std::uint64_t seed,
-                                     const LookReport& report_look = {});
+                                     const StepReport& report_step = {});
 
 /// One goal after the other: each run begins where the one before ended, with the place known that
 /// the robot then believes in. A goal that was not reached does not end the tour. Otherwise as

@@ -73,7 +73,7 @@ MapLayer planned_layer(const RememberedPlace& remembered, const PlannerOptions& 
                        ViewId goal, const MissionRun& run) {
   MapLayer layer{.label = "way planned", .colour = "#e69f00"};
   const auto known = std::ranges::find_if(
-      run.decisions, [](const auto& look) { return look.nearest.has_value(); });
+      run.decisions, [](const auto& step) { return step.nearest.has_value(); });
   if (known == run.decisions.end()) return layer;
   AreaPlanner planner(remembered.graph, options);
   planner.set_goal(goal);
@@ -89,7 +89,7 @@ MapLayer driven_layer(const MissionRun& run) {
   MapLayer layer{.label = "way driven", .colour = "#d62728", .lines = {{}}};
   for (std::size_t i = 0; i < run.path.size(); ++i) {
     layer.lines.back().push_back(run.path[i].position());
-    if (run.carried_at == i) layer.lines.emplace_back();
+    if (run.kidnapped_at == i) layer.lines.emplace_back();
   }
   return layer;
 }
@@ -113,10 +113,10 @@ void write_mission_picture(const std::filesystem::path& path, const std::string&
   plot.layers.push_back(driven_layer(run));
   plot.layers.push_back(
       {.label = "start", .colour = "#009e73", .squares = {run.path.front().position()}});
-  if (run.carried_at) {
-    plot.layers.push_back({.label = "carried here",
+  if (run.kidnapped_at) {
+    plot.layers.push_back({.label = "kidnapped to here",
                            .colour = "#cc79a7",
-                           .squares = {run.path.at(*run.carried_at + 1).position()}});
+                           .squares = {run.path.at(*run.kidnapped_at + 1).position()}});
   }
   const Pose2& at_goal = remembered.truth[*remembered.graph.node_of(goal)];
   if (is_known(at_goal)) {

@@ -15,7 +15,7 @@ namespace panonav {
 struct PlaceCondition {
   std::string name;
   SensorOptions sensor;
-  double tilt_rad = 0.0;  ///< the robot leans by this much, in another direction at each place
+  double tilt_rad = 0.0;  ///< the robot is tilted by this much, in another direction at each place
 };
 
 /// As memorised; light 30 % less and 30 % more, with a tenth of the columns hidden; 5 degrees of

@@ -13,7 +13,7 @@ namespace panonav {
 FilterSetting paper_setting() {
   FilterSetting setting;
   setting.options.compass = false;
-  setting.options.redraw = Redraw::none;
+  setting.options.injection = ParticleInjection::none;
   setting.particles_per_reference = 1.0;
   setting.odometry.drive = DriveKind::holonomic;
   setting.told_odometry.drive = DriveKind::holonomic;
@@ -21,9 +21,9 @@ FilterSetting paper_setting() {
   return setting;
 }
 
-FilterSetting compass_setting(Redraw redraw) {
+FilterSetting compass_setting(ParticleInjection injection) {
   FilterSetting setting;
-  setting.options.redraw = redraw;
+  setting.options.injection = injection;
   setting.particles_per_reference = 1.0;
   return setting;
 }
@@ -36,7 +36,7 @@ TrackedRun track_run(const TrackingPlace& place, const TrackingRun& run,
   if (setting.particles_per_reference) {
     const double wanted =
         *setting.particles_per_reference * static_cast<double>(place.memory().size());
-    options.least_particles = options.most_particles =
+    options.min_particles = options.max_particles =
         std::max(1, static_cast<int>(std::lround(wanted)));
   }
   MonteCarloLocaliser filter(place.ranking(), place.model(), options, setting.told_odometry);
@@ -76,7 +76,7 @@ TrackedRun track_run(const TrackingPlace& place, const TrackingRun& run,
     }
     image.modes = estimate.modes.size();
     image.particles = estimate.particles;
-    image.redrawn = estimate.redrawn;
+    image.injected = estimate.injected;
     tracked.push_back(image);
     if (observer) observer(i, filter, estimate);
   }

@@ -24,7 +24,7 @@ struct TrackedImage {
   double nearest_mode_m = 0.0;     ///< error of the mode nearest to the truth
   std::size_t modes = 0;
   int particles = 0;
-  int redrawn = 0;
+  int injected = 0;
 
   /// A pose was given and it is within `radius_m`.
   [[nodiscard]] bool is_within(double radius_m) const { return answered && error_m < radius_m; }
@@ -46,10 +46,10 @@ struct FilterSetting {
 };
 
 /// The paper's robot: holonomic, heading known and kept, no compass, as many particles as
-/// references, nothing redrawn.
+/// references, nothing injected.
 [[nodiscard]] FilterSetting paper_setting();
 /// Heading unknown, compass on, differential drive, as many particles as references.
-[[nodiscard]] FilterSetting compass_setting(Redraw redraw);
+[[nodiscard]] FilterSetting compass_setting(ParticleInjection injection);
 
 /// Called after each step, also those without an image.
 using StepObserver = std::function<void(std::size_t step, const MonteCarloLocaliser& filter,

@@ -108,13 +108,13 @@ TrackingRun run_through(std::span<const Pose2> poses, std::vector<PackedSignatur
 
 std::optional<TrackingRun> kidnapped(const TrackingRun& before, const TrackingRun& after,
                                      std::size_t images, double distance_m,
-                                     std::size_t least_images) {
+                                     std::size_t min_images) {
   if (before.steps.size() < images || images == 0) return std::nullopt;
   const Point2 left = before.steps[images - 1].truth.position();
   const auto found = std::ranges::find_if(after.steps, [&](const TrackingStep& step) {
     return distance(step.truth.position(), left) >= distance_m;
   });
-  if (after.steps.end() - found < static_cast<std::ptrdiff_t>(least_images)) return std::nullopt;
+  if (after.steps.end() - found < static_cast<std::ptrdiff_t>(min_images)) return std::nullopt;
   TrackingRun run;
   run.steps.assign(before.steps.begin(),
                    before.steps.begin() + static_cast<std::ptrdiff_t>(images));

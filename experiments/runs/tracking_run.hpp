@@ -72,8 +72,8 @@ class TrackingPlace {
 /// One step of a run.
 struct TrackingStep {
   Pose2 truth;  ///< world_from_robot after the step
-  /// robot_old_from_robot_new as it truly was; empty at the start, and where the robot was carried
-  /// to `truth` without noticing.
+  /// robot_old_from_robot_new as it truly was; empty at the start, and where the robot was
+  /// kidnapped to `truth` without noticing.
   std::optional<Pose2> moved;
   std::optional<PackedSignature> view;  ///< empty: no picture was taken
 };
@@ -88,12 +88,12 @@ struct TrackingRun {
 [[nodiscard]] TrackingRun run_through(std::span<const Pose2> poses,
                                       std::vector<PackedSignature> views);
 
-/// The first `images` steps of `before`; then the robot is carried to the first step of `after`
+/// The first `images` steps of `before`; then the robot is put down at the first step of `after`
 /// that is at least `distance_m` away, and goes on there. Empty when no such step leaves
-/// `least_images`.
+/// `min_images`.
 [[nodiscard]] std::optional<TrackingRun> kidnapped(const TrackingRun& before,
                                                    const TrackingRun& after, std::size_t images,
-                                                   double distance_m, std::size_t least_images);
+                                                   double distance_m, std::size_t min_images);
 
 /// The same run without the pictures of steps first .. first + count - 1.
 [[nodiscard]] TrackingRun without_images(TrackingRun run, std::size_t first, std::size_t count);

@@ -44,7 +44,7 @@ class GoalPictures {
   [[nodiscard]] MapLayer vectors(const FourierHomingOptions& homing) const;
   [[nodiscard]] MapLayer border(const std::vector<bool>& inside) const;
   [[nodiscard]] MapLayer goal_mark() const;
-  [[nodiscard]] MapLayer most_alike(const std::vector<double>& differences) const;
+  [[nodiscard]] MapLayer most_similar(const std::vector<double>& differences) const;
 
  private:
   ArenaSurveys& surveys_;
@@ -122,9 +122,9 @@ MapLayer GoalPictures::goal_mark() const {
   return {.label = "goal", .colour = "#d00000", .squares = {position()}};
 }
 
-MapLayer GoalPictures::most_alike(const std::vector<double>& differences) const {
+MapLayer GoalPictures::most_similar(const std::vector<double>& differences) const {
   const auto best = std::ranges::min_element(differences) - differences.begin();
-  return {.label = "most alike",
+  return {.label = "most similar",
           .colour = "#009e73",
           .circles = {arena_.currents.views[static_cast<std::size_t>(best)].pose.position()}};
 }
@@ -184,11 +184,12 @@ void reproduce_goal_figures(ArenaSurveys& surveys, const std::filesystem::path& 
   const auto ends_five = of.final_distances_of(published_strategy({5}));
   add_plot(
       result, folder, "figure_09_vectors.png",
-      "[S06] figure 9: home vectors to one goal (strokes from the dots), the darker the less alike "
+      "[S06] figure 9: home vectors to one goal (strokes from the dots), the darker the less "
+      "similar "
       "the views. Other valleys lead astray.",
       map_of("Home vectors, K = 5; orange: catchment area at 10 cm",
              of.shaded(at_five, difference_limits), of.vectors(published_homing(5, s06_iterations)),
-             of.border(within(ends_five, reached_m)), of.goal_mark(), of.most_alike(at_five)));
+             of.border(within(ends_five, reached_m)), of.goal_mark(), of.most_similar(at_five)));
 
   std::vector<MapPlot> panels;
   LinePlot along_x{.title = "Image difference along x through the goal",
@@ -203,7 +204,7 @@ void reproduce_goal_figures(ArenaSurveys& surveys, const std::filesystem::path& 
     panels.push_back(map_of(k + ": image difference, home vectors",
                             of.shaded(differences, difference_limits),
                             of.vectors(published_homing(highest, s06_iterations)), of.goal_mark(),
-                            of.most_alike(differences)));
+                            of.most_similar(differences)));
     panels.push_back(map_of(k + ": where runs end; yellow: at the goal, dark: beyond 40 cm",
                             of.shaded(ends, distance_limits), of.border(within(ends, reached_m)),
                             of.goal_mark()));

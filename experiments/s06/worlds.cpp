@@ -180,7 +180,7 @@ void reproduce_homing_in_scenes(std::uint64_t seed, int starts, Executor& execut
   Ends ends;
   for (const char* const name : scenes) {
     std::vector<HomingRun> flat;
-    std::vector<HomingRun> leaning;
+    std::vector<HomingRun> tilted;
     std::vector<HomingRun> sideways;
     for (std::uint64_t variant = 0; variant < seeds_each; ++variant) {
       const std::uint64_t number = seed + variant;
@@ -196,7 +196,7 @@ void reproduce_homing_in_scenes(std::uint64_t seed, int starts, Executor& execut
       holonomic.motion.drive = DriveKind::holonomic;
       append(sideways, holonomic);
       place.camera.frame.tilt_rad = tilt_rad;
-      append(leaning, {});
+      append(tilted, {});
     }
     const std::string id = std::string("s06.scene.") + name;
     const std::string what = std::string(name) + ", starts within 1.5 m";
@@ -205,11 +205,11 @@ void reproduce_homing_in_scenes(std::uint64_t seed, int starts, Executor& execut
     add_rate(reproduction, id + ".holonomic", what + ", a holonomic robot: home within 10 cm",
              successes(sideways), sideways.size());
     add_rate(reproduction, id + ".tilt",
-             what + ", leaning by 3 degrees in a random direction at each view: home within 10 cm",
-             successes(leaning), leaning.size());
+             what + ", tilted by 3 degrees in a random direction at each view: home within 10 cm",
+             successes(tilted), tilted.size());
     std::vector<double> distances_m;
-    for (const HomingRun& run : leaning) distances_m.push_back(run.end_distance_m);
-    add_median(reproduction, id + ".tilt_error", what + ", leaning: distance from home at the end",
+    for (const HomingRun& run : tilted) distances_m.push_back(run.end_distance_m);
+    add_median(reproduction, id + ".tilt_error", what + ", tilted: distance from home at the end",
                "m", distances_m);
     ends.add(flat);
   }

@@ -29,7 +29,7 @@ void reproduce_homing_in_world(const std::filesystem::path& data, const std::str
                                Executor& executor, Reproduction& reproduction);
 
 /// The same figures over built-in scenes of several seeds: office, lab, hall, loop and garden, the
-/// robot on flat ground and leaning by up to 3 degrees in a random direction at each view, and a
+/// robot on flat ground and tilted by up to 3 degrees in a random direction at each view, and a
 /// holonomic robot; and how much views differ where runs end at home and where they end elsewhere:
 /// `HomingPursuitOptions::arrived_difference` is to stand between.
 void reproduce_homing_in_scenes(std::uint64_t seed, int starts, Executor& executor,

@@ -269,9 +269,9 @@ void reproduce_lab_drives(const RouteReproductionOptions& options, Executor& exe
              at_most(2.0), std::pair(4.0, 4.0));
   add_rate(result, "y03.goal.arrived", "closed loop: the robot says that it arrived", arrived,
            goal_cm.size());
-  add_median(result, "y03.time", "from horizon line to pose, one core, direct fit", "ms", fit_ms,
-             at_most(0.5), std::pair(200.0, 200.0));
-  add_median(result, "y03.time.contours", "from horizon line to pose, one core, dual contours",
+  add_median(result, "y03.time", "from horizon scanline to pose, one core, direct fit", "ms",
+             fit_ms, at_most(0.5), std::pair(200.0, 200.0));
+  add_median(result, "y03.time.contours", "from horizon scanline to pose, one core, dual contours",
              "ms", contours_ms, std::nullopt, std::pair(200.0, 200.0));
 
   const auto means = [](const std::vector<Errors>& errors) {

@@ -24,8 +24,8 @@ namespace {
 constexpr double drive_step_m = 0.05;
 // Of the movable things; and how much of what is seen may be another.
 constexpr double moved_share = 0.1;
-constexpr double least_changed = 0.05;
-constexpr double most_changed = 0.15;
+constexpr double min_changed = 0.05;
+constexpr double max_changed = 0.15;
 constexpr double wanted_changed = 0.1;
 
 std::vector<std::vector<float>> take_lines(const Renderer& renderer,
@@ -127,8 +127,8 @@ double changed_share(const Renderer& before, const Renderer& after, const std::v
 ChangedLab change_lab(std::uint64_t seed, const Renderer& before, const std::vector<Pose2>& drive,
                       const LineCamera& camera, Executor& executor) {
   ChangedLab best;
-  constexpr std::uint64_t most_trials = 30;
-  for (std::uint64_t trial = 0; trial < most_trials; ++trial) {
+  constexpr std::uint64_t max_trials = 30;
+  for (std::uint64_t trial = 0; trial < max_trials; ++trial) {
     const Scene scene = make_scene(
         "lab", {.seed = seed, .moved_objects = moved_share, .moved_seed = seed + 1 + 1000 * trial});
     auto after = std::make_unique<Renderer>(scene, RendererOptions{}, executor);
@@ -137,7 +137,7 @@ ChangedLab change_lab(std::uint64_t seed, const Renderer& before, const std::vec
         std::abs(share - wanted_changed) < std::abs(best.share - wanted_changed)) {
       best = {std::move(after), share};
     }
-    if (best.share >= least_changed && best.share <= most_changed) break;
+    if (best.share >= min_changed && best.share <= max_changed) break;
   }
   return best;
 }
@@ -235,10 +235,10 @@ GoalRun run_to_goals(const LabRoute& lab, const RouteLines& lines, std::uint64_t
   Pose2 estimate = roughly(robot);
   GoalRun run;
   constexpr double arrived_m = 0.005;
-  constexpr int most_steps = 200;
+  constexpr int max_steps = 200;
   std::size_t next = 1;
   Pose2 step;
-  for (int i = 0; i < most_steps; ++i) {
+  for (int i = 0; i < max_steps; ++i) {
     estimate = estimate * step;
     const auto line = take_line(*lab.renderer, robot, camera, random.next());
     if (const auto fix = lines.fit(line, estimate)) estimate = fix->pose;

@@ -22,7 +22,7 @@
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/panorama_reader.hpp"
 #include "panonav/motion/headed_path.hpp"
-#include "panonav/route/horizon_line.hpp"
+#include "panonav/route/horizon_scanline.hpp"
 #include "panonav/route/route_place.hpp"
 #include "panonav/route/route_tracker.hpp"
 #include "panonav/simulation/scenes.hpp"
@@ -206,7 +206,7 @@ void reproduce_real_route(const RouteReproductionOptions& options, Executor& exe
   const Dataset dataset = read_dataset(options.data / "sussex_route");
   const PanoramaReader reader(dataset.source, {});
   auto lines = make_each(executor, dataset.entries.size(), [&](std::size_t i) {
-    return horizon_line(reader.read(dataset.entries[i].path));
+    return horizon_scanline(reader.read(dataset.entries[i].path));
   });
   std::vector<Point2> places;
   for (const DatasetEntry& entry : dataset.entries) {

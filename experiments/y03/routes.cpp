@@ -60,12 +60,12 @@ bool reaches(const RouteScene& place, Point2 from, Point2 to) {
 }
 
 // Of a way, at the place with the least room.
-double least_clearance_m(const RouteScene& place, const std::vector<Pose2>& way) {
-  double least_m = std::numeric_limits<double>::infinity();
+double min_clearance_m(const RouteScene& place, const std::vector<Pose2>& way) {
+  double min_m = std::numeric_limits<double>::infinity();
   for (const Pose2& pose : way) {
-    least_m = std::min(least_m, place.free_space->clearance_m(pose.position()));
+    min_m = std::min(min_m, place.free_space->clearance_m(pose.position()));
   }
-  return least_m;
+  return min_m;
 }
 
 double direction(Point2 from, Point2 to) {
@@ -155,9 +155,9 @@ std::vector<Pose2> curved_route(const RouteScene& place, double length_m, double
         space.shortest_path(corners.back().position(), space.random_pose(random).position());
     if (!leg || leg->size() < 2 || distance(leg->front(), leg->back()) < 0.5) continue;
     // At most 100 degrees at once, if there is such a way.
-    constexpr int most_refused = 50;
+    constexpr int max_refused = 50;
     const double turn = angle_difference(direction((*leg)[0], (*leg)[1]), heading);
-    if (corners.size() > 1 && std::abs(turn) > radians(100.0) && ++refused < most_refused) continue;
+    if (corners.size() > 1 && std::abs(turn) > radians(100.0) && ++refused < max_refused) continue;
     refused = 0;
     for (std::size_t i = 1; i < leg->size(); ++i) {
       way_m += distance((*leg)[i - 1], (*leg)[i]);
@@ -169,12 +169,12 @@ std::vector<Pose2> curved_route(const RouteScene& place, double length_m, double
   const std::vector<Pose2> sharp = resample(corners, fine_m);
   // As round as leaves the room that the corners leave, but for a cell of the map.
   constexpr double cell_m = 0.025;
-  const double room_kept_m = std::min(least_clearance_m(place, sharp) - cell_m,
+  const double room_kept_m = std::min(min_clearance_m(place, sharp) - cell_m,
                                       place.scene.robot_radius_m + room_m - cell_m);
   std::vector<Pose2> way = sharp;
   for (const std::size_t reach : {10U, 7U, 5U, 3U, 2U}) {
     std::vector<Pose2> round = rounded(rounded(sharp, reach), reach);
-    if (least_clearance_m(place, round) < room_kept_m) continue;
+    if (min_clearance_m(place, round) < room_kept_m) continue;
     way = std::move(round);
     break;
   }
@@ -225,13 +225,13 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
   Pose2 robot = start_beside(place, path, start, options.start_off_m, random);
   tracker.set_pose(start);
   PathFollower follower(path, {.steering = {.step_m = options.step_m}});
-  const auto most_steps = static_cast<int>(3.0 * follower.length_m() / options.step_m) + 50;
+  const auto max_steps = static_cast<int>(3.0 * follower.length_m() / options.step_m) + 50;
   RouteRun run;
   Pose2 told;
   // Odometry carries over a few lines that tell nothing; after that the route must be looked for.
   constexpr int patience = 4;
   int unknown = 0;
-  for (int step = 0; step < most_steps; ++step) {
+  for (int step = 0; step < max_steps; ++step) {
     const auto line = take_line(*place.renderer, robot, place.camera, noise_of_lines.next());
     const auto found = tracker.track(line, told);
     run.truth.push_back(robot);

@@ -115,7 +115,7 @@ TEST_P(EveryMirrorPicture, RimAndCentreAreFoundToAFractionOfAPixel) {
   EXPECT_NEAR(mirror->centre.u_px, truth.centre.u_px, 0.5);
   EXPECT_NEAR(mirror->centre.v_px, truth.centre.v_px, 0.5);
   EXPECT_NEAR(mirror->rim_radius_px, truth.rim_px, 0.5);
-  EXPECT_GE(mirror->quality, MirrorSearchOptions{}.least_quality);
+  EXPECT_GE(mirror->quality, MirrorSearchOptions{}.min_quality);
   EXPECT_LE(mirror->quality, 1.0);
   if (truth.disc_px == 0) {
     // No disc was painted; a circle of the scene may stand out by chance, the centre must not be
@@ -238,8 +238,8 @@ TEST(FindMirror, RefusesWhatItCannotSearch) {
   const Image b(64, 65);
   const std::vector<ImageView> views{a.view(), b.view()};
   EXPECT_THROW((void)find_mirror(views), ContractError);
-  EXPECT_THROW((void)find_in(a, {.least_quality = 0}), OptionError);
-  EXPECT_THROW((void)find_in(a, {.smallest_rim = std::nan("")}), OptionError);
+  EXPECT_THROW((void)find_in(a, {.min_quality = 0}), OptionError);
+  EXPECT_THROW((void)find_in(a, {.min_rim = std::nan("")}), OptionError);
   EXPECT_FALSE(find_in(a));
 }
 
@@ -251,7 +251,7 @@ TEST(FindMirror, OptionsBoundTheRadius) {
   truth.disc_px = 0;
   const Image image = paint(truth);
   ASSERT_TRUE(find_in(image));
-  const auto bounded = find_in(image, {.largest_rim = 80.0 / 320});
+  const auto bounded = find_in(image, {.max_rim = 80.0 / 320});
   EXPECT_FALSE(bounded && std::abs(bounded->rim_radius_px - 100) < 5);
 }
 

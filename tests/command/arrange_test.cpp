@@ -37,14 +37,15 @@ TEST_F(Arrange, StoresAndTellsTheMap) {
   EXPECT_EQ(answer["views"], poses.size());
   ASSERT_EQ(answer["nodes"].size(), poses.size());
   EXPECT_EQ(answer["metric"], false);
-  ASSERT_GE(answer["parts"].size(), 1U);
-  EXPECT_EQ(answer["parts"][0]["handedness_known"], true);
+  ASSERT_GE(answer["connected_components"].size(), 1U);
+  EXPECT_EQ(answer["connected_components"][0]["handedness_known"], true);
   std::size_t counted = 0;
-  for (const auto& part : answer["parts"]) counted += part["views"].get<std::size_t>();
+  for (const auto& component : answer["connected_components"])
+    counted += component["views"].get<std::size_t>();
   EXPECT_EQ(counted, poses.size());
-  ASSERT_FALSE(answer["truth"].is_null());
-  EXPECT_LT(answer["truth"]["shape_difference"], 0.1);
-  EXPECT_GT(answer["truth"]["trustworthiness"], 0.8);
+  ASSERT_FALSE(answer["ground_truth"].is_null());
+  EXPECT_LT(answer["ground_truth"]["procrustes_disparity"], 0.1);
+  EXPECT_GT(answer["ground_truth"]["trustworthiness"], 0.8);
 
   const auto file = MemoryFile::open(memory, Access::read_only);
   const auto map = file.map("lattice");
@@ -56,7 +57,7 @@ TEST_F(Arrange, StoresAndTellsTheMap) {
   const auto poses_and_header = lines(bytes_of(folder / "map.tum"));
   ASSERT_FALSE(poses_and_header.empty());
   EXPECT_EQ(poses_and_header.front().front(), '#');
-  EXPECT_EQ(poses_and_header.size() - 1, answer["parts"][0]["views"]);
+  EXPECT_EQ(poses_and_header.size() - 1, answer["connected_components"][0]["views"]);
 }
 
 TEST_F(Arrange, LeavesTheMemoryAsItIsWhenToldSo) {

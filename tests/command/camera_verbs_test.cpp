@@ -82,7 +82,7 @@ TEST_F(CameraVerbs, CalibrateRefusesBadInput) {
   refused({out_ / "text.png"}, "text.png");
   refused({picture(0), out_ / "other.png"}, "64 x 48; allowed: 640 x 480");
   refused({picture(0), "--rim-elevation-deg", "100"}, "rim_elevation_deg is 100");
-  refused({picture(0), "--least-quality", "0"}, "least_quality is 0");
+  refused({picture(0), "--min-quality", "0"}, "min_quality is 0");
   EXPECT_TRUE(contains(refusal({"calibrate", picture(0)}), "--out is required"));
   EXPECT_TRUE(contains(refusal({"calibrate", picture(0), "-o", out_ / "text.png/camera.toml"}),
                        "text.png/camera.toml"));

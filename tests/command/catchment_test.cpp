@@ -113,7 +113,7 @@ TEST_F(Catchment, BadInputIsOneLine) {
   EXPECT_TRUE(contains(refusal({"catchment", run, "--bin-m", "-1"}), "> 0"));
   EXPECT_TRUE(contains(refusal({"catchment", run, "--goal", "none.png"}), "none.png"));
   EXPECT_TRUE(contains(refusal({"catchment", run, "--ahead", "2", "--goal", "x"}), "leave out"));
-  EXPECT_TRUE(contains(refusal({"catchment", run, "--longest-step-m", "0"}), "longest_step_m"));
+  EXPECT_TRUE(contains(refusal({"catchment", run, "--max-step-m", "0"}), "max_step_m"));
   std::ofstream(std::filesystem::path(run) / "poses.csv") << "file,x_m,y_m\n"
                                                           << view_name(0) << ",0,0\n";
   EXPECT_TRUE(contains(refusal({"catchment", run}), "has no heading"));

@@ -39,17 +39,17 @@ TEST_F(Evaluate, AShiftedCopyIsRightOnceAligned) {
         lines_of([](int i, double x, double y) { return tum(i, x + 3.0, y - 1.0); }));
   const auto said =
       answer_of({"evaluate", folder_ / "shifted.tum", folder_ / "truth.tum", "--json"});
-  for (const char* key : {"pairs", "left_out", "alignment", "position_m", "heading_rad",
-                          "relative_pairs", "relative_position_m", "relative_heading_rad"}) {
+  for (const char* key : {"pairs", "left_out", "alignment", "ate_m", "heading_rad",
+                          "relative_pairs", "rpe_m", "rpe_heading_rad"}) {
     EXPECT_TRUE(said.contains(key)) << key;
   }
   EXPECT_EQ(said["pairs"], 8);
-  EXPECT_NEAR(said["position_m"]["rms"], 0.0, 1e-9);
+  EXPECT_NEAR(said["ate_m"]["rmse"], 0.0, 1e-9);
   EXPECT_NEAR(said["alignment"]["x_m"], -3.0, 1e-9);
   EXPECT_NEAR(said["alignment"]["y_m"], 1.0, 1e-9);
   const auto as_is = run_panonav(
       {"evaluate", folder_ / "shifted.tum", folder_ / "truth.tum", "--align", "false", "--json"});
-  EXPECT_NEAR(json::parse(as_is.out)["position_m"]["rms"], std::sqrt(10.0), 1e-9);
+  EXPECT_NEAR(json::parse(as_is.out)["ate_m"]["rmse"], std::sqrt(10.0), 1e-9);
 }
 
 TEST_F(Evaluate, TextForPeopleSaysTheSame) {

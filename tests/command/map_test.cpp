@@ -44,8 +44,8 @@ class Map : public ::testing::Test {
 
 TEST_F(Map, EveryPictureBecomesANodeOfTheMap) {
   const json said = map({"--tum", folder_ / "m.tum", "--graphml", folder_ / "m.graphml"});
-  for (const char* key : {"memory", "pictures", "nodes", "skipped", "parts", "closures", "scale_m",
-                          "wheel_lengths", "step_ms", "truth"}) {
+  for (const char* key : {"memory", "pictures", "nodes", "skipped", "connected_components",
+                          "closures", "scale_m", "wheel_lengths", "step_ms", "ground_truth"}) {
     EXPECT_TRUE(said.contains(key)) << key;
   }
   EXPECT_EQ(said["nodes"], 100);
@@ -53,7 +53,7 @@ TEST_F(Map, EveryPictureBecomesANodeOfTheMap) {
   std::ifstream tum(folder_ / "m.tum");
   std::size_t lines = 0;
   for (std::string line; std::getline(tum, line);) lines += line.empty() || line[0] == '#' ? 0 : 1;
-  EXPECT_EQ(lines, said["parts"][0]);
+  EXPECT_EQ(lines, said["connected_components"][0]);
   EXPECT_TRUE(fs::exists(folder_ / "m.graphml"));
   run_well({"verify", memory()});
   // A second time the views are known, and the map is the same.
@@ -84,7 +84,7 @@ TEST_F(Map, PruneShrinksTheMemoryAndKeepsTheMapWhole) {
   const auto info = run_panonav({"info", memory(), "--json"});
   EXPECT_EQ(json::parse(info.out)["views"], result["views"]);
   EXPECT_GE(json::parse(info.out)["links"].get<int>(),
-            result["views"].get<int>() - static_cast<int>(said["parts"].size()));
+            result["views"].get<int>() - static_cast<int>(said["connected_components"].size()));
   run_well({"verify", memory()});
 }
 
@@ -134,7 +134,7 @@ TEST(MapOfADrive, TheHeightOfTheCameraTellsMetres) {
     arguments.insert(arguments.end(), more.begin(), more.end());
     const auto result = run_panonav(arguments);
     EXPECT_EQ(result.exit_code, 0) << result.err;
-    return json::parse(result.out)["truth"]["scale"].get<double>();
+    return json::parse(result.out)["ground_truth"]["scale"].get<double>();
   };
   // Narrow rooms: what stands on the ground makes lengths up to 15 % too long.
   EXPECT_NEAR(scale_with(folder / "ground.panonav", {"--camera-height-m", "0.6"}), 1.0, 0.2);

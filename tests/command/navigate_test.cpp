@@ -70,7 +70,7 @@ class Navigate : public ::testing::Test {
   inline static std::string with_route;
 };
 
-TEST_F(Navigate, ArrivesAndTellsEachLook) {
+TEST_F(Navigate, ArrivesAndReportsEachStep) {
   const auto result =
       run_panonav(there(with_route, {"--json", "--log", *folder / "run.log", "--picture",
                                      *folder / "run.png", "--route", "rows"}));
@@ -79,7 +79,7 @@ TEST_F(Navigate, ArrivesAndTellsEachLook) {
   ASSERT_GT(told.size(), 5U);
   int on_route = 0;
   for (std::size_t i = 0; i + 1 < told.size(); ++i) {
-    EXPECT_EQ(told[i]["look"], i + 1);
+    EXPECT_EQ(told[i]["step"], i + 1);
     EXPECT_EQ(told[i]["state"], i + 2 < told.size() ? "moving" : "arrived");
     EXPECT_TRUE(told[i]["nearest"].is_string());
     on_route += told[i]["on_route"].get<bool>() ? 1 : 0;
@@ -87,13 +87,13 @@ TEST_F(Navigate, ArrivesAndTellsEachLook) {
   EXPECT_GT(on_route, 0);
   const json& summary = told.back();
   EXPECT_EQ(summary["end"], "arrived");
-  EXPECT_EQ(summary["passages_from"], "lattice");
+  EXPECT_EQ(summary["edges_from"], "lattice");
   EXPECT_EQ(summary["route"], "rows");
-  EXPECT_EQ(summary["looks"], told.size() - 1);
+  EXPECT_EQ(summary["steps"], told.size() - 1);
   EXPECT_LT(summary["goal_distance_m"], 0.5 * spacing_m);
   EXPECT_GT(summary["shortest_m"], 4.0 * spacing_m);
   EXPECT_GT(summary["travelled_m"], summary["shortest_m"].get<double>() - 0.5 * spacing_m);
-  EXPECT_TRUE(summary["carried_after_look"].is_null());
+  EXPECT_TRUE(summary["kidnapped_after_step"].is_null());
 
   std::ifstream log(*folder / "run.log");
   std::size_t logged = 0;
@@ -117,7 +117,7 @@ TEST_F(Navigate, ArrangesViewsThatNothingConnects) {
   const auto result = run_panonav(there(bare, {"--json"}));
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const auto told = objects(result.out);
-  EXPECT_EQ(told.back()["passages_from"], "arrangement");
+  EXPECT_EQ(told.back()["edges_from"], "arrangement");
   EXPECT_LT(told.back()["goal_distance_m"], 0.5 * spacing_m);
 }
 
@@ -131,12 +131,12 @@ TEST_F(Navigate, NoticesThatItIsCarriedAway) {
   const auto told = objects(result.out);
   EXPECT_EQ(told.back()["end"], "arrived");
   EXPECT_LT(told.back()["goal_distance_m"], 0.5 * spacing_m);
-  ASSERT_TRUE(told.back()["carried_after_look"].is_number());
-  const auto carried = told.back()["carried_after_look"].get<std::size_t>();
+  ASSERT_TRUE(told.back()["kidnapped_after_step"].is_number());
+  const auto carried = told.back()["kidnapped_after_step"].get<std::size_t>();
   ASSERT_LT(carried, told.size() - 1);
   const Point2 back{told[carried]["pose"]["x_m"], told[carried]["pose"]["y_m"]};
   EXPECT_LT(distance(back, first.pose->position()), 1e-6);
-  // Three looks must agree before another place is believed.
+  // Three steps must agree before another place is believed.
   std::optional<std::size_t> noticed;
   for (std::size_t i = carried; i + 1 < told.size() && !noticed; ++i) {
     const Point2 here{told[i]["pose"]["x_m"], told[i]["pose"]["y_m"]};
@@ -176,7 +176,7 @@ TEST_F(Navigate, RefusesInOneLine) {
   wrong.back() = "1,2";
   EXPECT_TRUE(contains(refusal(wrong), "X,Y,HEADING_DEG"));
   wrong = ask(bare, view_near({0.0, 0.0}));
-  wrong.insert(wrong.end(), {"--passages", "links"});
+  wrong.insert(wrong.end(), {"--edges", "links"});
   EXPECT_TRUE(contains(refusal(wrong), "links"));
 
   // Routes beside which no view is known to lie, and none.
@@ -210,7 +210,7 @@ TEST_F(Navigate, RefusesInOneLine) {
   }
   const VisualMemory views = MemoryFile::open(lonely, Access::read_only).load();
   const std::string name = views.info(views.views().front()).name;
-  EXPECT_TRUE(contains(refusal(ask(lonely, name)), "no passage leads to the view " + name));
+  EXPECT_TRUE(contains(refusal(ask(lonely, name)), "no edge leads to the view " + name));
 }
 
 // A robot of somebody's own, in a hall that is remembered as three rows of views.
@@ -247,7 +247,7 @@ TEST(NavigateByLibrary, APictureInAndAVelocityOutWithOneAreaAtHand) {
 
   Pose2 robot{-3.4, 1.4, 1.0};
   NavigationStep step;
-  std::size_t most_loaded = 0;
+  std::size_t max_loaded = 0;
   int decisions = 0;
   int periods = 0;
   do {
@@ -255,7 +255,7 @@ TEST(NavigateByLibrary, APictureInAndAVelocityOutWithOneAreaAtHand) {
     seen.odometry = robot;
     step = navigator.step(seen);
     decisions += step.decided ? 1 : 0;
-    most_loaded = std::max(most_loaded, navigator.navigator().loaded_views());
+    max_loaded = std::max(max_loaded, navigator.navigator().loaded_views());
     robot = robot * motion_after(step.velocity, BaseOptions{}.period_s);
   } while (step.decision.state == NavigationState::moving && ++periods < 5000);
   EXPECT_EQ(step.decision.state, NavigationState::arrived);
@@ -263,7 +263,7 @@ TEST(NavigateByLibrary, APictureInAndAVelocityOutWithOneAreaAtHand) {
   EXPECT_LT(distance(robot.position(), poses[poses.size() - 2].position()), 0.25);
   EXPECT_GT(decisions, 30);
   EXPECT_GT(periods, 3 * decisions) << "steps go on between decisions";
-  EXPECT_LT(most_loaded, 45U) << "of " << poses.size();
+  EXPECT_LT(max_loaded, 45U) << "of " << poses.size();
   EXPECT_THROW(static_cast<void>(navigator.step(Image(97, 12))), ContractError);
   EXPECT_THROW(navigator.set_goal("nowhere.png"), FileError);
 }

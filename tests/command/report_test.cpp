@@ -75,8 +75,8 @@ void expect_tracked_and_navigated(const json& said) {
   EXPECT_EQ(said["missions"], 3);
   EXPECT_GE(said["missions_arrived"].get<int>(), 2);
   EXPECT_LT(said["mission_detour"].get<double>(), 2.5);
-  EXPECT_GE(said["mission_looks"].get<double>(), 2.0);
-  for (const char* key : {"mission_carried", "mission_screen"}) {
+  EXPECT_GE(said["mission_steps"].get<double>(), 2.0);
+  for (const char* key : {"mission_kidnapped", "mission_screen"}) {
     const json& run = said[key];
     if (run.is_null()) continue;  // no screen leaves a way round
     const std::string end = run["end"];
@@ -84,7 +84,7 @@ void expect_tracked_and_navigated(const json& said) {
     if (end == "arrived") {
       EXPECT_LE(run["goal_distance_m"].get<double>(), 0.25) << run;
     }
-    EXPECT_GE(run["looks"].get<int>(), 1);
+    EXPECT_GE(run["steps"].get<int>(), 1);
   }
 }
 
@@ -107,10 +107,10 @@ TEST_F(Demo, TellsTheWholeStoryTwiceAndLeavesAMemoryThatAnswers) {
   expect_eight_parts(out);
   expect_tracked_and_navigated(said);
   const auto log = lines(bytes_of(fs::path(out) / "mission.log"));
-  EXPECT_GT(log.size(), said["mission_carried"]["looks"].get<std::size_t>());
+  EXPECT_GT(log.size(), said["mission_kidnapped"]["steps"].get<std::size_t>());
   EXPECT_TRUE(contains(bytes_of(fs::path(out) / "track.html"), "</html>"));
-  EXPECT_LT(said["arranged_shape_difference"].get<double>(), 0.2);
-  EXPECT_LT(said["drive_shape_difference"].get<double>(), 0.1);
+  EXPECT_LT(said["arranged_procrustes_disparity"].get<double>(), 0.2);
+  EXPECT_LT(said["drive_procrustes_disparity"].get<double>(), 0.1);
   EXPECT_EQ(said["route_runs"], 2);
 
   const auto memory = answer_of({"info", out + "/office.panonav", "--json"});

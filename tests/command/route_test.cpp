@@ -71,8 +71,9 @@ std::vector<Pose2> straight(Point2 from, double heading_rad, double length_m, do
 }
 
 double error_m(const json& answer) {
-  return std::hypot(answer["pose"]["x_m"].get<double>() - answer["truth"]["x_m"].get<double>(),
-                    answer["pose"]["y_m"].get<double>() - answer["truth"]["y_m"].get<double>());
+  return std::hypot(
+      answer["pose"]["x_m"].get<double>() - answer["ground_truth"]["x_m"].get<double>(),
+      answer["pose"]["y_m"].get<double>() - answer["ground_truth"]["y_m"].get<double>());
 }
 
 double worst_error_m(const std::vector<json>& all) {
@@ -121,7 +122,7 @@ TEST_F(RouteVerbs, RecordsALineEveryTenCentimetresAndFollowsToTheCentimetre) {
   EXPECT_EQ(keys_of(all[0]),
             (std::set<std::string>{"file", "stamp_s", "on_route", "pose", "origin", "along_m",
                                    "lateral_m", "correlation", "residual", "covariance", "columns",
-                                   "changed", "truth"}));
+                                   "changed", "ground_truth"}));
   EXPECT_EQ(all[0]["origin"], "search");
   for (std::size_t i = 0; i < all.size(); ++i) {
     ASSERT_TRUE(all[i]["on_route"]) << i;
@@ -129,7 +130,8 @@ TEST_F(RouteVerbs, RecordsALineEveryTenCentimetresAndFollowsToTheCentimetre) {
       EXPECT_EQ(all[i]["origin"], "prediction") << i;
     }
     EXPECT_NEAR(all[i]["pose"]["heading_rad"].get<double>(), 0.15, radians(0.5));
-    EXPECT_NEAR(all[i]["along_m"].get<double>(), all[i]["truth"]["along_m"].get<double>(), 0.02);
+    EXPECT_NEAR(all[i]["along_m"].get<double>(), all[i]["ground_truth"]["along_m"].get<double>(),
+                0.02);
     EXPECT_NEAR(all[i]["lateral_m"].get<double>(), all[i]["pose"]["y_m"].get<double>(), 1e-6);
     EXPECT_TRUE(all[i]["changed"].empty()) << all[i]["changed"];
   }
@@ -176,7 +178,7 @@ TEST_F(RouteVerbs, ARouteGrowsWhereItEndsAndNowhereElse) {
   ASSERT_EQ(by_wheels.size(), 21U);
   for (const auto& answer : by_wheels) {
     EXPECT_TRUE(answer["on_route"]);
-    EXPECT_TRUE(answer["truth"].is_null());  // another frame
+    EXPECT_TRUE(answer["ground_truth"].is_null());  // another frame
   }
 }
 
@@ -311,10 +313,10 @@ TEST(RealRoute, SussexFollowedToThreeCentimetres) {
   std::vector<double> lateral_m;
   for (const auto& answer : all) {
     if (!answer["on_route"]) continue;
-    along_m.push_back(
-        std::abs(answer["along_m"].get<double>() - answer["truth"]["along_m"].get<double>()));
-    lateral_m.push_back(
-        std::abs(answer["lateral_m"].get<double>() - answer["truth"]["lateral_m"].get<double>()));
+    along_m.push_back(std::abs(answer["along_m"].get<double>() -
+                               answer["ground_truth"]["along_m"].get<double>()));
+    lateral_m.push_back(std::abs(answer["lateral_m"].get<double>() -
+                                 answer["ground_truth"]["lateral_m"].get<double>()));
   }
   EXPECT_GE(along_m.size(), 400U);
   EXPECT_LE(median(along_m), 0.03);

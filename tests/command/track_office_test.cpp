@@ -61,8 +61,8 @@ Followed follow(std::vector<std::string> arguments) {
 }
 
 double error_m(const json& image) {
-  const double x = image["pose"]["x_m"].get<double>() - image["truth"]["x_m"].get<double>();
-  const double y = image["pose"]["y_m"].get<double>() - image["truth"]["y_m"].get<double>();
+  const double x = image["pose"]["x_m"].get<double>() - image["ground_truth"]["x_m"].get<double>();
+  const double y = image["pose"]["y_m"].get<double>() - image["ground_truth"]["y_m"].get<double>();
   return std::hypot(x, y);
 }
 
@@ -80,7 +80,7 @@ TEST_F(TrackOffice, IsFoundSoonAndFollowedToTheEnd) {
     errors.push_back(error_m(*image));
     EXPECT_LT(errors.back(), spacing_m) << (*image)["file"];
     EXPECT_LT(std::abs(angle_difference((*image)["pose"]["heading_rad"],
-                                        (*image)["truth"]["heading_rad"])),
+                                        (*image)["ground_truth"]["heading_rad"])),
               radians(15.0))
         << (*image)["file"];
   }
@@ -134,7 +134,7 @@ TEST_F(TrackOffice, EvaluateReadsTheTrajectoryAndFindsTheSameErrors) {
   const auto said =
       answer_of({"evaluate", tum, run() + "/poses.csv", "--align", "false", "--json"});
   EXPECT_EQ(said["pairs"], errors.size());
-  EXPECT_NEAR(said["position_m"]["median"], median(errors), 1e-6);
+  EXPECT_NEAR(said["ate_m"]["median"], median(errors), 1e-6);
 }
 
 TEST_F(TrackOffice, TheReportHoldsPicturesAndARunToPlay) {
@@ -170,7 +170,7 @@ TEST_F(TrackOffice, TheReportHoldsPicturesAndARunToPlay) {
     const json& shown = data["images"][i];
     EXPECT_EQ(shown["file"], images[i]["file"]);
     EXPECT_EQ(shown["state"], images[i]["state"]);
-    EXPECT_NEAR(shown["truth"][0], images[i]["truth"]["x_m"], 0.001);
+    EXPECT_NEAR(shown["ground_truth"][0], images[i]["ground_truth"]["x_m"], 0.001);
     EXPECT_GE(shown["particles"].size(), 2U * 100U);
     EXPECT_LE(shown["particles"].size(), 2U * 300U);
   }

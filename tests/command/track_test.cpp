@@ -97,8 +97,8 @@ TEST_F(Track, JsonLinesHaveExactlyTheDocumentedFields) {
     const json& image = all[i];
     EXPECT_EQ(keys_of(image), (std::set<std::string>{
                                   "file", "stamp_s", "state", "pose", "inside", "modes", "spread_m",
-                                  "particles", "effective_particles", "resampled", "redrawn",
-                                  "difference_here", "difference_anywhere", "truth"}));
+                                  "particles", "effective_particles", "resampled", "injected",
+                                  "difference_here", "difference_anywhere", "ground_truth"}));
     EXPECT_EQ(image["file"], view_name(i));
     EXPECT_EQ(image["stamp_s"], 0.5 * static_cast<double>(i));
     const std::string state = image["state"];
@@ -107,14 +107,14 @@ TEST_F(Track, JsonLinesHaveExactlyTheDocumentedFields) {
     if (!image["pose"].is_null()) {
       EXPECT_EQ(keys_of(image["pose"]), (std::set<std::string>{"x_m", "y_m", "heading_rad"}));
     }
-    EXPECT_NEAR(image["truth"]["x_m"], truth[i].x_m, 1e-12);
-    EXPECT_NEAR(image["truth"]["heading_rad"], truth[i].heading_rad, 1e-12);
+    EXPECT_NEAR(image["ground_truth"]["x_m"], truth[i].x_m, 1e-12);
+    EXPECT_NEAR(image["ground_truth"]["heading_rad"], truth[i].heading_rad, 1e-12);
     EXPECT_GE(image["particles"].get<int>(), 1);
     EXPECT_LE(image["effective_particles"].get<double>(), image["particles"].get<double>() + 1e-6);
     EXPECT_GE(image["inside"].get<double>(), 0.0);
     EXPECT_LE(image["inside"].get<double>(), 1.0);
     EXPECT_EQ(image["inside"].get<double>() < 0.5, state == "lost");
-    EXPECT_GE(image["redrawn"].get<int>(), 0);
+    EXPECT_GE(image["injected"].get<int>(), 0);
     EXPECT_TRUE(image["resampled"].is_boolean());
     double weight = 0.0;
     double last = 1.0;
@@ -163,7 +163,7 @@ TEST_F(Track, EveryNthPictureIsLookedAtWithAllOdometryBetween) {
   ASSERT_EQ(all.size(), 4U);
   for (std::size_t i = 0; i < all.size(); ++i) EXPECT_EQ(all[i]["file"], view_name(6 * i));
   // Without noise, and from the true start, odometry alone carries the particles along the circle.
-  std::vector<std::string> blind{run(), "--every", "6", "--redraw", "none"};
+  std::vector<std::string> blind{run(), "--every", "6", "--injection", "none"};
   for (const char* noise : {"translation-from-translation", "translation-from-rotation",
                             "rotation-from-translation", "rotation-from-rotation"}) {
     blind.insert(blind.end(), {std::string("--odometry-") + noise, "0"});
@@ -172,28 +172,30 @@ TEST_F(Track, EveryNthPictureIsLookedAtWithAllOdometryBetween) {
                              "--start-deviation-m", "0", "--start-heading-deviation-deg", "0"});
   for (const auto& image : tracked(blind)) {
     ASSERT_EQ(image["modes"].size(), 1U);
-    EXPECT_NEAR(image["modes"][0]["x_m"], image["truth"]["x_m"], 1e-6);
-    EXPECT_NEAR(image["modes"][0]["y_m"], image["truth"]["y_m"], 1e-6);
-    EXPECT_NEAR(angle_difference(image["modes"][0]["heading_rad"], image["truth"]["heading_rad"]),
-                0.0, 1e-6);
+    EXPECT_NEAR(image["modes"][0]["x_m"], image["ground_truth"]["x_m"], 1e-6);
+    EXPECT_NEAR(image["modes"][0]["y_m"], image["ground_truth"]["y_m"], 1e-6);
+    EXPECT_NEAR(
+        angle_difference(image["modes"][0]["heading_rad"], image["ground_truth"]["heading_rad"]),
+        0.0, 1e-6);
   }
 }
 
 TEST_F(Track, AKnownHeadingAloneLeavesThePlaceOpen) {
   // No odometry noise in the heading, no compass: all particles keep the heading they start with.
-  const auto all = tracked({run(), "--start-heading-deg", "90", "--redraw", "none", "--compass",
+  const auto all = tracked({run(), "--start-heading-deg", "90", "--injection", "none", "--compass",
                             "false", "--odometry-rotation-from-translation", "0",
                             "--odometry-rotation-from-rotation", "0"});
   ASSERT_EQ(all.size(), static_cast<std::size_t>(count));
   for (const auto& image : all) {
     for (const auto& mode : image["modes"]) {
-      EXPECT_NEAR(angle_difference(mode["heading_rad"], image["truth"]["heading_rad"]), 0.0, 1e-6);
+      EXPECT_NEAR(angle_difference(mode["heading_rad"], image["ground_truth"]["heading_rad"]), 0.0,
+                  1e-6);
     }
   }
   const json& last = all.back();
   ASSERT_FALSE(last["modes"].empty());
-  EXPECT_NEAR(last["modes"][0]["x_m"], last["truth"]["x_m"], 0.5);
-  EXPECT_NEAR(last["modes"][0]["y_m"], last["truth"]["y_m"], 0.5);
+  EXPECT_NEAR(last["modes"][0]["x_m"], last["ground_truth"]["x_m"], 0.5);
+  EXPECT_NEAR(last["modes"][0]["y_m"], last["ground_truth"]["y_m"], 0.5);
 }
 
 TEST_F(Track, TextSaysTheSameAsJson) {
@@ -247,7 +249,7 @@ TEST_F(Track, WithoutStampsATrajectoryCountsPictures) {
   EXPECT_TRUE(contains(result.err, "no column 'stamp_s'"));
   ASSERT_EQ(lines(result.out).size(), 4U);
   for (const auto& line : lines(result.out)) {
-    EXPECT_TRUE(json::parse(line)["truth"].is_null());
+    EXPECT_TRUE(json::parse(line)["ground_truth"].is_null());
     EXPECT_TRUE(json::parse(line)["stamp_s"].is_null());
   }
   EXPECT_TRUE(std::filesystem::exists(tum));
@@ -314,10 +316,10 @@ TEST_F(Track, WrongValuesAreNamedWithTheirRange) {
       contains(refused({"--start-heading-deg", "north"}), "--start-heading-deg is 'north'"));
   EXPECT_TRUE(contains(refused({"--start-deviation-m", "-1"}), "deviation_m is -1"));
   EXPECT_TRUE(contains(refused({"--start-deviation-m", "1"}), "go with --start-x-m"));
-  EXPECT_TRUE(contains(refused({"--redraw", "sometimes"}), "redraw"));
+  EXPECT_TRUE(contains(refused({"--injection", "sometimes"}), "injection"));
   EXPECT_TRUE(contains(refused({"--kld-error", "2"}), "kld_error is 2"));
-  EXPECT_TRUE(contains(refused({"--least-particles", "300", "--most-particles", "200"}),
-                       "--least-particles is 300; allowed: at most"));
+  EXPECT_TRUE(contains(refused({"--min-particles", "300", "--max-particles", "200"}),
+                       "--min-particles is 300; allowed: at most"));
   EXPECT_TRUE(contains(refusal({"track", memory(), *folder_ / "nowhere"}), "nowhere"));
   EXPECT_TRUE(contains(refusal({"track", *folder_ / "no.panonav", run()}), "no.panonav"));
   EXPECT_TRUE(contains(refused({"--tum", *folder_ / "nowhere/estimate.tum"}), "estimate.tum"));

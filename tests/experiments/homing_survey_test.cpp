@@ -105,7 +105,7 @@ TEST(HomingSurvey, StepsLeadToTheNearestPlaceAsBruteForceFindsIt) {
     for (std::size_t p = 0; p < places.size(); ++p) {
       const double away = distance(goals[g].position(), places[p].position());
       const double angle = std::atan2(goals[g].y_m - places[p].y_m, goals[g].x_m - places[p].x_m);
-      const double step = std::min(options.longest_step_m, away);
+      const double step = std::min(options.max_step_m, away);
       const Point2 to{places[p].x_m + step * std::cos(angle + 0.4),
                       places[p].y_m + step * std::sin(angle + 0.4)};
       std::size_t nearest = p;
@@ -130,7 +130,7 @@ TEST(HomingSurvey, NoStepLeadsOverAGapAndStagesGoOnWhereTheLastStopped) {
     if (x < 4 || x > 6) places.push_back({x * spacing_m, 0.0, 0.0});
   }
   const std::vector<Pose2> goals{{0.0, 0.0, 0.0}};
-  HomingSurveyOptions options{.longest_step_m = 0.025};
+  HomingSurveyOptions options{.max_step_m = 0.025};
   Executor executor(1);
   // The first stage stops 2 spacings before the goal, the second goes on to it.
   const auto survey_until = [&](double stop_m) {
@@ -148,7 +148,7 @@ TEST(HomingSurvey, NoStepLeadsOverAGapAndStagesGoOnWhereTheLastStopped) {
   EXPECT_EQ(final_places(std::span(stages).first(1), 0),
             (std::vector<std::uint32_t>{0, 1, 2, 2, 4, 4, 4, 4, 4}));
   EXPECT_EQ(final_places(stages, 0), (std::vector<std::uint32_t>{0, 0, 0, 0, 4, 4, 4, 4, 4}));
-  options.most_steps = 1;
+  options.max_steps = 1;
   EXPECT_EQ(final_places(stages, 0, options),
             (std::vector<std::uint32_t>{0, 0, 1, 1, 4, 4, 4, 5, 6}));
 }
@@ -176,8 +176,7 @@ TEST(HomingSurvey, RefusesWhatMakesNoSense) {
   const std::vector<Pose2> none;
   EXPECT_THROW((void)survey_homing(none, poses, rule, {}, executor), ContractError);
   EXPECT_THROW((void)survey_homing(poses, none, rule, {}, executor), ContractError);
-  EXPECT_THROW((void)survey_homing(poses, poses, rule, {.longest_step_m = 0.0}, executor),
-               OptionError);
+  EXPECT_THROW((void)survey_homing(poses, poses, rule, {.max_step_m = 0.0}, executor), OptionError);
   const std::vector<Pose2> far{{std::nan(""), 0.0, 0.0}};
   EXPECT_THROW((void)survey_homing(far, poses, rule, {}, executor), ContractError);
   EXPECT_THROW((void)final_places({}, 0), ContractError);

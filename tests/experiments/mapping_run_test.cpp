@@ -44,7 +44,7 @@ TEST(MappingRun, ARoundTripIsClosedAndMeasured) {
   EXPECT_EQ(closed.wrong_closures, 0U);
   EXPECT_GT(closed.mean_step_s, 0.0);
   const auto captured =
-      map_recording(recording, {.mapping = {.capture_difference = 0.1}, .most_nodes = 20});
+      map_recording(recording, {.mapping = {.capture_difference = 0.1}, .max_nodes = 20});
   EXPECT_LE(captured.number.size(), 20U);
   EXPECT_TRUE(std::ranges::is_sorted(captured.number));
   const auto alone =

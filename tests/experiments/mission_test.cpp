@@ -84,16 +84,16 @@ TEST(Missions, ARobotThatIsCarriedAwayFindsItsGoalAllTheSame) {
   Executor executor(2);
   const MissionPlace place = make_mission_place(make_scene("office", {.seed = 72}), executor);
   const RememberedPlace remembered = remember_grid(place, 0.4, 5, executor);
-  const auto missions = random_missions(place, remembered, {.count = 8, .carried = true}, 4);
+  const auto missions = random_missions(place, remembered, {.count = 8, .kidnapped = true}, 4);
   const auto runs = run_missions(place, remembered, missions, {}, 10, executor);
   int carried = 0;
   int arrived = 0;
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    if (!runs[i].carried_at) continue;
+    if (!runs[i].kidnapped_at) continue;
     ++carried;
-    const std::size_t next = *runs[i].carried_at + 1;
+    const std::size_t next = *runs[i].kidnapped_at + 1;
     ASSERT_LT(next, runs[i].path.size());
-    EXPECT_EQ(runs[i].path[next], *missions[i].carried_to);
+    EXPECT_EQ(runs[i].path[next], *missions[i].kidnapped_to);
     arrived += static_cast<int>(runs[i].arrives(0.2));
   }
   ASSERT_GE(carried, 4);

@@ -32,7 +32,7 @@ TEST(LineCamera, SeesTheHorizonOfTheWholePicture) {
   Executor executor(1);
   const Image picture = take_picture(renderer, pose, camera.camera, {.camera_height_m = 0.6},
                                      camera.sensor, 1, executor);
-  const auto whole = horizon_line(camera.unwarper.unwrap(picture.view()), camera.line);
+  const auto whole = horizon_scanline(camera.unwarper.unwrap(picture.view()), camera.line);
   const auto line = take_line(renderer, pose, camera, 1);
   ASSERT_EQ(line.size(), 360U);
   double off = 0.0;

@@ -79,7 +79,7 @@ TEST(HomingPursuit, EndsThoughTheThingsAroundAreMuchNearerThanAssumed) {
   // Every step goes far beyond the goal: without a shorter step it would run to and fro for ever.
   const ToyWorld world = striped_round_room(3.0, 8);
   const Pose2 home{0.2, 0.1, 1.0};
-  const HomingPursuitOptions far{.typical_distance_m = 9.0, .longest_step_m = 2.0};
+  const HomingPursuitOptions far{.typical_distance_m = 9.0, .max_step_m = 2.0};
   const Ended end = run(world, HomingPursuit(seen_from(world, home), far), {0.5, -0.1, 2.0});
   EXPECT_EQ(end.state, PursuitState::arrived);
   EXPECT_LT(distance(end.pose.position(), home.position()), 0.1);
@@ -121,7 +121,7 @@ TEST(HomingPursuit, StopsAtOnceAtHomeAndStaysStopped) {
 
 TEST(HomingPursuit, GivesUpAfterTheMostSteps) {
   const ToyWorld world = striped_round_room(3.0, 10);
-  HomingPursuit pursuit(seen_from(world, {}), {.most_steps = 3});
+  HomingPursuit pursuit(seen_from(world, {}), {.max_steps = 3});
   const HomingView stuck = seen_from(world, {0.9, 0.0, 0.0});
   for (int i = 0; i < 3; ++i) EXPECT_EQ(pursuit.decide(stuck).state, PursuitState::moving);
   EXPECT_EQ(pursuit.decide(stuck).state, PursuitState::exhausted);
@@ -148,7 +148,7 @@ TEST(HomingPursuit, CoarseToFineGoesThroughItsStages) {
 TEST(HomingPursuit, ChecksItsInputs) {
   const ToyWorld world = striped_round_room(3.0, 12);
   EXPECT_THROW(HomingPursuit(seen_from(world, {}), {.typical_distance_m = 0.0}), OptionError);
-  EXPECT_THROW(HomingPursuit(seen_from(world, {}), {.most_steps = 0}), OptionError);
+  EXPECT_THROW(HomingPursuit(seen_from(world, {}), {.max_steps = 0}), OptionError);
   HomingPursuit pursuit(seen_from(world, {}));
   const std::vector<float> zeros(2 * 14);
   EXPECT_THROW((void)pursuit.decide(HomingView(2, 14, zeros, zeros)), ContractError) << "rows";

@@ -97,7 +97,7 @@ TEST_P(Distance, SketchBoundsFollowTheirDefinition) {
     EXPECT_EQ(smallest, *std::ranges::min_element(bounds));
     for (std::size_t view = 0; view < bounds.size(); ++view) {
       std::int64_t expected =
-          made.query.constant - std::min(made.slacks[view], made.query.largest_slack);
+          made.query.constant - std::min(made.slacks[view], made.query.max_slack);
       for (std::size_t i = 0; i < groups * 8; ++i) {
         if (made.mask[i] == 0) continue;
         const std::uint8_t code =

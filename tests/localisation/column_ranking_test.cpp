@@ -59,7 +59,7 @@ TEST(ColumnRanking, FindsThePlaceWhereSomebodyStandsInView) {
     const RememberedRoom place(seed, {6.0, 4.0, 4, 0.15}, 0.4);
     const Localiser localiser(place.memory);
     const Localiser plain(place.memory, localiser.place_model(), localiser.position_model(),
-                          {.compared_views = 0});
+                          {.reranked_views = 0});
     Random random(seed, 5);
     for (int i = 0; i < 25; ++i) {
       const Pose2 pose = place.room.between(place.grid, place.step_m, random);

@@ -89,7 +89,7 @@ TEST(MonteCarlo, FindsItselfFromNothingAndStaysThere) {
 TEST(MonteCarlo, WeightsSumToOneAndNumbersStayWithinTheirBounds) {
   const RememberedRoom place(72, {}, 0.4);
   MonteCarloLocaliser filter =
-      quick_filter(place.memory, {.least_particles = 50, .most_particles = 700});
+      quick_filter(place.memory, {.min_particles = 50, .max_particles = 700});
   EXPECT_EQ(filter.particles().size(), 700U);
   const Walk run = walk(place, 12, 5);
   bool fewer = false;
@@ -143,12 +143,12 @@ TEST(MonteCarlo, IsFoundAgainAfterItWasCarriedAway) {
   const RememberedRoom place(74, {}, 0.3);
   const auto ranking = std::make_shared<const ColumnRanking>(place.memory);
   const ObservationModel model = learn_observation_model(*ranking);
-  const auto images_needed = [&](Redraw redraw) {
+  const auto images_needed = [&](ParticleInjection injection) {
     std::vector<int> needed;
     for (int seed = 1; seed <= 10; ++seed) {
       const Walk before = walk(place, 6, 200 + static_cast<std::uint64_t>(seed));
       const Walk after = walk(place, 12, 300 + static_cast<std::uint64_t>(seed));
-      MonteCarloLocaliser filter(ranking, model, {.redraw = redraw, .seed = seed});
+      MonteCarloLocaliser filter(ranking, model, {.injection = injection, .seed = seed});
       for (std::size_t k = 0; k < before.poses.size(); ++k) {
         if (k > 0) filter.move(before.step(k));
         filter.observe(before.views[k]);
@@ -165,8 +165,8 @@ TEST(MonteCarlo, IsFoundAgainAfterItWasCarriedAway) {
     std::ranges::sort(needed);
     return needed;
   };
-  const auto explained = images_needed(Redraw::explained);
-  const auto topological = images_needed(Redraw::topological);
+  const auto explained = images_needed(ParticleInjection::explained);
+  const auto topological = images_needed(ParticleInjection::topological);
   EXPECT_LE(explained[explained.size() / 2], 2);
   EXPECT_LE(explained[explained.size() * 9 / 10 - 1], 8);
   EXPECT_LE(topological[topological.size() / 2], 3);
@@ -213,7 +213,7 @@ TEST(MonteCarlo, KnowsItsHeadingAndPlaceWhenTheyAreTold) {
   const RememberedRoom place(77, {}, 0.4);
   const Walk run = walk(place, 2, 7);
   MonteCarloLocaliser filter =
-      quick_filter(place.memory, {.least_particles = 300, .most_particles = 300});
+      quick_filter(place.memory, {.min_particles = 300, .max_particles = 300});
   filter.start_anywhere(0.7);
   for (const double heading_rad : filter.particles().heading_rad) EXPECT_EQ(heading_rad, 0.7);
   filter.start_at(run.poses[0], 0.05, 0.02);
@@ -311,9 +311,9 @@ TEST(MonteCarlo, WorksWithoutHeadingsInTheMemory) {
 
 TEST(MonteCarlo, RefusesWhatMakesNoSense) {
   const RememberedRoom place(81, {}, 0.5);
-  EXPECT_THROW(quick_filter(place.memory, {.least_particles = 10, .most_particles = 5}),
+  EXPECT_THROW(quick_filter(place.memory, {.min_particles = 10, .max_particles = 5}),
                ContractError);
-  EXPECT_THROW(quick_filter(place.memory, {.least_particles = 0}), OptionError);
+  EXPECT_THROW(quick_filter(place.memory, {.min_particles = 0}), OptionError);
   EXPECT_THROW(quick_filter(place.memory, {}, {.translation_from_translation = -1.0}), OptionError);
   MonteCarloLocaliser filter = quick_filter(place.memory);
   EXPECT_THROW(filter.observe(pack(compute_signature(place.room.see({1.0, 1.0, 0.0}, 12)), 1.0F)),

@@ -25,7 +25,7 @@ TEST(PlaceModel, OfATinyMemoryIsNotLearnt) {
   const Room room(7, {});
   const std::vector<Point2> grid = room.grid(0.5);
   std::vector<FourierSignature> views;
-  for (int i = 0; i < PlaceModel::least_views - 1; ++i) {
+  for (int i = 0; i < PlaceModel::min_views - 1; ++i) {
     views.push_back(compute_signature(room.see({grid[i].x_m, grid[i].y_m, 0.0})));
     const VisualMemory memory = make_memory(views);
     const PlaceModel model = learn_place_model(ColumnRanking(memory));

@@ -91,7 +91,7 @@ TEST(PositionModel, OfFewOrUnposedViewsIsTheNearestReference) {
   const RememberedRoom place(23, {}, 0.5);
   std::vector<FourierSignature> views;
   std::vector<std::optional<ReferencePose>> poses;
-  for (int i = 0; i < PositionModel::least_views; ++i) {
+  for (int i = 0; i < PositionModel::min_views; ++i) {
     views.push_back(place.memory.signature(place.memory.views()[i]));
     poses.push_back(place.memory.info(place.memory.views()[i]).pose);
   }

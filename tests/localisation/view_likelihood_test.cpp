@@ -189,10 +189,10 @@ TEST(ViewLikelihood, ANewViewForgetsTheLast) {
   const double first = likelihood.compare(0);
   EXPECT_EQ(likelihood.compare(0), first);  // once is enough
   EXPECT_EQ(likelihood.compared_sites().size(), 1U);
-  EXPECT_EQ(*likelihood.least_difference(likelihood.compared_sites()), first);
+  EXPECT_EQ(*likelihood.min_difference(likelihood.compared_sites()), first);
   likelihood.begin(seen(place, truth));
   EXPECT_FALSE(likelihood.compared(0));
-  EXPECT_FALSE(likelihood.least_difference(std::vector<std::uint32_t>{0}));
+  EXPECT_FALSE(likelihood.min_difference(std::vector<std::uint32_t>{0}));
   EXPECT_EQ(log_ratio(likelihood, truth), 0.0);  // nothing compared, nothing explained
 }
 

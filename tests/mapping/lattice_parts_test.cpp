@@ -1,4 +1,4 @@
-// The parts of the lattice: curve, graph, solver.
+// The components of the lattice: curve, graph, solver.
 
 #include <gtest/gtest.h>
 
@@ -29,7 +29,7 @@ TEST(DissimilarityCurve, FindsTheCurveThatPairsFollow) {
   for (const double distance : {0.1, 0.5, 1.0, 1.8}) {
     EXPECT_NEAR(curve.distance(truth(distance)), distance, 0.02) << distance;
   }
-  EXPECT_NEAR(curve.largest_dissimilarity(), 76.0, 1e-9);
+  EXPECT_NEAR(curve.max_dissimilarity(), 76.0, 1e-9);
   EXPECT_NEAR(curve.range(), -std::log(0.24), 0.02);
   EXPECT_EQ(curve.distance(0.0), 0.0);
 }
@@ -79,7 +79,7 @@ TEST(DissimilarityCurve, RefusesWhatIsNoNumber) {
 TEST(LatticeGraph, PartsAndWays) {
   const std::vector<GraphEdge> edges{{5, 6, 1.0}, {0, 1, 1.0}, {1, 2, 2.0}, {0, 2, 4.0}};
   const LatticeGraph graph(7, edges);
-  EXPECT_EQ(graph.parts(), (std::vector<std::size_t>{0, 0, 0, 2, 3, 1, 1}));
+  EXPECT_EQ(graph.components(), (std::vector<std::size_t>{0, 0, 0, 2, 3, 1, 1}));
   const auto ways = graph.shortest_ways(0);
   EXPECT_EQ(ways[2], 3.0);
   EXPECT_TRUE(std::isinf(ways[5]));
@@ -150,7 +150,7 @@ std::vector<Pose2> shaken(const World& world, std::uint64_t seed, double by) {
   return poses;
 }
 
-double rms_to_truth(const World& world, const std::vector<Pose2>& poses) {
+double rms_to_ground_truth(const World& world, const std::vector<Pose2>& poses) {
   std::vector<Point2> truth;
   std::vector<Point2> found;
   for (const Pose2& pose : world.truth) truth.push_back(pose.position());
@@ -163,9 +163,9 @@ TEST(LatticeSolver, ExactSpringsGiveTheTruth) {
     const World world = random_world(4, directions);
     ASSERT_GT(world.springs.size(), 100U);
     auto poses = shaken(world, 5, 0.1);
-    ASSERT_GT(rms_to_truth(world, poses), 0.05);
+    ASSERT_GT(rms_to_ground_truth(world, poses), 0.05);
     const auto solution = solve_lattice(world.springs, poses);
-    EXPECT_LT(rms_to_truth(world, poses), 1e-4);
+    EXPECT_LT(rms_to_ground_truth(world, poses), 1e-4);
     EXPECT_LT(solution.energy, 1e-3);
     for (const double weight : solution.weights) EXPECT_GT(weight, 0.99);
   }
@@ -190,7 +190,7 @@ TEST(LatticeSolver, GivesUpSpringsThatContradictTheOthers) {
   ASSERT_GT(world.springs.size(), right + 20);
   auto poses = shaken(world, 8, 0.1);
   const auto solution = solve_lattice(world.springs, poses);
-  EXPECT_LT(rms_to_truth(world, poses), 0.01);
+  EXPECT_LT(rms_to_ground_truth(world, poses), 0.01);
   for (std::size_t s = 0; s < world.springs.size(); ++s) {
     if (s < right) {
       EXPECT_GT(solution.weights[s], 0.9);

@@ -88,8 +88,8 @@ TEST(Lattice, UnorderedViewsArrangeThemselvesLikeTheirRoom) {
     ASSERT_GT(place.memory.size(), 60U);
     const Lattice lattice = arrange(place.memory);
     ASSERT_EQ(lattice.nodes.size(), place.memory.size());
-    ASSERT_EQ(lattice.parts.size(), 1U);
-    EXPECT_TRUE(lattice.parts[0].handedness_known);
+    ASSERT_EQ(lattice.components.size(), 1U);
+    EXPECT_TRUE(lattice.components[0].handedness_known);
     EXPECT_FALSE(lattice.metric);
     // No mirror image is allowed: directions tell which one it is.
     const auto truth = true_positions(place.memory);
@@ -135,8 +135,8 @@ TEST(Lattice, SameBitsOnAnyNumberOfThreads) {
 TEST(Lattice, WithoutPhasesHandednessIsUnknown) {
   const Place place(6, 0.4);
   const Lattice lattice = arrange(place.memory, {.phases = false});
-  ASSERT_FALSE(lattice.parts.empty());
-  for (const auto& part : lattice.parts) EXPECT_FALSE(part.handedness_known);
+  ASSERT_FALSE(lattice.components.empty());
+  for (const auto& component : lattice.components) EXPECT_FALSE(component.handedness_known);
   for (const auto& spring : lattice.springs) EXPECT_FALSE(spring.phases.has_value());
   // Worse than with phases.
   const auto difference =
@@ -180,7 +180,7 @@ TEST(Lattice, CoarseMotionGivesMetres) {
   }
   const Lattice lattice = arrange(place.memory, {}, motion);
   EXPECT_TRUE(lattice.metric);
-  ASSERT_EQ(lattice.parts.size(), 1U);
+  ASSERT_EQ(lattice.components.size(), 1U);
   const auto fit =
       align(positions_of(lattice), true_positions(place.memory), {.allow_scale = true});
   EXPECT_NEAR(fit.scale, 1.0, 0.2);
@@ -199,12 +199,12 @@ TEST(Lattice, DisconnectedGroupsStayParts) {
     }
   }
   const Lattice lattice = arrange(memory_of(signatures));
-  ASSERT_GE(lattice.parts.size(), 2U);
+  ASSERT_GE(lattice.components.size(), 2U);
   for (const auto& spring : lattice.springs) EXPECT_EQ(room_of[spring.a], room_of[spring.b]);
   std::size_t counted = 0;
-  for (const auto& part : lattice.parts) counted += part.views;
+  for (const auto& component : lattice.components) counted += component.views;
   EXPECT_EQ(counted, signatures.size());
-  EXPECT_GE(lattice.parts[1].views, 20U);
+  EXPECT_GE(lattice.components[1].views, 20U);
 }
 
 TEST(Lattice, DegenerateMemories) {
@@ -216,11 +216,11 @@ TEST(Lattice, DegenerateMemories) {
   const Lattice one = arrange(memory_of({here}));
   ASSERT_EQ(one.nodes.size(), 1U);
   EXPECT_EQ(one.nodes[0].pose, Pose2{});
-  EXPECT_EQ(one.parts.size(), 1U);
+  EXPECT_EQ(one.components.size(), 1U);
 
   const FourierSignature there = seen(room, {1.2, 1.0, 0.5});
   const Lattice two = arrange(memory_of({here, there}));
-  ASSERT_EQ(two.parts.size(), 1U);
+  ASSERT_EQ(two.components.size(), 1U);
   EXPECT_NEAR(distance(two.nodes[0].pose.position(), two.nodes[1].pose.position()), 1.0, 1e-3);
   EXPECT_NEAR(two.nodes[1].pose.heading_rad, 0.5, radians(5.0));
   EXPECT_NEAR(std::atan2(two.nodes[1].pose.y_m, two.nodes[1].pose.x_m), 0.0, radians(20.0));
@@ -245,7 +245,7 @@ TEST(Lattice, AViewTwiceLiesAtOnePlace) {
     signatures.push_back(seen(room, {p.x_m, p.y_m, 0.0}));
   signatures.push_back(turn(signatures[7], 0.7));
   const Lattice lattice = arrange(memory_of(signatures));
-  ASSERT_EQ(lattice.nodes[7].part, lattice.nodes.back().part);
+  ASSERT_EQ(lattice.nodes[7].component, lattice.nodes.back().component);
   const Pose2& first = lattice.nodes[7].pose;
   const Pose2& again = lattice.nodes.back().pose;
   EXPECT_LT(distance(first.position(), again.position()), 0.15);
@@ -273,12 +273,12 @@ TEST(Lattice, ViewsThatCameLaterFindTheirPlace) {
   for (std::size_t i = first; i < order.size(); ++i) memory.remove(all.views()[i]);
   Lattice lattice = arrange(memory);
   ASSERT_EQ(lattice.nodes.size(), first);
-  ASSERT_EQ(lattice.parts.size(), 1U);
+  ASSERT_EQ(lattice.components.size(), 1U);
   const auto before = positions_of(lattice);
   extend(lattice, all);
   ASSERT_EQ(lattice.nodes.size(), order.size());
-  EXPECT_EQ(lattice.parts.size(), 1U);
-  EXPECT_EQ(lattice.parts[0].views, order.size());
+  EXPECT_EQ(lattice.components.size(), 1U);
+  EXPECT_EQ(lattice.components[0].views, order.size());
   std::vector<Point2> known(truth.begin(), truth.begin() + static_cast<std::ptrdiff_t>(first));
   const double difference_before = shape_difference(before, known).value;
   EXPECT_LT(shape_difference(positions_of(lattice), truth).value, difference_before + 0.01);
@@ -319,7 +319,7 @@ TEST(Lattice, AMapOfItHoldsAllNodesAndSprings) {
   EXPECT_NO_THROW(validate(map));
   ASSERT_EQ(map.nodes.size(), lattice.nodes.size());
   ASSERT_EQ(map.edges.size(), lattice.springs.size());
-  EXPECT_EQ(number_of_parts(map), lattice.parts.size());
+  EXPECT_EQ(number_of_components(map), lattice.components.size());
   for (std::size_t s = 0; s < map.edges.size(); ++s) {
     const Pose2& a = lattice.nodes[lattice.springs[s].a].pose;
     const Pose2& b = lattice.nodes[lattice.springs[s].b].pose;

@@ -19,6 +19,17 @@ std::vector<Point2> random_points(std::size_t count, std::uint64_t seed) {
   return points;
 }
 
+TEST(IsComparable, NeedsThreePointsAndAnExtentInBoth) {
+  const std::vector<Point2> line{{0.0, 0.0}, {1.0, 0.0}, {2.0, 0.0}};
+  const std::vector<Point2> place(3, Point2{1.0, 1.0});
+  EXPECT_TRUE(is_comparable(line, line));
+  EXPECT_FALSE(is_comparable(line, place));
+  EXPECT_FALSE(is_comparable(place, line));
+  EXPECT_FALSE(is_comparable(line, std::span(line).first(2)));
+  EXPECT_FALSE(is_comparable(std::span(line).first(2), std::span(line).first(2)));
+  EXPECT_FALSE(is_comparable({}, {}));
+}
+
 TEST(NeighbourPreservation, ACopyTurnedAndScaledKeepsAll) {
   const auto truth = random_points(60, 1);
   std::vector<Point2> map;

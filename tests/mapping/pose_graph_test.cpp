@@ -126,7 +126,7 @@ TEST(PoseGraph, AWrongClosureLosesAgainstRightOnes) {
 
 TEST(PoseGraph, PartsWithoutAnEdgeBetweenThemStayApart) {
   const std::vector<PoseEdge> edges{{0, 1, {1.0, 0.0, 0.0}}, {3, 4, {1.0, 0.0, 0.0}}};
-  EXPECT_EQ(connected_parts(5, edges), (std::vector<std::size_t>{0, 0, 1, 2, 2}));
+  EXPECT_EQ(connected_components(5, edges), (std::vector<std::size_t>{0, 0, 1, 2, 2}));
   std::vector<Pose2> nodes{{0, 0, 0}, {3, 0, 0}, {9, 9, 1}, {5, 5, 0}, {5, 6, 0}};
   optimise_pose_graph(nodes, edges);
   EXPECT_NEAR(nodes[1].x_m, 1.0, 1e-4);
@@ -155,7 +155,7 @@ TEST(PoseGraph, NothingToDo) {
   std::vector<Pose2> one{{1.0, 2.0, 3.0}};
   EXPECT_TRUE(optimise_pose_graph(one, {}).settled);
   EXPECT_EQ(one[0], (Pose2{1.0, 2.0, 3.0}));
-  EXPECT_TRUE(connected_parts(0, {}).empty());
+  EXPECT_TRUE(connected_components(0, {}).empty());
 }
 
 TEST(PoseGraph, RefusesWhatHasNoMeaning) {
@@ -172,7 +172,7 @@ TEST(PoseGraph, RefusesWhatHasNoMeaning) {
   nodes[1].x_m = std::numeric_limits<double>::infinity();
   EXPECT_THROW(with({0, 1, {}}), ContractError);
   nodes[1].x_m = 0.0;
-  EXPECT_THROW(optimise_pose_graph(nodes, {}, {.most_iterations = 0}), OptionError);
+  EXPECT_THROW(optimise_pose_graph(nodes, {}, {.max_iterations = 0}), OptionError);
 }
 
 }  // namespace

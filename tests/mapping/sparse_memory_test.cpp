@@ -142,7 +142,8 @@ TEST(SparseMemory, WhatWasConnectedStaysConnected) {
     const Pose2 a = left.nodes[number(edge.a)].pose;
     EXPECT_NEAR((a * edge.a_from_b).x_m, left.nodes[number(edge.b)].pose.x_m, 1e-9);
   }
-  for (const std::size_t part : connected_parts(left.nodes.size(), edges)) EXPECT_EQ(part, 0U);
+  for (const std::size_t component : connected_components(left.nodes.size(), edges))
+    EXPECT_EQ(component, 0U);
   EXPECT_EQ(contract_map(map, {.kept = {}, .redundant = {}}), map);
 }
 

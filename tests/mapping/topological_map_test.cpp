@@ -84,7 +84,7 @@ TEST(TopologicalMapper, ClosesTheLoopOfASecondRound) {
   EXPECT_EQ(map.nodes.size(), truth.size());
   EXPECT_LE(map.edges.size(), truth.size() - 1 + closures);
   EXPECT_GT(map.edges.size(), truth.size() - 1 + closures / 2);  // most are not refuted
-  EXPECT_EQ(number_of_parts(map), 1U);
+  EXPECT_EQ(number_of_components(map), 1U);
 }
 
 TEST(TopologicalMapper, WheelLengthsSetTheScale) {
@@ -116,11 +116,11 @@ TEST(TopologicalMapper, OneViewTwoViews) {
   Mapping mapping;
   mapping.mapper.finish();
   EXPECT_TRUE(mapping.mapper.map().nodes.empty());
-  EXPECT_TRUE(mapping.add(round_room_signature(world, {})).new_part);
+  EXPECT_TRUE(mapping.add(round_room_signature(world, {})).new_component);
   mapping.mapper.finish();
   EXPECT_EQ(mapping.mapper.map().nodes.size(), 1U);
   EXPECT_TRUE(mapping.mapper.map().edges.empty());
-  EXPECT_FALSE(mapping.add(round_room_signature(world, {0.1, 0.0, 0.0})).new_part);
+  EXPECT_FALSE(mapping.add(round_room_signature(world, {0.1, 0.0, 0.0})).new_component);
   EXPECT_EQ(mapping.mapper.map().edges.size(), 1U);
 }
 
@@ -144,26 +144,26 @@ TEST(TopologicalMapper, WhatNothingConnectsBecomesAPartOfItsOwn) {
   const auto truth = rounds(round + 60);
   Mapping mapping;
   for (std::size_t i = 0; i < 60; ++i) mapping.add(round_room_signature(world, truth[i]));
-  EXPECT_TRUE(mapping.add(empty_view()).new_part);
-  EXPECT_TRUE(mapping.add(round_room_signature(world, truth[60])).new_part);
-  EXPECT_EQ(number_of_parts(mapping.mapper.map()), 3U);
-  EXPECT_EQ(mapping.mapper.map().nodes.back().part, 2U);
+  EXPECT_TRUE(mapping.add(empty_view()).new_component);
+  EXPECT_TRUE(mapping.add(round_room_signature(world, truth[60])).new_component);
+  EXPECT_EQ(number_of_components(mapping.mapper.map()), 3U);
+  EXPECT_EQ(mapping.mapper.map().nodes.back().component, 2U);
   // Wheels bridge what the views do not show.
   Mapping with_wheels;
   with_wheels.add(round_room_signature(world, truth[0]));
-  EXPECT_FALSE(with_wheels.add(empty_view(), Pose2{0.1, 0.0, 0.0}).new_part);
-  EXPECT_EQ(number_of_parts(with_wheels.mapper.map()), 1U);
+  EXPECT_FALSE(with_wheels.add(empty_view(), Pose2{0.1, 0.0, 0.0}).new_component);
+  EXPECT_EQ(number_of_components(with_wheels.mapper.map()), 1U);
   Mapping bridged({.bridge_m = 0.5});
   bridged.add(round_room_signature(world, truth[0]));
-  EXPECT_FALSE(bridged.add(empty_view()).new_part);
+  EXPECT_FALSE(bridged.add(empty_view()).new_component);
   EXPECT_NEAR(bridged.mapper.poses().back().x_m, 0.5, 1e-9);
-  // The second round joins the parts again.
+  // The second round joins the components again.
   for (std::size_t i = 61; i < truth.size(); ++i)
     mapping.add(round_room_signature(world, truth[i]));
   mapping.mapper.finish();
   const TopologicalMap map = mapping.mapper.map();
-  EXPECT_EQ(number_of_parts(map), 2U);
-  EXPECT_EQ(map.nodes[0].part, map.nodes.back().part);
+  EXPECT_EQ(number_of_components(map), 2U);
+  EXPECT_EQ(map.nodes[0].component, map.nodes.back().component);
 }
 
 TEST(TopologicalMapper, RefusesWhatHasNoMeaning) {

@@ -27,7 +27,7 @@ TEST(Steering, ReachesGoalsFromAnywhere) {
 }
 
 TEST(Steering, ObeysItsLimits) {
-  const SteeringOptions options{.turn_gain = 0.5, .most_turn_rad = 0.2, .step_m = 0.1};
+  const SteeringOptions options{.turn_gain = 0.5, .max_turn_rad = 0.2, .step_m = 0.1};
   const Pose2 behind = steer_to({}, {-1.0, 0.01}, options);
   EXPECT_EQ(behind.x_m, 0.0);
   EXPECT_DOUBLE_EQ(behind.heading_rad, 0.2);
@@ -96,7 +96,7 @@ TEST(PathFollower, CutsNoCorner) {
   const PathFollowerOptions options{.steering = {.step_m = 0.15}};
   PathFollower follower(path, options);
   Pose2 robot;
-  double most_m = 0.0;
+  double max_m = 0.0;
   int steps = 0;
   while (const auto step = follower.next_step(robot)) {
     ASSERT_LT(++steps, 500);
@@ -113,14 +113,14 @@ TEST(PathFollower, CutsNoCorner) {
                                  path[i - 1].y_m + 0.1 * share * (path[i].y_m - path[i - 1].y_m)}));
         }
       }
-      most_m = std::max(most_m, least);
+      max_m = std::max(max_m, least);
     }
     robot = there;
   }
   EXPECT_LT(distance(robot.position(), path.back()), 0.03);
   EXPECT_GT(steps, 30);
   // A look-ahead of 0.3 m alone would cut by 0.1 m.
-  EXPECT_LT(most_m, 0.06);
+  EXPECT_LT(max_m, 0.06);
 }
 
 TEST(PathFollower, RefusesWhatIsNoPath) {

@@ -103,7 +103,7 @@ TEST(TrajectoryError, TooLittleInCommonIsNoAnswer) {
   EXPECT_FALSE(trajectory_error(Trajectory{}, truth));
   EXPECT_FALSE(trajectory_error(truth, Trajectory{}));
   EXPECT_FALSE(trajectory_error(Trajectory({{100.0, {}}, {101.0, {}}}), truth));
-  EXPECT_THROW((void)trajectory_error(truth, truth, {.longest_gap_s = -1}), OptionError);
+  EXPECT_THROW((void)trajectory_error(truth, truth, {.max_gap_s = -1}), OptionError);
   const auto error = trajectory_error(truth, truth, {.relative_distance_m = 1000});
   ASSERT_TRUE(error);
   EXPECT_EQ(error->relative_pairs, 0U);

@@ -17,7 +17,7 @@ namespace panonav {
 namespace {
 
 // What the lines show does not matter here.
-constexpr KnownRouteOptions unlearnt{.tracker = {.least_correlation = 0.5}};
+constexpr KnownRouteOptions unlearnt{.tracker = {.min_correlation = 0.5}};
 
 RoutePanorama blank_route(const std::vector<Pose2>& path) {
   RoutePanorama route(16);

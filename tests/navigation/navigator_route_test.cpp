@@ -39,7 +39,7 @@ struct World {
       views.push_back({view, remembered.pose_of(view)});
     }
     routes.push_back(
-        known_route(route, views, {.beside_m = beside_m, .tracker = {.least_correlation = 0.7}}));
+        known_route(route, views, {.beside_m = beside_m, .tracker = {.min_correlation = 0.7}}));
   }
   [[nodiscard]] Navigator navigator() const {
     Executor executor(1);
@@ -63,7 +63,7 @@ const World& world() {
 
 struct Drive {
   std::vector<NavigationDecision> decisions;
-  std::vector<Pose2> path;  // true poses at the looks
+  std::vector<Pose2> path;  // true poses at the steps
 
   [[nodiscard]] std::optional<std::size_t> look_of(NavigationEvent event) const {
     for (std::size_t i = 0; i < decisions.size(); ++i) {
@@ -80,7 +80,7 @@ struct Drive {
 
 struct DriveOptions {
   bool lines = true;
-  std::optional<Pose2> carried_to;  // at the sixth look of a leg
+  std::optional<Pose2> kidnapped_to;  // at the sixth step of a leg
 };
 
 Drive drive(Navigator& navigator, ViewId goal, const Pose2& start, std::uint64_t seed,
@@ -91,7 +91,7 @@ Drive drive(Navigator& navigator, ViewId goal, const Pose2& start, std::uint64_t
   navigator.forget_place();
   Drive run;
   bool obstacle = false;
-  for (int look = 1; look <= 400; ++look) {
+  for (int step = 1; step <= 400; ++step) {
     RobotReport report{.obstacle = obstacle, .moved = robot.take_odometry()};
     std::vector<float> line;
     if (options.lines) line = two_rooms_line(world().walls, robot.pose());
@@ -102,8 +102,8 @@ Drive drive(Navigator& navigator, ViewId goal, const Pose2& start, std::uint64_t
     const NavigationDecision& decision = run.decisions.back();
     if (decision.state != NavigationState::moving) break;
     obstacle = robot.go(decision.direction_rad, decision.advance_m);
-    if (options.carried_to && run.on_route() == 6) {
-      robot.carry_to(*options.carried_to);
+    if (options.kidnapped_to && run.on_route() == 6) {
+      robot.carry_to(*options.kidnapped_to);
     }
   }
   return run;
@@ -126,17 +126,17 @@ TEST(NavigatorOnARoute, RepeatsItTowardsGoalsAtBothEndsAndArrives) {
     EXPECT_TRUE(run.look_of(NavigationEvent::route).has_value());
     EXPECT_FALSE(run.look_of(NavigationEvent::route_left).has_value());
     EXPECT_GT(2 * run.on_route(), run.decisions.size());
-    int looks = 0;
+    int steps = 0;
     for (std::size_t i = 0; i < run.path.size(); ++i) {
       const NavigationDecision& decision = run.decisions[i];
-      looks = decision.on_route ? looks + 1 : 0;
+      steps = decision.on_route ? steps + 1 : 0;
       EXPECT_LE(decision.advance_m, 0.25);
       if (!decision.on_route) continue;
       EXPECT_FALSE(decision.homing);
       EXPECT_TRUE(contains(describe(decision), "along a route"));
       // From the first half metre on it is on the way that was driven.
       const double off_m = world().off_m(run.path[i].position());
-      EXPECT_LT(off_m, looks > 3 ? 0.1 : beside_m) << "look " << i + 1;
+      EXPECT_LT(off_m, steps > 3 ? 0.1 : beside_m) << "step " << i + 1;
     }
   }
 }
@@ -164,10 +164,10 @@ TEST(NavigatorOnARoute, ARobotThatIsCarriedAwayLeavesItAndArrives) {
   const ViewId goal = world().view_at(world().path.back().position());
   const Pose2 carried{1.0, 3.4, 0.5};
   ASSERT_GT(world().off_m(carried.position()), 2.0 * beside_m);
-  const Drive run = drive(navigator, goal, world().path.front(), 5, {.carried_to = carried});
+  const Drive run = drive(navigator, goal, world().path.front(), 5, {.kidnapped_to = carried});
   const auto left = run.look_of(NavigationEvent::route_left);
   ASSERT_TRUE(left.has_value());
-  // Within the looks that must agree, and one for a place that surprises.
+  // Within the steps that must agree, and one for a place that surprises.
   const auto sixth = *run.look_of(NavigationEvent::route) + 5;
   EXPECT_LE(*left, sixth + 4);
   EXPECT_FALSE(run.decisions[*left].on_route);
@@ -189,8 +189,8 @@ TEST(NavigatorOnARoute, AShutDoorEndsTheLegAndTheRouteIsNotTriedAgain) {
   int begun_after = 0;
   NavigationDecision decision;
   int since_left = 0;
-  constexpr int enough_looks = 40;
-  while (since_left < enough_looks) {
+  constexpr int enough_steps = 40;
+  while (since_left < enough_steps) {
     RobotReport report{.obstacle = obstacle, .moved = robot.take_odometry()};
     const auto line = two_rooms_line(walls, robot.pose());
     report.line = line;

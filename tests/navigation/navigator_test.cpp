@@ -40,18 +40,18 @@ AreaPlanner phase_planner(const VisualMemory& memory, int views_per_area = 60) {
                      {.areas = {.views_per_area = views_per_area}});
 }
 
-// Drives until the navigator stops. `kidnap_look`: then the robot is carried to `kidnap_to`.
+// Drives until the navigator stops. `kidnap_step`: then the robot is put down at `kidnap_to`.
 Drive drive(const ToyWorld& world, const RememberedWorld& remembered, Navigator& navigator,
             ViewId goal, const Pose2& start, DriveKind kind, std::uint64_t seed, double light = 1.0,
-            int kidnap_look = 0, const Pose2& kidnap_to = {}) {
+            int kidnap_step = 0, const Pose2& kidnap_to = {}) {
   SimulatedRobot robot(world, start, kind, seed);
   Random noise(seed, 9);
   navigator.set_goal(goal);
   navigator.forget_place();
   Drive run;
   RobotReport report;
-  for (int look = 1; look <= 600; ++look) {
-    if (look == kidnap_look) robot.carry_to(kidnap_to);
+  for (int step = 1; step <= 600; ++step) {
+    if (step == kidnap_step) robot.carry_to(kidnap_to);
     const auto decision =
         navigator.observe(two_rooms_signature(world, robot.pose(), noise, light), report);
     run.events.insert(run.events.end(), decision.events.begin(), decision.events.end());
@@ -154,8 +154,8 @@ TEST(Navigator, FewComponentsInTheOpenAreEnoughAndCostLess) {
   Outcome full;
   struct Work {
     std::uint64_t bytes = 0;
-    int looks = 0;
-    [[nodiscard]] double bytes_per_look() const { return static_cast<double>(bytes) / looks; }
+    int steps = 0;
+    [[nodiscard]] double bytes_per_step() const { return static_cast<double>(bytes) / steps; }
   };
   Work coarse_work;
   Work full_work;
@@ -178,14 +178,14 @@ TEST(Navigator, FewComponentsInTheOpenAreEnoughAndCostLess) {
             run.end.state == NavigationState::arrived && run.error_m <= 0.5 * spacing_m;
         Work& work = all ? full_work : coarse_work;
         work.bytes += run.bytes_read;
-        work.looks += run.end.step;
+        work.steps += run.end.step;
       }
     }
   }
   EXPECT_GE(full.arrived, full.runs * 95 / 100);
   EXPECT_GE(coarse.arrived, coarse.runs * 95 / 100);
   // These rooms are small: most places lie near the doors or the goal.
-  EXPECT_LT(coarse_work.bytes_per_look(), 0.9 * full_work.bytes_per_look());
+  EXPECT_LT(coarse_work.bytes_per_step(), 0.9 * full_work.bytes_per_step());
 }
 
 // All components at the goal, in a narrow place and where the robot does not know where it is.
@@ -259,7 +259,7 @@ TEST(Navigator, AShutDoorIsGoneRoundOrMakesTheGoalUnreachable) {
   Outcome with_detour;
   Outcome without;
   int told = 0;
-  int looks = 0;
+  int steps = 0;
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     for (const bool second_door : {true, false}) {
       ToyWorld world = two_rooms(seed, second_door);
@@ -283,7 +283,7 @@ TEST(Navigator, AShutDoorIsGoneRoundOrMakesTheGoalUnreachable) {
         outcome.arrived += arrived;
         if (!second_door) {
           told += run.end.state == NavigationState::unreachable;
-          looks += run.end.step;
+          steps += run.end.step;
           EXPECT_TRUE(run.had(NavigationEvent::closed));
         }
       }
@@ -292,8 +292,8 @@ TEST(Navigator, AShutDoorIsGoneRoundOrMakesTheGoalUnreachable) {
   EXPECT_GE(with_detour.arrived, with_detour.runs * 9 / 10);
   EXPECT_EQ(without.arrived, 0);
   EXPECT_GE(told, without.runs * 9 / 10);
-  // Three attempts, each of some closings with `passage_patience` looks.
-  EXPECT_LE(looks, without.runs * 300);
+  // Three attempts, each of some closings with `edge_patience` steps.
+  EXPECT_LE(steps, without.runs * 300);
 }
 
 TEST(Navigator, IsLostInAnotherPlace) {
@@ -398,7 +398,7 @@ TEST(Navigator, SameCallsGiveTheSameDecisions) {
     SimulatedRobot robot(world, {1.0, 1.0, 0.3}, DriveKind::differential, 4);
     Random noise(5);
     RobotReport report;
-    for (int look = 0; look < 30; ++look) {
+    for (int step = 0; step < 30; ++step) {
       const auto decision =
           navigator.observe(two_rooms_signature(world, robot.pose(), noise), report);
       log.push_back(describe(decision));
@@ -466,7 +466,7 @@ TEST(Navigator, RefusesWhatItCannotDo) {
                ContractError);
   EXPECT_THROW(navigator.set_goal(ViewId{99999}), ContractError);
   EXPECT_THROW(Navigator(source, phase_planner(remembered.memory), {.step_m = 0.0}), OptionError);
-  EXPECT_THROW(Navigator(source, phase_planner(remembered.memory), {.shortest_leg_m = 0.0}),
+  EXPECT_THROW(Navigator(source, phase_planner(remembered.memory), {.min_leg_m = 0.0}),
                OptionError);
   EXPECT_THROW(Navigator(source, phase_planner(remembered.memory), {.coarse_components = 2}),
                ContractError);

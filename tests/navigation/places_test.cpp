@@ -1,4 +1,4 @@
-// What the navigator is made of: scales of likeness, views by area, obstacles, graphs from views.
+// What the navigator is made of: scales of similarity, views by area, obstacles, graphs from views.
 
 #include <gtest/gtest.h>
 
@@ -228,7 +228,7 @@ TEST(NavigationGraph, LeavesOutEdgesToPlacesThatLookAlike) {
   EXPECT_TRUE(has_edge(graph, alike, alike + columns));
 }
 
-// What is left out for that comes back where nothing else joins two parts.
+// What is left out for that comes back where nothing else joins two components.
 TEST(NavigationGraph, KeepsTheOnlyEdgeBetweenTwoParts) {
   constexpr std::size_t side = 6;
   Lattice lattice = exact_grid(side, 2 * side);

@@ -38,7 +38,7 @@ struct RecordedRoute {
       placed.push_back({views.back(), path[i]});
     }
     // Learning it takes longer than the rest.
-    known.push_back(known_route(route, placed, {.tracker = {.least_correlation = 0.7}}));
+    known.push_back(known_route(route, placed, {.tracker = {.min_correlation = 0.7}}));
   }
   [[nodiscard]] const Pose2& pose_of(ViewId view) const { return path[3 * view.value]; }
   [[nodiscard]] std::vector<ViewId> way(std::size_t from, std::size_t to) const {
@@ -78,19 +78,19 @@ TEST(RoutePilot, DrivesToTheEndOfTheWayInBothDirections) {
     Robot robot{route.pose_of(way.front()) * Pose2{0.05, 0.15, back ? 2.0 : -1.0}};
     ASSERT_TRUE(pilot.begin(way, route.room.line(robot.pose), shortest_m));
     EXPECT_EQ(pilot.end(), way.back());
-    int looks = 0;
-    for (; pilot.aim() && looks < 100; ++looks) {
+    int steps = 0;
+    for (; pilot.aim() && steps < 100; ++steps) {
       const Pose2 moved = robot.go(*pilot.aim());
       pilot.track(route.room.line(robot.pose), moved);
-      EXPECT_EQ(pilot.unknown_looks(), 0);
+      EXPECT_EQ(pilot.unknown_steps(), 0);
       // From the first half metre on it is on the route.
-      if (looks > 2) {
+      if (steps > 2) {
         EXPECT_LT(std::abs(place_on_route(route.path, robot.pose.position()).lateral_m), 0.05);
       }
     }
     EXPECT_FALSE(pilot.aim().has_value());
     EXPECT_LT(distance(robot.pose.position(), route.pose_of(way.back()).position()), 0.1);
-    EXPECT_GT(looks, 20);
+    EXPECT_GT(steps, 20);
   }
 }
 
@@ -109,7 +109,7 @@ TEST(RoutePilot, BeginsOnlyWhereLineAndViewAgreeAndTheWayIsLong) {
   EXPECT_FALSE(pilot.begin(std::vector<ViewId>{ViewId{900}, ViewId{901}}, here, shortest_m));
   EXPECT_FALSE(pilot.begin({}, here, shortest_m));
   EXPECT_FALSE(RoutePilot().begin(way, here, shortest_m));
-  // A route that was given up is not begun until it is forgiven; one that was stopped is.
+  // A route that was rejected is not begun until it is forgiven; one that was stopped is.
   ASSERT_TRUE(pilot.begin(way, here, shortest_m));
   pilot.give_up();
   EXPECT_FALSE(pilot.drives());
@@ -122,7 +122,7 @@ TEST(RoutePilot, BeginsOnlyWhereLineAndViewAgreeAndTheWayIsLong) {
   EXPECT_THROW(pilot.track(here, {}), ContractError);
 }
 
-TEST(RoutePilot, CountsLooksThatTellNoPlaceOnTheLeg) {
+TEST(RoutePilot, CountsStepsWithoutAPlaceOnTheLeg) {
   const RecordedRoute& route = recorded();
   RoutePilot pilot(route.known);
   const auto way = route.way(2, 9);
@@ -133,20 +133,20 @@ TEST(RoutePilot, CountsLooksThatTellNoPlaceOnTheLeg) {
   const auto beyond = route.room.line(route.pose_of(route.views[17]));
   for (const auto& line : {strange, beyond, std::vector<float>{}}) {
     RoutePilot other = pilot;
-    for (int look = 1; look <= 4; ++look) {
+    for (int step = 1; step <= 4; ++step) {
       other.track(line, {});
-      EXPECT_EQ(other.unknown_looks(), look);
+      EXPECT_EQ(other.unknown_steps(), step);
     }
   }
-  // Odometry alone carries over some looks, and the next line agrees.
+  // Odometry alone carries over some steps, and the next line agrees.
   Robot robot{start};
-  for (int look = 0; look < 3; ++look) {
+  for (int step = 0; step < 3; ++step) {
     ASSERT_TRUE(pilot.aim().has_value());
     const Pose2 moved = robot.go(*pilot.aim());
     pilot.track({}, moved);
   }
   pilot.track(route.room.line(robot.pose), {});
-  EXPECT_EQ(pilot.unknown_looks(), 0);
+  EXPECT_EQ(pilot.unknown_steps(), 0);
   EXPECT_GT(place_on_route(route.path, robot.pose.position()).along_m, 0.6 + 0.5);
 }
 

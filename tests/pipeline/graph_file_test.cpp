@@ -21,12 +21,12 @@ TEST_F(GraphFile, NodesAndEdgesAreThere) {
   write_graph(path, map, [](ViewId view) { return view.value == 3 ? "a<b&\"c\".png" : "d.png"; });
   const auto bytes = read_file(path, 1U << 20U);
   const std::string text(bytes.begin(), bytes.end());
-  for (const char* part :
+  for (const char* component :
        {"<graphml", "<node id=\"3\"><data key=\"name\">a&lt;b&amp;&quot;c&quot;.png</data>",
         "<data key=\"x_m\">1.5</data><data key=\"y_m\">-2</data>",
         "<edge source=\"3\" target=\"7\"><data key=\"kind\">closure</data>",
         "<data key=\"weight\">0.75</data>", "</graphml>"}) {
-    EXPECT_TRUE(contains(text, part)) << part << "\n" << text;
+    EXPECT_TRUE(contains(text, component)) << component << "\n" << text;
   }
 }
 

@@ -197,7 +197,7 @@ TEST(FourierHoming, IterationsExplainAFarViewBetter) {
 }
 
 // What a robot sees that pitches: the direction u comes from u - omega x u.
-Panorama leaning(const Panorama& level, double lean) {
+Panorama tilted_panorama(const Panorama& level, double tilt) {
   Panorama result = level;
   const double row_rad = (band.top_rad - band.bottom_rad) / level.rows();
   for (int r = 0; r < level.rows(); ++r) {
@@ -205,9 +205,9 @@ Panorama leaning(const Panorama& level, double lean) {
       const double phi = level.azimuth_rad(c);
       const double elevation = level.elevation_rad(r);
       const double from_row =
-          std::clamp(r + lean * std::cos(phi) / row_rad, 0.0, level.rows() - 1.001);
+          std::clamp(r + tilt * std::cos(phi) / row_rad, 0.0, level.rows() - 1.001);
       const double from_column =
-          (phi - lean * std::tan(elevation) * std::sin(phi)) * level.columns() / (2.0 * pi) +
+          (phi - tilt * std::tan(elevation) * std::sin(phi)) * level.columns() / (2.0 * pi) +
           level.columns();
       const int r0 = static_cast<int>(from_row);
       const int c0 = static_cast<int>(std::floor(from_column));
@@ -228,9 +228,9 @@ TEST(FourierHoming, LeanIsToldFromDisplacement) {
     const ToyWorld around = random_surroundings(600 + trial, 6.0);
     const HomingView home = view_of(seen_from(around, 0.0, 0.0, 0.0, 40));
     const HomingView current =
-        view_of(leaning(seen_from(around, 0.05, 0.03, 0.0, 40), radians(1.5)));
+        view_of(tilted_panorama(seen_from(around, 0.05, 0.03, 0.0, 40), radians(1.5)));
     const auto error = [&](bool solved) {
-      const HomeVector v = home_vector(home, current, {.lean = solved});
+      const HomeVector v = home_vector(home, current, {.tilt = solved});
       return std::hypot(v.xi + 0.05, v.eta + 0.03);
     };
     with += error(true);
@@ -241,21 +241,21 @@ TEST(FourierHoming, LeanIsToldFromDisplacement) {
 
 // A robot that is home looks at home, also where the ground is not even.
 TEST(ImageDifference, LeanIsNotADifference) {
-  double leaning_at_home = 0.0;
+  double tilted_at_home = 0.0;
   double flat = 0.0;
   for (int trial = 0; trial < 30; ++trial) {
     const ToyWorld around = random_surroundings(700 + trial, 6.0);
     const Panorama level = seen_from(around, 0.0, 0.0, 0.0, 40);
-    const Panorama tilted = leaning(level, radians(1.5));
-    leaning_at_home += image_difference(view_of(level), turn(view_of(tilted), 1.0)) / 30;
-    // Without elevations nothing is known of a lean.
+    const Panorama tilted = tilted_panorama(level, radians(1.5));
+    tilted_at_home += image_difference(view_of(level), turn(view_of(tilted), 1.0)) / 30;
+    // Without elevations nothing is known of a tilt.
     const auto bare = [](const Panorama& view) {
       return view_of(Panorama(view.rows(), view.columns(), std::nullopt,
                               {view.values().begin(), view.values().end()}));
     };
     flat += image_difference(bare(level), turn(bare(tilted), 1.0)) / 30;
   }
-  EXPECT_LT(leaning_at_home, 0.4 * flat);
+  EXPECT_LT(tilted_at_home, 0.4 * flat);
 }
 
 // A feature off the horizon moves up and down as the robot moves to and from it.

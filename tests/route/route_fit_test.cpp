@@ -103,7 +103,7 @@ TEST(RouteCrossing, ChangesWithTheViewpointAsItSays) {
 
 TEST(RouteFit, FindsPosesBesideAStraightPath) {
   const ToyWorld room = pillared_room(5);
-  for (const auto& [spacing_m, most_m] : {std::pair{0.02, 0.006}, std::pair{0.1, 0.012}}) {
+  for (const auto& [spacing_m, max_m] : {std::pair{0.02, 0.006}, std::pair{0.1, 0.012}}) {
     const RouteLines lines(record(room, straight_path(5.0, spacing_m)));
     Random random(11);
     double sum = 0.0;
@@ -120,7 +120,7 @@ TEST(RouteFit, FindsPosesBesideAStraightPath) {
       EXPECT_GT(fix->correlation, 0.9);
       EXPECT_NEAR(angle_difference(fix->pose.heading_rad, truth.heading_rad), 0.0, radians(1.0));
     }
-    EXPECT_LT(sum, most_m) << "mean error at a spacing of " << spacing_m;
+    EXPECT_LT(sum, max_m) << "mean error at a spacing of " << spacing_m;
   }
 }
 

@@ -114,8 +114,8 @@ TEST_F(RouteTracking, CarriesOdometryThroughABlindStretch) {
 
 TEST_F(RouteTracking, ChecksItsInputs) {
   EXPECT_THROW((void)RouteTracker(route, {.search_step_m = 0.0}), OptionError);
-  RouteTracker tracker(route, {.least_correlation = 0.8});
-  EXPECT_EQ(tracker.least_correlation(), 0.8);
+  RouteTracker tracker(route, {.min_correlation = 0.8});
+  EXPECT_EQ(tracker.min_correlation(), 0.8);
   EXPECT_THROW((void)tracker.search(std::vector<float>(10, 0.0F)), ContractError);
   EXPECT_THROW((void)tracker.track(std::vector<float>(10, 0.0F), {}), ContractError);
 }

@@ -151,11 +151,11 @@ TEST_F(Gantry, CompassBetweenNeighboursIsRightToAFractionOfAColumn) {
     }
     ASSERT_GT(errors_deg.size(), 600U);
     const double median_deg = median(errors_deg);
-    const double most_deg = quantile(errors_deg, 0.95);
+    const double max_deg = quantile(errors_deg, 0.95);
     EXPECT_LE(median_deg, 1.7) << (packed ? "packed" : "float");
-    EXPECT_LE(most_deg, 5.0) << (packed ? "packed" : "float");
+    EXPECT_LE(max_deg, 5.0) << (packed ? "packed" : "float");
     RecordProperty(packed ? "packed_median_deg" : "median_deg", std::to_string(median_deg));
-    RecordProperty(packed ? "packed_95_percent_deg" : "95_percent_deg", std::to_string(most_deg));
+    RecordProperty(packed ? "packed_95_percent_deg" : "95_percent_deg", std::to_string(max_deg));
   }
 }
 

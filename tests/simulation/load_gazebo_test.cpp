@@ -212,8 +212,8 @@ TEST_F(GazeboWorld, RealWorldsLoadWithTheirWalls) {
   PANONAV_REQUIRE_DATA(scenes, "scenes");
   struct Expected {
     const char* path;
-    std::size_t objects, least_textures, most_warnings;
-    double size_x_m, size_y_m, least_free_m2, most_free_m2;
+    std::size_t objects, min_textures, max_warnings;
+    double size_x_m, size_y_m, min_free_m2, max_free_m2;
   };
   // Sizes are those that the wall models state; free areas by counting squares of the floor plans.
   for (const Expected& expected :
@@ -233,13 +233,13 @@ TEST_F(GazeboWorld, RealWorldsLoadWithTheirWalls) {
     EXPECT_GE(objects.size(), expected.objects) << path;
     const auto textured = std::count_if(scene.materials.begin(), scene.materials.end(),
                                         [](const Material& m) { return m.texture != nullptr; });
-    EXPECT_GE(static_cast<std::size_t>(textured), expected.least_textures) << path;
-    EXPECT_LE(scene.warnings.size(), expected.most_warnings) << path;
+    EXPECT_GE(static_cast<std::size_t>(textured), expected.min_textures) << path;
+    EXPECT_LE(scene.warnings.size(), expected.max_warnings) << path;
     EXPECT_NEAR(scene.floor_high.x_m - scene.floor_low.x_m, expected.size_x_m, 0.1);
     EXPECT_NEAR(scene.floor_high.y_m - scene.floor_low.y_m, expected.size_y_m, 0.1);
     const FreeSpace space(scene);
-    EXPECT_GE(space.area_m2(), expected.least_free_m2) << path;
-    EXPECT_LE(space.area_m2(), expected.most_free_m2) << path;
+    EXPECT_GE(space.area_m2(), expected.min_free_m2) << path;
+    EXPECT_LE(space.area_m2(), expected.max_free_m2) << path;
   }
 }
 

@@ -91,12 +91,12 @@ TEST_F(MeshFile, LargeTexturesAreHalved) {
     for (auto& value : image.pixels()) value = 100;
     return image;
   }};
-  textures.largest_side_px = 20;
+  textures.max_side_px = 20;
   const Scene scene = load_mesh(meshes / "crate_z_up_cm.dae", {.textures = textures});
   ASSERT_NE(scene.materials[0].texture, nullptr);
   EXPECT_EQ(scene.materials[0].texture->size(), (ImageSize{16, 1}));
   EXPECT_EQ(scene.materials[0].texture->at(15, 0, 2), 100);
-  textures.largest_side_px = 0;
+  textures.max_side_px = 0;
   EXPECT_THROW((void)load_mesh(meshes / "crate_z_up_cm.dae", {.textures = textures}),
                ContractError);
 }

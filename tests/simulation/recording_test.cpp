@@ -111,18 +111,18 @@ TEST_F(Recording, TiltChangesTheViewAndNothingElseDoes) {
   const SensorOptions ideal{.read_noise = 0.0, .full_well = 1e12, .eight_bit = false};
   const auto level = take_panorama(renderer, pose, small_, {}, ideal, 1, executor_);
   const auto again = take_panorama(renderer, pose, small_, {}, ideal, 2, executor_);
-  const auto leaning =
+  const auto tilted =
       take_panorama(renderer, pose, small_, {.tilt_rad = radians(5.0)}, ideal, 1, executor_);
   double largest_again = 0.0;
-  double mean_leaning = 0.0;
+  double mean_tilted = 0.0;
   for (std::size_t i = 0; i < level.values().size(); ++i) {
     const auto value = static_cast<double>(level.values()[i]);
     largest_again =
         std::max(largest_again, std::abs(value - static_cast<double>(again.values()[i])));
-    mean_leaning += std::abs(value - static_cast<double>(leaning.values()[i]));
+    mean_tilted += std::abs(value - static_cast<double>(tilted.values()[i]));
   }
   EXPECT_LT(largest_again, 1e-4);
-  EXPECT_GT(mean_leaning / static_cast<double>(level.values().size()), 0.005);
+  EXPECT_GT(mean_tilted / static_cast<double>(level.values().size()), 0.005);
 }
 
 // A black floor without end below a white sky, and a black wall all round, 2 m away and 1 m high.

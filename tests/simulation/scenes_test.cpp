@@ -185,7 +185,7 @@ double free_share(const Scene& scene) {
 TEST(Scenes, HaveTheStatedSizes) {
   struct Size {
     const char* scene;
-    double width_m, depth_m, least_free_share;
+    double width_m, depth_m, min_free_share;
   };
   // Office and halls promise that much free floor; a room of 7 x 5 m has furniture along its walls,
   // and half of the arena is houses and what the robot's size takes.
@@ -196,7 +196,7 @@ TEST(Scenes, HaveTheStatedSizes) {
       const Scene scene = make_scene(stated.scene, {seed});
       EXPECT_NEAR(scene.floor_high.x_m - scene.floor_low.x_m, stated.width_m, 1e-9);
       EXPECT_NEAR(scene.floor_high.y_m - scene.floor_low.y_m, stated.depth_m, 1e-9);
-      EXPECT_GT(free_share(scene), stated.least_free_share) << stated.scene << ", seed " << seed;
+      EXPECT_GT(free_share(scene), stated.min_free_share) << stated.scene << ", seed " << seed;
     }
   }
 }
@@ -263,7 +263,7 @@ TEST(Scenes, AHouseStandsBetweenTheStreetsOfTheArena) {
 // The scene turned by half a turn about its middle looks the same but for a few distinct things:
 // the mean dissimilarity of views from places and the places where half a turn takes them, over
 // that of views half a metre apart.
-double likeness_of_opposite_places(const Scene& scene) {
+double similarity_of_opposite_places(const Scene& scene) {
   Executor executor(2);
   const Renderer renderer(scene, {}, executor);
   const auto signature = [&](Point2 place) {
@@ -293,11 +293,11 @@ TEST(Scenes, FarPlacesOfCorridorAndPeriodicHallLookAlike) {
   for (const std::uint64_t seed : kSeeds) {
     // Alike, and yet not the same.
     for (const char* name : {"corridor", "hall_periodic"}) {
-      const double likeness = likeness_of_opposite_places(make_scene(name, {seed}));
-      EXPECT_LT(likeness, 1.0) << name << ", seed " << seed;
-      EXPECT_GT(likeness, 0.01) << name << ", seed " << seed;
+      const double similarity = similarity_of_opposite_places(make_scene(name, {seed}));
+      EXPECT_LT(similarity, 1.0) << name << ", seed " << seed;
+      EXPECT_GT(similarity, 0.01) << name << ", seed " << seed;
     }
-    EXPECT_GT(likeness_of_opposite_places(make_scene("hall", {seed})), 1.5) << "seed " << seed;
+    EXPECT_GT(similarity_of_opposite_places(make_scene("hall", {seed})), 1.5) << "seed " << seed;
   }
 }
 

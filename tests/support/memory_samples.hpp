@@ -16,13 +16,13 @@ namespace panonav::testing {
 inline PackedSignature random_packed(Random& random, SignatureShape shape) {
   PackedSignature packed{shape, std::vector<std::uint8_t>(shape.size()),
                          std::vector<std::uint8_t>(shape.size())};
-  for (auto* part : {&packed.magnitudes, &packed.phases}) {
-    for (auto& value : *part) value = static_cast<std::uint8_t>(random.index(256));
+  for (auto* component : {&packed.magnitudes, &packed.phases}) {
+    for (auto& value : *component) value = static_cast<std::uint8_t>(random.index(256));
   }
   return packed;
 }
 
-/// A view with and without each of the optional parts, by its number.
+/// A view with and without each of the optional components, by its number.
 inline NewView random_view(Random& random, SignatureShape shape, int number) {
   NewView view;
   view.info.name = "view_" + std::to_string(number) + ".png";

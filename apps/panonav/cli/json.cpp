@@ -12,9 +12,33 @@ struct FormerKey {
 };
 
 /// Keys of JSON output that have another name since the last version; the only list of them.
-constexpr std::array<FormerKey, 2> former_keys{{
+constexpr std::array<FormerKey, 26> former_keys{{
+    {"ate_m", "position_m"},                      // evaluate
+    {"rpe_m", "relative_position_m"},             // evaluate
+    {"rpe_heading_rad", "relative_heading_rad"},  // evaluate
+    {"rmse", "rms"},                              // evaluate
+    {"max", "largest"},                           // evaluate
+    {"procrustes_disparity", "shape_difference"},
+    {"procrustes_disparity_with_reflection", "shape_difference_with_reflection"},
+    {"odometry_procrustes_disparity", "odometry_shape_difference"},
+    {"arranged_procrustes_disparity", "arranged_shape_difference"},  // demo
+    {"drive_procrustes_disparity", "drive_shape_difference"},        // demo
+    {"wheels_procrustes_disparity", "wheels_shape_difference"},      // demo
     {"column_difference", "difference"},  // localise: column by column, after turning
     {"image_difference", "difference"},   // navigate: of whole views
+    {"connected_component", "part"},
+    {"connected_components", "parts"},
+    {"edges", "passages"},
+    {"edges_from", "passages_from"},
+    {"closed_edges", "closed_passages"},
+    {"ground_truth", "truth"},
+    {"injected", "redrawn"},  // track
+    {"step", "look"},
+    {"steps", "looks"},
+    {"kidnapped_after_step", "carried_after_look"},
+    {"mission_kidnapped", "mission_carried"},  // demo
+    {"mission_steps", "mission_looks"},        // demo
+    {"springs_rejected", "springs_given_up"},  // arrange
 }};
 
 ordered_json with_former_keys(const ordered_json& value) {

@@ -249,7 +249,7 @@ ordered_json median_or_null(const std::vector<double>& values) {
 ordered_json as_json(const MissionRun& run) {
   return {{"end", name_of(run.end)},
           {"goal_distance_m", run.end_distance_m},
-          {"looks", run.decisions.size()},
+          {"steps", run.decisions.size()},
           {"travelled_m", run.travelled_m},
           {"shortest_m", run.shortest_m}};
 }
@@ -270,10 +270,10 @@ ordered_json as_json(const DemoResults& done, const fs::path& out) {
           {"track_localised", done.track.localised},
           {"track_wrong", done.track.wrong},
           {"track_error_m", median_or_null(done.track.errors_m)},
-          {"arranged_shape_difference",
+          {"arranged_procrustes_disparity",
            done.maps.lattice ? ordered_json(done.maps.lattice->shape_difference) : ordered_json()},
-          {"drive_shape_difference", done.maps.map_error},
-          {"wheels_shape_difference", done.maps.wheels_error},
+          {"drive_procrustes_disparity", done.maps.map_error},
+          {"wheels_procrustes_disparity", done.maps.wheels_error},
           {"runs_home", done.homing.runs.size()},
           {"arrived_home", done.homing.arrived},
           {"home_error_m", median(done.homing.distances_m)},
@@ -283,8 +283,8 @@ ordered_json as_json(const DemoResults& done, const fs::path& out) {
           {"missions", navigation.runs.size()},
           {"missions_arrived", navigation.arrived},
           {"mission_detour", median_or_null(navigation.detours)},
-          {"mission_looks", median_or_null(navigation.looks)},
-          {"mission_carried", as_json(navigation.carried)},
+          {"mission_steps", median_or_null(navigation.steps)},
+          {"mission_kidnapped", as_json(navigation.kidnapped)},
           {"mission_screen", navigation.screened ? as_json(*navigation.screened) : ordered_json()},
           {"seconds", done.seconds}};
 }
@@ -307,7 +307,7 @@ void print(const DemoResults& done, Session& session) {
   session.print("  own places recognised: " + percent(done.own.known) +
                 "; views of another room taken for this one: " + percent(done.foreign.known));
   session.print("  tracked: localised " + images_text(done.track.until_localised) +
-                "; carried away, found again " + images_text(done.track.until_found_again) +
+                "; kidnapped, found again " + images_text(done.track.until_found_again) +
                 "; median error " + median_text(done.track.errors_m, 100.0, 1, "cm") + "; " +
                 of(done.track.wrong, done.track.localised) + " answers wrong");
   session.print("  arranged without positions: shape difference " +
@@ -325,7 +325,7 @@ void print(const DemoResults& done, Session& session) {
   session.print("  missions by views alone: " + of(navigation.arrived, navigation.runs.size()) +
                 " arrived; way driven over the shortest: median " +
                 (navigation.detours.empty() ? "none" : fixed(median(navigation.detours), 2)) +
-                "; carried away half way: " + std::string(name_of(navigation.carried.end)) +
+                "; kidnapped half way: " + std::string(name_of(navigation.kidnapped.end)) +
                 "; a screen in the way: " +
                 (navigation.screened ? std::string(name_of(navigation.screened->end)) : "none"));
 }
@@ -351,7 +351,7 @@ ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
   ReportPage page("panonav: a robot that remembers what places look like",
                   "A simulated robot with one mirror camera drives through an office and remembers "
                   "what it looks like. From that memory alone it says where it is, is found again "
-                  "when it was carried away, arranges what it remembers, finds home, repeats a "
+                  "when it was kidnapped, arranges what it remembers, finds home, repeats a "
                   "route and goes where it is told. No laser, no GPU, no training. Each figure "
                   "leads to its part below.");
   show_camera(*recordings, out, session, page);

@@ -87,7 +87,8 @@ DemoHoming show_homing(const Scene& office, const FloorPlan& plan, int runs, std
       "knowing which way it faces: the Fourier components of both views tell the direction home. "
       "It was put down one metre away from " +
       std::to_string(runs) +
-      " places, turned anyhow, and made step after step, each after a new picture. Its wheels and "
+      " places, with random heading, and made step after step, each after a new picture. Its "
+      "wheels and "
       "its camera are noisy.");
   page.figures({{std::to_string(homing.arrived) + " of " + std::to_string(runs),
                  "runs that ended within 10 cm of home, and knew it"},

@@ -38,7 +38,7 @@ DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick,
                    const std::filesystem::path& out, Session& session, ReportPage& page) {
   DemoMaps maps;
   maps.arranged = arrange(office, {}, {}, session.executor());
-  maps.lattice = compare_with_truth(maps.arranged, office);
+  maps.lattice = compare_with_ground_truth(maps.arranged, office);
   write_lattice_picture(out / "arranged.png", maps.arranged, office);
 
   const PlaceRecording place =
@@ -58,7 +58,8 @@ DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick,
              "from the true shape: 0 is the same, 1 any other; no position was given"});
   page.text(
       "The remembered views of the office, in no order and without any position, arrange "
-      "themselves by their likeness alone, like balls held by springs. And from one picture after "
+      "themselves by their similarity alone, like balls held by springs. And from one picture "
+      "after "
       "the other, a robot that drives through rooms it has never seen makes a map of its way; the "
       "height of the camera tells metres, its wheels tell nothing.");
   std::vector<std::pair<std::string, std::string>> figures;

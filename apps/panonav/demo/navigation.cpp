@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 
 // Random streams of the demonstration's missions.
 constexpr std::uint64_t mission_stream = 1;
-constexpr std::uint64_t carried_stream = 2;
+constexpr std::uint64_t kidnapped_stream = 2;
 constexpr std::uint64_t screen_stream = 3;
 constexpr std::uint64_t noise_stream = 4;
 
@@ -62,7 +62,7 @@ std::optional<ScreenedMission> screened_mission(const MissionPlace& place,
                                                 const Pipeline& pipeline, Executor& executor) {
   constexpr double width_m = 0.6;
   constexpr double height_m = 1.0;
-  constexpr double least_detour_m = 0.1;
+  constexpr double min_detour_m = 0.1;
   AreaPlanner planner(remembered.graph);
   for (const Mission& mission : missions) {
     const auto nearest = std::ranges::min_element(remembered.truth, {}, [&](const Pose2& pose) {
@@ -83,7 +83,7 @@ std::optional<ScreenedMission> screened_mission(const MissionPlace& place,
     const Point2 goal = remembered.truth[*remembered.graph.node_of(mission.goal)].position();
     const auto direct = place.free_space->shortest_path(mission.start.position(), goal);
     const auto around = screened.free_space->shortest_path(mission.start.position(), goal);
-    if (!direct || !around || path_length_m(*around) < path_length_m(*direct) + least_detour_m)
+    if (!direct || !around || path_length_m(*around) < path_length_m(*direct) + min_detour_m)
       continue;
     screened.renderer =
         std::make_shared<const Renderer>(screened.scene, RendererOptions{}, executor);
@@ -124,7 +124,7 @@ std::string end_text(const MissionRun& run, double within_m) {
   return run.arrives(within_m) ? "arrived" : "arrived, but too far off";
 }
 
-/// A heading with what came of a run, and a line for each look.
+/// A heading with what came of a run, and a line for each step.
 std::string log_of(const std::string& title, const std::string& goal, const MissionRun& run,
                    double within_m) {
   std::string text = title + ", to " + goal + ": " + end_text(run, within_m) + ", " +
@@ -136,7 +136,7 @@ std::string log_of(const std::string& title, const std::string& goal, const Miss
 /// What one mission more came to, as a sentence.
 std::string sentence_on(const MissionRun& run, double within_m) {
   return "It ended as: " + end_text(run, within_m) + ", " + fixed(100.0 * run.end_distance_m, 0) +
-         " cm from the goal after " + std::to_string(run.decisions.size()) + " looks and " +
+         " cm from the goal after " + std::to_string(run.decisions.size()) + " steps and " +
          fixed(run.travelled_m, 1) + " m.";
 }
 
@@ -154,7 +154,7 @@ void add_part(const DemoNavigation& navigation, ReportPage& page) {
       "view that it is at, takes its direction, drives a step and looks again; the last stretch is "
       "the way home to the goal's view.");
   page.text("It was sent from " + count + " random places to " + count +
-            " random views. One more robot was carried elsewhere half way, and another one found a "
+            " random views. One more robot was kidnapped half way, and another one found a "
             "screen across its way that had not been there before. A mission counts when the robot "
             "says that it arrived and is within half the spacing of the views, " +
             within + ".");
@@ -162,8 +162,8 @@ void add_part(const DemoNavigation& navigation, ReportPage& page) {
       {{arrived, "missions arrived within " + within + ", and knew it"},
        {navigation.detours.empty() ? "none" : fixed(median(navigation.detours), 2),
         "times the shortest way, driven by those that arrived (median)"},
-       {fixed(median(navigation.looks), 0), "looks a mission (median)"},
-       {end_text(navigation.carried, navigation.within_m), "the robot that was carried away"},
+       {fixed(median(navigation.steps), 0), "steps a mission (median)"},
+       {end_text(navigation.kidnapped, navigation.within_m), "the robot that was kidnapped"},
        {navigation.screened ? end_text(*navigation.screened, navigation.within_m) : "none",
         navigation.screened ? "the robot with a screen in its way"
                             : "no screen leaves a way round here"}});
@@ -172,8 +172,9 @@ void add_part(const DemoNavigation& navigation, ReportPage& page) {
        "The first mission. Arrows: which way each remembered view sends the robot; orange: the way "
        "planned at the start; red: the way driven."},
       {"missions.png", "All missions. A way that did not end at its goal is orange."},
-      {"mission_carried.png", "Half way, somebody carried this robot to the pink square. " +
-                                  sentence_on(navigation.carried, navigation.within_m)}};
+      {"mission_kidnapped.png",
+       "Half way, somebody kidnapped this robot: it was put down at the pink square. " +
+           sentence_on(navigation.kidnapped, navigation.within_m)}};
   if (navigation.screened) {
     pictures.push_back({"mission_screen.png",
                         "A screen stands across the middle of the planned way, which the memory "
@@ -195,20 +196,20 @@ DemoNavigation show_navigation(const DemoOptions& options, const DemoRecordings&
   const RememberedPlace remembered = remembered_place(memory, arranged, options.spacing_m());
   MissionPlace place = recordings.office_world->place();
   give_sight(place, recordings, pipeline);
-  const auto random = [&](std::uint64_t stream, int count, bool carried) {
-    return random_missions(place, remembered, {.count = count, .carried = carried},
+  const auto random = [&](std::uint64_t stream, int count, bool kidnapped) {
+    return random_missions(place, remembered, {.count = count, .kidnapped = kidnapped},
                            Random(options.seed, stream).next());
   };
   auto missions = random(mission_stream, options.missions(), false);
-  missions.push_back(random(carried_stream, 1, true).front());
+  missions.push_back(random(kidnapped_stream, 1, true).front());
   const MissionOptions settings;
   const std::uint64_t noise = Random(options.seed, noise_stream).next();
   DemoNavigation navigation{.within_m = 0.5 * options.spacing_m()};
   navigation.runs = run_missions(place, remembered, missions, settings, noise, executor);
-  navigation.carried = std::move(navigation.runs.back());
+  navigation.kidnapped = std::move(navigation.runs.back());
   navigation.runs.pop_back();
   for (const MissionRun& run : navigation.runs) {
-    navigation.looks.push_back(static_cast<double>(run.decisions.size()));
+    navigation.steps.push_back(static_cast<double>(run.decisions.size()));
     if (!run.arrives(navigation.within_m)) continue;
     ++navigation.arrived;
     if (run.shortest_m > 0.0) navigation.detours.push_back(run.travelled_m / run.shortest_m);
@@ -220,7 +221,7 @@ DemoNavigation show_navigation(const DemoOptions& options, const DemoRecordings&
   };
   const Mission& first = missions.front();
   draw("mission.png", "To a remembered view", place, first, navigation.runs.front());
-  draw("mission_carried.png", "Carried away half way", place, missions.back(), navigation.carried);
+  draw("mission_kidnapped.png", "Kidnapped half way", place, missions.back(), navigation.kidnapped);
   draw_runs(navigation, remembered, missions, plan, options.out / "missions.png");
   std::string log;
   const auto add_log = [&](const std::string& title, const Mission& mission,
@@ -230,7 +231,7 @@ DemoNavigation show_navigation(const DemoOptions& options, const DemoRecordings&
   for (std::size_t i = 0; i < navigation.runs.size(); ++i) {
     add_log("Mission " + std::to_string(i + 1), missions[i], navigation.runs[i]);
   }
-  add_log("Carried away half way", missions.back(), navigation.carried);
+  add_log("Kidnapped half way", missions.back(), navigation.kidnapped);
   navigation.first_mission = {"--goal", memory.info(first.goal).name, "--start",
                               fixed(first.start.x_m, 3) + "," + fixed(first.start.y_m, 3) + "," +
                                   fixed(degrees(first.start.heading_rad), 1)};

@@ -22,8 +22,8 @@ struct DemoNavigation {
   std::vector<MissionRun> runs;  ///< from random starts to random goals
   std::size_t arrived = 0;       ///< within `within_m`, and they know it
   std::vector<double> detours;   ///< of those: way driven over the shortest one
-  std::vector<double> looks;     ///< of all
-  MissionRun carried;            ///< one more, carried away half way
+  std::vector<double> steps;     ///< of all
+  MissionRun kidnapped;          ///< one more, kidnapped half way
   /// One more, a screen across its way; empty: no screen leaves a way round.
   std::optional<MissionRun> screened;
   /// The first run as options of the verb `navigate`.

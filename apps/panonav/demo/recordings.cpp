@@ -46,7 +46,7 @@ constexpr std::array<std::string_view, 28> made{"memory_run",
                                                 "route_panorama.png",
                                                 "mission.png",
                                                 "mission.log",
-                                                "mission_carried.png",
+                                                "mission_kidnapped.png",
                                                 "mission_screen.png",
                                                 "missions.png",
                                                 "index.html"};
@@ -100,8 +100,8 @@ std::optional<MirrorCircle> find_mirror_in(const Dataset& recording, int count) 
 
 /// Two walks as one recording. Between them somebody carries the robot far away, to the farthest
 /// place in the first half of `after`; its odometry knows nothing of that.
-std::vector<RecordedPose> carried_walk(std::vector<RecordedPose> walk,
-                                       const std::vector<RecordedPose>& after) {
+std::vector<RecordedPose> kidnapped_walk(std::vector<RecordedPose> walk,
+                                         const std::vector<RecordedPose>& after) {
   const RecordedPose last = walk.back();
   const std::size_t images = (after.size() + 1) / 2;
   const auto first =
@@ -176,8 +176,8 @@ std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& s
   PlannedRun walk = plan(office.world.with(walking, seed_of(3)));
   const PlannedRun after = plan(office.world.with(walking, seed_of(4)));
   walk.poses.resize((walk.poses.size() + 1) / 2);
-  const std::size_t carried_after = walk.poses.size() - 1;
-  walk.poses = carried_walk(std::move(walk.poses), after.poses);
+  const std::size_t kidnapped_after = walk.poses.size() - 1;
+  walk.poses = kidnapped_walk(std::move(walk.poses), after.poses);
 
   Progress progress("rendering", office.poses.size() + asked.poses.size() + elsewhere.poses.size() +
                                      walk.poses.size());
@@ -190,7 +190,7 @@ std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& s
   recordings.query_run = record_run(asked, "query_run");
   recordings.elsewhere_run = record_run(elsewhere, "elsewhere_run");
   recordings.walk_run = record_run(walk, "walk_run");
-  recordings.carried_after = carried_after;
+  recordings.kidnapped_after = kidnapped_after;
   progress.clear();
 
   recordings.true_camera = std::get<Camera>(office.world.camera());

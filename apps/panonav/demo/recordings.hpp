@@ -24,7 +24,7 @@ struct DemoOptions {
   [[nodiscard]] double spacing_m() const noexcept { return quick ? 0.5 : 0.25; }
   [[nodiscard]] int questions() const noexcept { return quick ? 8 : 40; }
   [[nodiscard]] int runs_home() const noexcept { return quick ? 3 : 12; }
-  /// Images of the robot that is tracked, half of them before it is carried elsewhere.
+  /// Images of the robot that is tracked, half of them before it is kidnapped.
   [[nodiscard]] int walk_images() const noexcept { return quick ? 20 : 60; }
   [[nodiscard]] int missions() const noexcept { return quick ? 3 : 12; }
   [[nodiscard]] double route_m() const noexcept { return quick ? 3.0 : 10.0; }
@@ -33,13 +33,13 @@ struct DemoOptions {
 /// What the demonstration works on: pictures of a simulated mirror camera with its sensor's noise,
 /// on the disk as any recording, and the camera as calibration found it in them.
 struct DemoRecordings {
-  Dataset memory_run;             ///< the office on a grid
-  Dataset query_run;              ///< the same office at random places
-  Dataset elsewhere_run;          ///< another room
-  Dataset walk_run;               ///< a walk through the office, with odometry
-  std::size_t carried_after = 0;  ///< the image of the walk; odometry does not know
-  MirrorCircle mirror;            ///< what calibration found
-  int calibrated_on = 0;          ///< pictures
+  Dataset memory_run;               ///< the office on a grid
+  Dataset query_run;                ///< the same office at random places
+  Dataset elsewhere_run;            ///< another room
+  Dataset walk_run;                 ///< a walk through the office, with odometry
+  std::size_t kidnapped_after = 0;  ///< the image of the walk; odometry does not know
+  MirrorCircle mirror;              ///< what calibration found
+  int calibrated_on = 0;            ///< pictures
   Camera true_camera;
   Scene office_scene;
   std::shared_ptr<const SimulatedWorld> office_world;  ///< in grey, as the robot sees it

@@ -12,13 +12,13 @@
 
 namespace panonav::command {
 
-/// A robot that does not know where it is drives through the office and is carried away half way.
+/// A robot that does not know where it is drives through the office and is kidnapped half way.
 struct DemoTrack {
   std::size_t images = 0;
   /// Images until it says that it is localised and is within the views' spacing of the truth, that
-  /// one included; empty: never before it was carried away.
+  /// one included; empty: never before it was kidnapped.
   std::optional<std::size_t> until_localised;
-  /// The same from the first image after it was carried away on.
+  /// The same from the first image after it was kidnapped on.
   std::optional<std::size_t> until_found_again;
   std::size_t localised = 0;     ///< images at which it says so
   std::size_t wrong = 0;         ///< of these, farther off than the spacing

@@ -29,9 +29,9 @@ HeatMap raster(const std::vector<Pose2>& places, double spacing_m,
     high = {std::max(high.x_m, place.x_m), std::max(high.y_m, place.y_m)};
   }
   // A far outlier must not blow up the raster.
-  constexpr double most_cells = 500.0;
+  constexpr double max_cells = 500.0;
   const double extent_m = std::max(high.x_m - low.x_m, high.y_m - low.y_m);
-  const double cell_m = std::max(spacing_m, extent_m / most_cells);
+  const double cell_m = std::max(spacing_m, extent_m / max_cells);
   const auto cell = [&](double at_m, double from_m) {
     return static_cast<int>(std::lround((at_m - from_m) / cell_m));
   };

@@ -13,7 +13,7 @@ namespace {
 
 constexpr int neighbours = 8;
 
-/// The views of the largest part that have a true position.
+/// The views of the largest component that have a true position.
 struct Known {
   std::vector<Point2> arranged;
   std::vector<Point2> truth;
@@ -23,22 +23,14 @@ Known known_of(const Lattice& lattice, const VisualMemory& memory) {
   Known known;
   for (const LatticeNode& node : lattice.nodes) {
     const auto& pose = memory.info(node.view).pose;
-    if (node.part != 0 || !pose) continue;
+    if (node.component != 0 || !pose) continue;
     known.arranged.push_back(node.pose.position());
     known.truth.push_back(pose->position());
   }
   return known;
 }
 
-bool is_one_place(const std::vector<Point2>& points) {
-  return std::ranges::all_of(points, [&](const Point2& p) { return p == points.front(); });
-}
-
-bool is_comparable(const Known& known) {
-  return known.truth.size() >= 3 && !is_one_place(known.truth) && !is_one_place(known.arranged);
-}
-
-/// Springs that were not given up, as lines between `positions`.
+/// Springs that were not rejected, as lines between `positions`.
 MapLayer springs_between(const Lattice& lattice,
                          const std::vector<std::optional<Point2>>& positions) {
   MapLayer layer{.label = "springs", .colour = "#c7c7c7"};
@@ -61,10 +53,10 @@ MapPlot plot_of(std::string title, const Lattice& lattice,
 
 }  // namespace
 
-std::optional<LatticeComparison> compare_with_truth(const Lattice& lattice,
-                                                    const VisualMemory& memory) {
+std::optional<LatticeComparison> compare_with_ground_truth(const Lattice& lattice,
+                                                           const VisualMemory& memory) {
   const Known known = known_of(lattice, memory);
-  if (!is_comparable(known)) return std::nullopt;
+  if (!is_comparable(known.arranged, known.truth)) return std::nullopt;
   const auto difference = shape_difference(known.arranged, known.truth);
   const auto alignment = align(known.arranged, known.truth, {.allow_scale = true});
   LatticeComparison comparison{.compared = known.truth.size(),
@@ -83,7 +75,7 @@ std::optional<LatticeComparison> compare_with_truth(const Lattice& lattice,
 void write_lattice_picture(const std::filesystem::path& path, const Lattice& lattice,
                            const VisualMemory& memory) {
   const Known known = known_of(lattice, memory);
-  const bool comparable = is_comparable(known);
+  const bool comparable = is_comparable(known.arranged, known.truth);
   Alignment truth_from_lattice;
   if (comparable) {
     truth_from_lattice =
@@ -94,7 +86,7 @@ void write_lattice_picture(const std::filesystem::path& path, const Lattice& lat
   for (const LatticeNode& node : lattice.nodes) {
     arranged.emplace_back();
     truth.emplace_back();
-    if (node.part != 0) continue;
+    if (node.component != 0) continue;
     arranged.back() = truth_from_lattice.apply(node.pose.position());
     const auto& pose = memory.info(node.view).pose;
     if (pose) truth.back() = pose->position();

@@ -9,9 +9,9 @@
 
 namespace panonav::command {
 
-/// How the largest part of an arrangement compares with the positions that the memory knows.
+/// How the largest component of an arrangement compares with the positions that the memory knows.
 struct LatticeComparison {
-  std::size_t compared = 0;               ///< views of that part with a true position
+  std::size_t compared = 0;               ///< views of that component with a true position
   double shape_difference = 1.0;          ///< mu [F11], 0 .. 1
   double with_reflection = 1.0;           ///< the same when a mirror image is allowed
   double rms_m = 0.0;                     ///< after the best alignment with a free scale
@@ -20,11 +20,11 @@ struct LatticeComparison {
   std::optional<double> continuity;
 };
 /// Empty where fewer than three views have a position, or all are at one place.
-[[nodiscard]] std::optional<LatticeComparison> compare_with_truth(const Lattice& lattice,
-                                                                  const VisualMemory& memory);
+[[nodiscard]] std::optional<LatticeComparison> compare_with_ground_truth(
+    const Lattice& lattice, const VisualMemory& memory);
 
-/// Draws the largest part with its springs; where the memory knows positions, the map is laid over
-/// them and they stand beside it. Throws what `write_plot` throws.
+/// Draws the largest component with its springs; where the memory knows positions, the map is laid
+/// over them and they stand beside it. Throws what `write_plot` throws.
 void write_lattice_picture(const std::filesystem::path& path, const Lattice& lattice,
                            const VisualMemory& memory);
 

@@ -15,7 +15,7 @@ namespace {
 constexpr double right_closure_m = 1.0;
 constexpr std::size_t neighbours = 8;
 
-/// The nodes of the largest part beside what is known of them.
+/// The nodes of the largest component beside what is known of them.
 struct Nodes {
   std::vector<Point2> map;
   std::vector<Point2> truth;     // as many, or none where one is not known
@@ -25,10 +25,10 @@ struct Nodes {
 
 Nodes nodes_of(const Dataset& recording, const MappedRun& run) {
   Nodes nodes;
-  const std::size_t part = largest_part(run.map);
+  const std::size_t component = largest_component(run.map);
   for (std::size_t i = 0; i < run.map.nodes.size(); ++i) {
     const MapNode& node = run.map.nodes[i];
-    if (node.part != part) continue;
+    if (node.component != component) continue;
     const DatasetEntry& entry = recording.entries[run.observations[i]];
     nodes.number.emplace(node.view, nodes.map.size());
     nodes.map.push_back(node.pose.position());
@@ -40,16 +40,6 @@ Nodes nodes_of(const Dataset& recording, const MappedRun& run) {
   return nodes;
 }
 
-bool is_one_place(const std::vector<Point2>& points) {
-  return std::ranges::all_of(points, [&](const Point2& p) { return p == points.front(); });
-}
-
-// Three points at least, and a shape in both.
-bool is_comparable(const std::vector<Point2>& points, const std::vector<Point2>& truth) {
-  return points.size() >= 3 && truth.size() == points.size() && !is_one_place(points) &&
-         !is_one_place(truth);
-}
-
 std::vector<Point2> moved(const std::vector<Point2>& points, const Alignment& alignment) {
   std::vector<Point2> result;
   for (const Point2& p : points) result.push_back(alignment.apply(p));
@@ -58,7 +48,8 @@ std::vector<Point2> moved(const std::vector<Point2>& points, const Alignment& al
 
 }  // namespace
 
-std::optional<MapComparison> compare_with_truth(const Dataset& recording, const MappedRun& run) {
+std::optional<MapComparison> compare_with_ground_truth(const Dataset& recording,
+                                                       const MappedRun& run) {
   const Nodes nodes = nodes_of(recording, run);
   if (!is_comparable(nodes.map, nodes.truth)) return std::nullopt;
   MapComparison comparison;
@@ -95,8 +86,8 @@ void write_map_picture(const std::filesystem::path& path, const Dataset& recordi
   std::vector<Point2> map = nodes.map;
   if (is_comparable(nodes.map, nodes.truth)) {
     map = moved(nodes.map, align(nodes.map, nodes.truth, {.allow_scale = !run.wheels}));
-    plot.title = "map beside the truth";
-    plot.layers.push_back({.label = "truth", .colour = "#999999", .lines = {nodes.truth}});
+    plot.title = "map beside the ground truth";
+    plot.layers.push_back({.label = "ground truth", .colour = "#999999", .lines = {nodes.truth}});
     if (is_comparable(nodes.odometry, nodes.truth)) {
       plot.layers.push_back({.label = "wheels",
                              .colour = "#d62728",

@@ -1,32 +1,34 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 
 #include "panonav/io/dataset.hpp"
 #include "panonav/pipeline/mapper.hpp"
 
 namespace panonav::command {
 
-/// Draws the largest part of the map with its closures; where the recording knows positions, the
-/// map is laid over them, and so is the odometry of its wheels. Throws what `write_plot` throws.
+/// Draws the largest component of the map with its closures; where the recording knows positions,
+/// the map is laid over them, and so is the odometry of its wheels. Throws what `write_plot`
+/// throws.
 void write_map_picture(const std::filesystem::path& path, const Dataset& recording,
                        const MappedRun& run);
 
 /// How the map compares with the positions that the recording knows.
 struct MapComparison {
-  std::size_t compared = 0;       ///< nodes of the largest part with a true position
+  std::size_t compared = 0;       ///< nodes of the largest component with a true position
   double shape_difference = 0.0;  ///< mu [F11], 0 .. 1
   double rms_m = 0.0;  ///< after the best alignment; with a free scale where wheels tell none
   double scale = 1.0;  ///< of that alignment
-  double trustworthiness = 1.0;  ///< of 8 neighbours
-  double continuity = 1.0;
+  std::optional<double> trustworthiness;  ///< of 8 neighbours; empty where nodes are too few
+  std::optional<double> continuity;
   std::size_t right_closures = 0;  ///< views at most 1 m apart
   std::size_t wrong_closures = 0;
   /// Of the wheels alone, over the same nodes; empty where the recording has no odometry.
   std::optional<double> odometry_shape_difference;
 };
 /// Empty where fewer than three nodes have a position, or all are at one place.
-[[nodiscard]] std::optional<MapComparison> compare_with_truth(const Dataset& recording,
-                                                              const MappedRun& run);
+[[nodiscard]] std::optional<MapComparison> compare_with_ground_truth(const Dataset& recording,
+                                                                     const MappedRun& run);
 
 }  // namespace panonav::command

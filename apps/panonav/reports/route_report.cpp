@@ -38,9 +38,9 @@ MapLayer path_layer(std::span<const Pose2> path) {
 
 /// Lines at equal steps of way from the bottom to the top.
 void draw_panorama(const fs::path& path, const RoutePanorama& route) {
-  constexpr int most_rows = 400;
+  constexpr int max_rows = 400;
   const double length_m = route.length_m();
-  const int rows = std::clamp(static_cast<int>(route.size()), 1, most_rows);
+  const int rows = std::clamp(static_cast<int>(route.size()), 1, max_rows);
   const auto columns = static_cast<std::size_t>(route.columns());
   PicturePlot plot{.title = "What the route looks like: each row is the horizon at one place",
                    .x_label = "azimuth from straight ahead [degrees], left positive",
@@ -118,7 +118,7 @@ void draw_lines(const fs::path& path, const RouteLines& route,
 
 void draw_path(const fs::path& path, const RouteLines& route,
                const std::vector<FollowedImage>& images) {
-  MapLayer truth{.label = "true path", .colour = "#1f5fd0"};
+  MapLayer truth{.label = "ground truth", .colour = "#1f5fd0"};
   MapLayer fixes{.label = "fixes", .colour = "#000000"};
   MapLayer changed{.label = "something changed in view", .colour = "#d55e00"};
   MapLayer off{.label = "true place where not on the route", .colour = "#e0201b"};

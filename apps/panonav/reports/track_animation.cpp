@@ -40,11 +40,11 @@ ordered_json image_json(const TrackedImage& image) {
   return {{"file", image.file},
           {"state", name_of(estimate.state)},
           {"pose", estimate.pose ? pose_json(*estimate.pose) : ordered_json()},
-          {"truth", std::move(truth)},
+          {"ground_truth", std::move(truth)},
           {"error", error ? ordered_json(rounded(*error)) : ordered_json()},
           {"modes", estimate.modes.size()},
           {"count", estimate.particles},
-          {"redrawn", estimate.redrawn},
+          {"injected", estimate.injected},
           {"particles", std::move(particles)}};
 }
 

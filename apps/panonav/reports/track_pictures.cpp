@@ -26,13 +26,13 @@ MapLayer references(const VisualMemory& memory) {
 
 /// One line for each stretch of images that hold a position and follow each other.
 Lines lines_of(const std::vector<std::optional<Point2>>& positions,
-               const std::optional<std::size_t>& carried_after) {
+               const std::optional<std::size_t>& kidnapped_after) {
   Lines lines;
   bool going_on = false;
   for (std::size_t i = 0; i < positions.size(); ++i) {
     if (positions[i] && !going_on) lines.emplace_back();
     if (positions[i]) lines.back().push_back(*positions[i]);
-    going_on = positions[i] && carried_after != i;
+    going_on = positions[i] && kidnapped_after != i;
   }
   std::erase_if(lines, [](const auto& line) { return line.size() < 2; });
   return lines;
@@ -44,8 +44,9 @@ MapLayer true_path(const std::vector<TrackedImage>& images, std::size_t count,
   for (std::size_t i = 0; i < count; ++i) {
     if (images[i].truth) positions[i] = images[i].truth->position();
   }
-  return {
-      .label = "true path", .colour = blue, .lines = lines_of(positions, background.carried_after)};
+  return {.label = "ground truth",
+          .colour = blue,
+          .lines = lines_of(positions, background.kidnapped_after)};
 }
 
 MapLayer estimated_path(const std::vector<TrackedImage>& images, std::size_t count,
@@ -56,7 +57,7 @@ MapLayer estimated_path(const std::vector<TrackedImage>& images, std::size_t cou
   }
   return {.label = "estimated path",
           .colour = black,
-          .lines = lines_of(positions, background.carried_after)};
+          .lines = lines_of(positions, background.kidnapped_after)};
 }
 
 }  // namespace
@@ -68,9 +69,9 @@ void draw_track_map(const VisualMemory& memory, const std::vector<TrackedImage>&
   MapLayer lost{.label = "true place where lost", .colour = red};
   MapLayer start{.label = "start", .colour = "#009e73"};
   if (images.front().truth) start.squares.push_back(images.front().truth->position());
-  MapLayer carried{.label = "carried here", .colour = "#cc79a7"};
-  if (background.carried_after && images.at(*background.carried_after + 1).truth) {
-    carried.squares.push_back(images[*background.carried_after + 1].truth->position());
+  MapLayer kidnapped{.label = "kidnapped to here", .colour = "#cc79a7"};
+  if (background.kidnapped_after && images.at(*background.kidnapped_after + 1).truth) {
+    kidnapped.squares.push_back(images[*background.kidnapped_after + 1].truth->position());
   }
   for (const TrackedImage& image : images) {
     const auto& pose = image.estimate.pose;
@@ -87,7 +88,7 @@ void draw_track_map(const VisualMemory& memory, const std::vector<TrackedImage>&
   for (MapLayer& layer :
        std::vector{references(memory), true_path(images, images.size(), background),
                    estimated_path(images, images.size(), background), localised, guessed, lost,
-                   start, carried}) {
+                   start, kidnapped}) {
     plot.layers.push_back(std::move(layer));
   }
   write_plot(path, plot);
@@ -113,8 +114,8 @@ void draw_track_snapshots(const VisualMemory& memory, const std::vector<TrackedI
     if (image.truth) truth.crosses.push_back(image.truth->position());
     std::string title =
         "image " + std::to_string(number + 1) + ": " + std::string(name_of(image.estimate.state));
-    if (background.carried_after && number == *background.carried_after + 1) {
-      title += ", carried here";
+    if (background.kidnapped_after && number == *background.kidnapped_after + 1) {
+      title += ", kidnapped to here";
     }
     MapPlot panel{.title = std::move(title), .layers = background.surroundings};
     for (MapLayer& layer :

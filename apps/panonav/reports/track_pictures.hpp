@@ -15,8 +15,8 @@ namespace panonav::command {
 /// What is drawn below a tracked run.
 struct TrackBackground {
   std::vector<MapLayer> surroundings;
-  /// The last image before the robot was carried elsewhere; empty: it was not.
-  std::optional<std::size_t> carried_after;
+  /// The last image before the robot was kidnapped; empty: it was not.
+  std::optional<std::size_t> kidnapped_after;
 };
 
 /// True and estimated path of a run from above, and what the filter said of each image. Throws as

@@ -73,7 +73,7 @@ void draw_errors(const std::vector<TrackedImage>& images, double spacing_m, cons
 
 void draw_particles(const std::vector<TrackedImage>& images, const fs::path& path) {
   Series all{.label = "particles", .style = SeriesStyle::lines};
-  Series redrawn{.label = "drawn anew", .style = SeriesStyle::points};
+  Series injected{.label = "drawn anew", .style = SeriesStyle::points};
   Series effective{.label = "effective number", .style = SeriesStyle::lines};
   for (std::size_t i = 0; i < images.size(); ++i) {
     const MonteCarloEstimate& estimate = images[i].estimate;
@@ -82,12 +82,12 @@ void draw_particles(const std::vector<TrackedImage>& images, const fs::path& pat
     };
     add(all, estimate.particles);
     add(effective, estimate.effective_particles);
-    if (estimate.redrawn > 0) add(redrawn, estimate.redrawn);
+    if (estimate.injected > 0) add(injected, estimate.injected);
   }
   write_plot(path, LinePlot{.title = "Particles",
                             .x_label = "image",
                             .y_label = "number",
-                            .series = {all, redrawn, effective},
+                            .series = {all, injected, effective},
                             .log_y = true});
 }
 
@@ -194,7 +194,7 @@ void write_track_report(const fs::path& folder, const VisualMemory& memory, doub
   page.section("Particles");
   page.text(
       "More are used while much is possible, fewer once they lie close together. By those drawn "
-      "anew a robot that was carried away is found again.");
+      "anew a robot that was kidnapped is found again.");
   page.pictures(
       {{"particles.png", "Number of particles after each image, on a logarithmic scale"}});
   page.write(folder);

@@ -54,7 +54,8 @@ std::vector<CoarseMotion> motions_of(const ArrangeArguments& wanted, const Visua
   return motions;
 }
 
-/// Poses of the largest part in the order of the views; the stamp is the view's, or its number.
+/// Poses of the largest component in the order of the views; the stamp is the view's, or its
+/// number.
 std::vector<StampedPose> trajectory_of(const Lattice& lattice, const VisualMemory& memory) {
   const auto has_stamp = [&](const LatticeNode& node) {
     return memory.info(node.view).stamp_s.has_value();
@@ -62,7 +63,7 @@ std::vector<StampedPose> trajectory_of(const Lattice& lattice, const VisualMemor
   const bool stamped = std::ranges::all_of(lattice.nodes, has_stamp);
   std::vector<StampedPose> trajectory;
   for (const LatticeNode& node : lattice.nodes) {
-    if (node.part != 0) continue;
+    if (node.component != 0) continue;
     trajectory.push_back(
         {stamped ? *memory.info(node.view).stamp_s : static_cast<double>(node.view.value),
          node.pose});
@@ -76,16 +77,16 @@ std::vector<StampedPose> trajectory_of(const Lattice& lattice, const VisualMemor
   return trajectory;
 }
 
-std::size_t number_given_up(const Lattice& lattice) {
+std::size_t number_rejected(const Lattice& lattice) {
   return static_cast<std::size_t>(std::ranges::count_if(
-      lattice.springs, [](const auto& spring) { return spring.weight < least_spring_weight; }));
+      lattice.springs, [](const auto& spring) { return spring.weight < min_spring_weight; }));
 }
 
 #ifdef PANONAV_COMMAND_SIMULATES
 ordered_json as_json(const LatticeComparison& comparison) {
   return {{"views", comparison.compared},
-          {"shape_difference", comparison.shape_difference},
-          {"shape_difference_with_reflection", comparison.with_reflection},
+          {"procrustes_disparity", comparison.shape_difference},
+          {"procrustes_disparity_with_reflection", comparison.with_reflection},
           {"rms_m", comparison.rms_m},
           {"scale", comparison.scale},
           {"trustworthiness", or_null(comparison.trustworthiness)},
@@ -95,15 +96,16 @@ ordered_json as_json(const LatticeComparison& comparison) {
 
 ordered_json as_json(const ArrangeArguments& wanted, const Lattice& lattice,
                      const VisualMemory& memory) {
-  auto parts = ordered_json::array();
-  for (const LatticePart& part : lattice.parts) {
-    parts.push_back({{"views", part.views}, {"handedness_known", part.handedness_known}});
+  auto components = ordered_json::array();
+  for (const LatticeComponent& component : lattice.components) {
+    components.push_back(
+        {{"views", component.views}, {"handedness_known", component.handedness_known}});
   }
   auto nodes = ordered_json::array();
   for (const LatticeNode& node : lattice.nodes) {
     nodes.push_back({{"view", node.view.value},
                      {"file", memory.info(node.view).name},
-                     {"part", node.part},
+                     {"connected_component", node.component},
                      {"x", node.pose.x_m},
                      {"y", node.pose.y_m},
                      {"heading_rad", wanted.lattice.phases || lattice.metric
@@ -112,17 +114,17 @@ ordered_json as_json(const ArrangeArguments& wanted, const Lattice& lattice,
   }
   ordered_json json{{"memory", wanted.memory},
                     {"views", lattice.nodes.size()},
-                    {"parts", std::move(parts)},
+                    {"connected_components", std::move(components)},
                     {"springs", lattice.springs.size()},
-                    {"springs_given_up", number_given_up(lattice)},
+                    {"springs_rejected", number_rejected(lattice)},
                     {"metric", lattice.metric},
                     {"iterations", lattice.iterations},
                     {"energy", lattice.energy},
                     {"nodes", std::move(nodes)},
-                    {"truth", nullptr}};
+                    {"ground_truth", nullptr}};
 #ifdef PANONAV_COMMAND_SIMULATES
-  if (const auto comparison = compare_with_truth(lattice, memory)) {
-    json["truth"] = as_json(*comparison);
+  if (const auto comparison = compare_with_ground_truth(lattice, memory)) {
+    json["ground_truth"] = as_json(*comparison);
   }
 #endif
   return json;
@@ -131,22 +133,23 @@ ordered_json as_json(const ArrangeArguments& wanted, const Lattice& lattice,
 void print_result(const Lattice& lattice, const VisualMemory& memory, Session& session) {
   session.print(session.strong(std::to_string(lattice.nodes.size())) + " views arranged by " +
                 std::to_string(lattice.springs.size()) + " springs, " +
-                std::to_string(number_given_up(lattice)) + " of them given up; unit: " +
+                std::to_string(number_rejected(lattice)) + " of them rejected; unit: " +
                 (lattice.metric ? "metres" : "the distance to the nearest view (median)"));
-  if (lattice.parts.size() > 1) {
+  if (lattice.components.size() > 1) {
     std::string sizes;
-    for (const auto& part : lattice.parts) {
-      sizes += (sizes.empty() ? "" : ", ") + std::to_string(part.views);
+    for (const auto& component : lattice.components) {
+      sizes += (sizes.empty() ? "" : ", ") + std::to_string(component.views);
     }
-    session.print(session.bad("The map is in " + std::to_string(lattice.parts.size()) + " parts") +
-                  " that nothing connects, of so many views: " + sizes);
+    session.print(
+        session.bad("The map is in " + std::to_string(lattice.components.size()) + " components") +
+        " that nothing connects, of so many views: " + sizes);
   }
-  if (!lattice.parts.front().handedness_known) {
+  if (!lattice.components.front().handedness_known) {
     session.print("It may as well be the mirror image: nothing tells left from right.");
   }
 #ifdef PANONAV_COMMAND_SIMULATES
-  if (const auto comparison = compare_with_truth(lattice, memory)) {
-    session.print("beside the true positions: shape difference " +
+  if (const auto comparison = compare_with_ground_truth(lattice, memory)) {
+    session.print("beside the ground truth: Procrustes disparity (shape difference) " +
                   session.strong(fixed(comparison->shape_difference, 4)) + ", " +
                   fixed(comparison->rms_m, 2) + " m rms with a free scale of " +
                   fixed(comparison->scale, 3));
@@ -192,9 +195,10 @@ Run declare(Arguments& arguments) {
   arguments.positional("MEMORY", wanted->memory, "Memory file; its views may be in any order");
   arguments.option("--odometry", wanted->odometry,
                    "Take the robot's motion between views from this data set, by file name");
-  arguments.option("--tum", wanted->tum,
-                   "Write the poses of the largest part to this file: TUM text, or CSV for a name "
-                   "that ends in .csv");
+  arguments.option(
+      "--tum", wanted->tum,
+      "Write the poses of the largest component to this file: TUM text, or CSV for a name "
+      "that ends in .csv");
   arguments.option("--graphml", wanted->graph, "Write the map as a graph to this file");
 #ifdef PANONAV_COMMAND_SIMULATES
   arguments.option("--picture", wanted->picture,
@@ -210,10 +214,10 @@ Run declare(Arguments& arguments) {
 
 Verb arrange_verb() {
   return {
-      "arrange", "Arrange the views of a memory as they lie in space, by their likeness alone",
+      "arrange", "Arrange the views of a memory as they lie in space, by their similarity alone",
       "Views may have been taken in any order; poses in the memory are only compared with. What "
       "nothing\n"
-      "connects is kept as separate parts. The map is stored in the memory under the name "
+      "connects is kept as separate components. The map is stored in the memory under the name "
       "lattice.",
       "  panonav arrange office.panonav --picture lattice.png\n"
       "  panonav arrange hall.panonav --odometry run --graphml hall.graphml --json",

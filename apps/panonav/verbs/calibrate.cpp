@@ -148,7 +148,7 @@ ExitCode calibrate(const Arguments& arguments, const CalibrateArguments& wanted,
   if (!mirror) {
     session.note("panonav calibrate: no mirror found in " + wanted.images.front() +
                  (images.size() > 1 ? " and the others" : "") +
-                 "; give more images, or allow a fainter rim with --least-quality");
+                 "; give more images, or allow a fainter rim with --min-quality");
     return ExitCode::no_answer;
   }
   const double forward_rad = radians(wanted.mirror.forward_angle_deg);

@@ -219,7 +219,7 @@ ExitCode catchment(const Arguments& arguments, const CatchmentArguments& wanted,
         read_stages(*wanted.stages, std::min(62, wanted.homing.views.signature.components - 2));
   }
   settings.typical_distance_given = arguments.given("run", "typical_distance_m");
-  settings.longest_step_given = arguments.given("run", "longest_step_m");
+  settings.longest_step_given = arguments.given("run", "max_step_m");
   settings.obstacle_given = arguments.given("run", "obstacle_m");
   const auto recording = open_recording(wanted.dataset, wanted.pictures, std::nullopt);
   std::optional<Dataset> second;

@@ -99,7 +99,7 @@ void count_pairs(const std::vector<PairVector>& vectors, const CatchmentSettings
                  CatchmentResult& result) {
   const HomingSurvey& survey = result.survey;
   const double bin_m = settings.bin_m.value_or(result.spacing_m);
-  const double most_m = settings.up_to_m.value_or(std::numeric_limits<double>::infinity());
+  const double max_m = settings.up_to_m.value_or(std::numeric_limits<double>::infinity());
   const auto homeward = homeward_by_distance(survey, bin_m);
   std::vector<ErrorSum> errors(homeward.size());
   ErrorSum all;
@@ -113,7 +113,7 @@ void count_pairs(const std::vector<PairVector>& vectors, const CatchmentSettings
                            (goal.heading_rad - place.heading_rad);
       const auto bin = static_cast<std::size_t>(std::lround(off_m / bin_m));
       if (bin < errors.size()) errors[bin].add(error);
-      if (off_m <= most_m + rounding_m) all.add(error);
+      if (off_m <= max_m + rounding_m) all.add(error);
     }
   }
   for (std::size_t i = 0; i < homeward.size(); ++i) {
@@ -122,7 +122,7 @@ void count_pairs(const std::vector<PairVector>& vectors, const CatchmentSettings
   }
   result.pairs = all.count;
   result.orientation_error_rad = all.deviation();
-  result.component = mean_homeward(survey, most_m + rounding_m);
+  result.component = mean_homeward(survey, max_m + rounding_m);
 }
 
 }  // namespace
@@ -181,7 +181,7 @@ CatchmentResult survey_catchment(const RecordedViews& goals, const RecordedViews
     result.typical_distance_m = settings.run.typical_distance_m;
   }
   result.run.typical_distance_m = result.typical_distance_m;
-  if (!settings.longest_step_given) result.run.longest_step_m = 2.0 * result.spacing_m;
+  if (!settings.longest_step_given) result.run.max_step_m = 2.0 * result.spacing_m;
   if (!settings.obstacle_given) result.run.obstacle_m = 0.8 * result.spacing_m;
   const auto surveyed = [&](const std::vector<PairVector>& all) {
     const HomingRule known = [&](std::size_t goal, std::size_t place) {

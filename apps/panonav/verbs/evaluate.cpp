@@ -28,18 +28,18 @@ struct EvaluateArguments {
 };
 
 ordered_json as_json(const ErrorSummary& errors) {
-  return {{"rms", errors.rms},
+  return {{"rmse", errors.rms},
           {"mean", errors.mean},
           {"median", errors.median},
           {"p95", errors.p95},
-          {"largest", errors.largest}};
+          {"max", errors.largest}};
 }
 
 /// Closures are right when their views truly are so near.
 constexpr double right_closure_m = 1.0;
 constexpr int neighbours = 8;
 /// Comparing everyone's neighbours takes time with the square of the poses; more are thinned out.
-constexpr std::size_t most_points = 2000;
+constexpr std::size_t max_points = 2000;
 
 /// What is compared with the truth: poses over time, and closures where a map was given.
 struct Estimate {
@@ -56,12 +56,13 @@ struct MapFigures {
 };
 
 ordered_json as_json(const MapFigures& figures) {
-  ordered_json json{{"shape_difference", nullptr}, {"shape_difference_with_reflection", nullptr},
-                    {"trustworthiness", nullptr},  {"continuity", nullptr},
-                    {"right_closures", nullptr},   {"wrong_closures", nullptr}};
+  ordered_json json{
+      {"procrustes_disparity", nullptr}, {"procrustes_disparity_with_reflection", nullptr},
+      {"trustworthiness", nullptr},      {"continuity", nullptr},
+      {"right_closures", nullptr},       {"wrong_closures", nullptr}};
   if (figures.shape) {
-    json["shape_difference"] = figures.shape->value;
-    json["shape_difference_with_reflection"] = figures.shape->with_reflection;
+    json["procrustes_disparity"] = figures.shape->value;
+    json["procrustes_disparity_with_reflection"] = figures.shape->with_reflection;
   }
   if (figures.neighbours) {
     json["trustworthiness"] = figures.neighbours->trustworthiness;
@@ -75,7 +76,7 @@ ordered_json as_json(const MapFigures& figures) {
 }
 
 ordered_json as_json(const TrajectoryError& error) {
-  const auto& alignment = error.truth_from_estimate;
+  const auto& alignment = error.ground_truth_from_estimate;
   ordered_json json{{"pairs", error.pairs},
                     {"left_out", error.left_out},
                     {"alignment",
@@ -84,22 +85,22 @@ ordered_json as_json(const TrajectoryError& error) {
                       {"x_m", alignment.translation.x_m},
                       {"y_m", alignment.translation.y_m},
                       {"reflected", alignment.reflected}}},
-                    {"position_m", as_json(error.position_m)},
+                    {"ate_m", as_json(error.position_m)},
                     {"heading_rad", as_json(error.heading_rad)},
                     {"relative_pairs", error.relative_pairs},
-                    {"relative_position_m", nullptr},
-                    {"relative_heading_rad", nullptr}};
+                    {"rpe_m", nullptr},
+                    {"rpe_heading_rad", nullptr}};
   if (error.relative_pairs > 0) {
-    json["relative_position_m"] = as_json(error.relative_position_m);
-    json["relative_heading_rad"] = as_json(error.relative_heading_rad);
+    json["rpe_m"] = as_json(error.relative_position_m);
+    json["rpe_heading_rad"] = as_json(error.relative_heading_rad);
   }
   return json;
 }
 
 std::string line_of(const std::string& label, const ErrorSummary& errors, double unit, int digits) {
-  return label + "  rms " + fixed(errors.rms * unit, digits) + "  median " +
+  return label + "  RMSE " + fixed(errors.rms * unit, digits) + "  median " +
          fixed(errors.median * unit, digits) + "  95 % within " + fixed(errors.p95 * unit, digits) +
-         "  largest " + fixed(errors.largest * unit, digits);
+         "  maximum " + fixed(errors.largest * unit, digits);
 }
 
 Trajectory read(const std::string& path) {
@@ -123,7 +124,7 @@ Estimate read_map(const std::string& path) {
                                 " has no stamp; allowed: a recording with the column 'stamp_s'");
     }
     estimate.stamp_s.emplace(node.view, *stamp_s);
-    if (node.part == map->nodes.front().part) poses.push_back({*stamp_s, node.pose});
+    if (node.component == map->nodes.front().component) poses.push_back({*stamp_s, node.pose});
   }
   std::ranges::sort(poses, {}, &StampedPose::stamp_s);
   estimate.trajectory = Trajectory(poses);
@@ -135,23 +136,18 @@ Estimate read_estimate(const std::string& path) {
   return {.trajectory = read(path)};
 }
 
-MapFigures compare_as_map(const Estimate& estimate, const Trajectory& truth, double longest_gap_s) {
+MapFigures compare_as_map(const Estimate& estimate, const Trajectory& truth, double max_gap_s) {
   std::vector<Point2> map;
   std::vector<Point2> known;
   for (const StampedPose& pose : estimate.trajectory.poses()) {
-    const auto there = truth.at(pose.stamp_s, longest_gap_s);
+    const auto there = truth.at(pose.stamp_s, max_gap_s);
     if (!there) continue;
     map.push_back(pose.pose.position());
     known.push_back(there->position());
   }
   MapFigures figures;
-  const auto is_one_place = [](const std::vector<Point2>& points) {
-    return std::ranges::all_of(points, [&](const Point2& p) { return p == points.front(); });
-  };
-  if (map.size() >= 2 && !is_one_place(map) && !is_one_place(known)) {
-    figures.shape = shape_difference(map, known);
-  }
-  const std::size_t every = (map.size() + most_points - 1) / most_points;
+  if (is_comparable(map, known)) figures.shape = shape_difference(map, known);
+  const std::size_t every = (map.size() + max_points - 1) / max_points;
   std::vector<Point2> few;
   std::vector<Point2> few_known;
   for (std::size_t i = 0; every > 0 && i < map.size(); i += every) {
@@ -165,7 +161,7 @@ MapFigures compare_as_map(const Estimate& estimate, const Trajectory& truth, dou
     figures.closures = count_closures(
         estimate.map,
         [&](ViewId view) -> std::optional<Point2> {
-          const auto there = truth.at(estimate.stamp_s.at(view), longest_gap_s);
+          const auto there = truth.at(estimate.stamp_s.at(view), max_gap_s);
           return there ? std::optional(there->position()) : std::nullopt;
         },
         right_closure_m);
@@ -175,7 +171,7 @@ MapFigures compare_as_map(const Estimate& estimate, const Trajectory& truth, dou
 
 void print_figures(const MapFigures& figures, Session& session) {
   if (figures.shape) {
-    session.print("shape difference     " + fixed(figures.shape->value, 4) +
+    session.print("Procrustes disparity " + fixed(figures.shape->value, 4) +
                   "  with a reflection allowed " + fixed(figures.shape->with_reflection, 4));
   }
   if (figures.neighbours) {
@@ -198,7 +194,7 @@ ExitCode evaluate(const EvaluateArguments& wanted, Session& session) {
                  " have a stamp within " + wanted.truth + "; do both count the same seconds?");
     return ExitCode::no_answer;
   }
-  const MapFigures figures = compare_as_map(estimate, truth, wanted.options.longest_gap_s);
+  const MapFigures figures = compare_as_map(estimate, truth, wanted.options.max_gap_s);
   if (session.json()) {
     ordered_json json = as_json(*error);
     json.update(as_json(figures));
@@ -206,13 +202,13 @@ ExitCode evaluate(const EvaluateArguments& wanted, Session& session) {
     return ExitCode::done;
   }
   session.print(std::to_string(error->pairs) + " poses compared, " +
-                std::to_string(error->left_out) + " without a true pose");
-  session.print(line_of("position [m]       ", error->position_m, 1.0, 3));
+                std::to_string(error->left_out) + " without ground truth");
+  session.print(line_of("ATE [m]            ", error->position_m, 1.0, 3));
   session.print(line_of("heading [degrees]  ", error->heading_rad, degrees(1.0), 2));
   if (error->relative_pairs > 0) {
     session.print("over " + to_text(wanted.options.relative_distance_m) + " m of path:");
-    session.print(line_of("position [m]       ", error->relative_position_m, 1.0, 3));
-    session.print(line_of("heading [degrees]  ", error->relative_heading_rad, degrees(1.0), 2));
+    session.print(line_of("RPE [m]            ", error->relative_position_m, 1.0, 3));
+    session.print(line_of("RPE [degrees]      ", error->relative_heading_rad, degrees(1.0), 2));
   }
   print_figures(figures, session);
   return ExitCode::done;
@@ -222,7 +218,7 @@ Run declare(Arguments& arguments) {
   auto wanted = std::make_shared<EvaluateArguments>();
   arguments.positional("ESTIMATE", wanted->estimate,
                        "Trajectory as TUM text or CSV, or a memory file (NAME.panonav) with a map");
-  arguments.positional("TRUTH", wanted->truth, "Trajectory as TUM text or CSV");
+  arguments.positional("GROUND_TRUTH", wanted->truth, "Trajectory as TUM text or CSV");
   arguments.options("evaluation", wanted->options);
   return [wanted](Session& session) { return evaluate(*wanted, session); };
 }
@@ -230,7 +226,7 @@ Run declare(Arguments& arguments) {
 }  // namespace
 
 Verb evaluate_verb() {
-  return {"evaluate", "Compare an estimated trajectory or map with the truth",
+  return {"evaluate", "Compare an estimated trajectory or map with the ground truth",
           "Poses are associated by stamp and aligned by least squares unless --align false. Ends "
           "with 1\n"
           "when the two have no time in common.",

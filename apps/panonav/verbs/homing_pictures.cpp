@@ -23,7 +23,7 @@ FourierHomingOptions homing_options(const Arguments& arguments, const HomingArgu
   if (wanted.published) {
     for (const auto* name :
          {"highest", "rising", "turn", "gradient", "weights", "starting_estimates",
-          "displacement_search", "vertical_motion", "lean"}) {
+          "displacement_search", "vertical_motion", "tilt"}) {
       if (!arguments.given("homing", name)) continue;
       throw UsageError("--published sets '" + std::string(name) +
                        "' itself; leave one of them out");

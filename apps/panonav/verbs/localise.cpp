@@ -83,7 +83,7 @@ std::string as_text(const Answer& answer, Session& session) {
   if (found.matches.empty()) return line + session.bad("nothing to compare with");
   const PlaceMatch& nearest = found.matches.front();
   if (!found.known) {
-    return line + session.bad("unknown place") + "  (most alike: " + nearest.name + ")";
+    return line + session.bad("unknown place") + "  (most similar: " + nearest.name + ")";
   }
   line += session.good("near " + nearest.name);
   if (found.position) {

@@ -35,14 +35,14 @@ struct MapArguments {
   bool no_thumbnails = false;
 };
 
-/// Poses of the largest part over time. The stamp is the number of the picture where the recording
-/// has none.
+/// Poses of the largest component over time. The stamp is the number of the picture where the
+/// recording has none.
 std::vector<StampedPose> trajectory_of(const Dataset& recording, const MappedRun& run,
                                        const std::string& dataset) {
   std::vector<StampedPose> trajectory;
-  const std::size_t part = largest_part(run.map);
+  const std::size_t component = largest_component(run.map);
   for (std::size_t i = 0; i < run.map.nodes.size(); ++i) {
-    if (run.map.nodes[i].part != part) continue;
+    if (run.map.nodes[i].component != component) continue;
     const DatasetEntry& entry = recording.entries[run.observations[i]];
     const double stamp_s = entry.stamp_s.value_or(static_cast<double>(run.observations[i]));
     if (!trajectory.empty() && !(stamp_s > trajectory.back().stamp_s)) {
@@ -55,9 +55,9 @@ std::vector<StampedPose> trajectory_of(const Dataset& recording, const MappedRun
   return trajectory;
 }
 
-std::vector<std::size_t> part_sizes(const TopologicalMap& map) {
-  std::vector<std::size_t> sizes(number_of_parts(map), 0);
-  for (const MapNode& node : map.nodes) ++sizes[node.part];
+std::vector<std::size_t> component_sizes(const TopologicalMap& map) {
+  std::vector<std::size_t> sizes(number_of_components(map), 0);
+  for (const MapNode& node : map.nodes) ++sizes[node.component];
   return sizes;
 }
 
@@ -68,32 +68,34 @@ std::size_t number_of_closures(const TopologicalMap& map) {
 #ifdef PANONAV_COMMAND_SIMULATES
 ordered_json as_json(const MapComparison& comparison) {
   ordered_json json{{"nodes", comparison.compared},
-                    {"shape_difference", comparison.shape_difference},
+                    {"procrustes_disparity", comparison.shape_difference},
                     {"rms_m", comparison.rms_m},
                     {"scale", comparison.scale},
-                    {"trustworthiness", comparison.trustworthiness},
-                    {"continuity", comparison.continuity},
+                    {"trustworthiness", or_null(comparison.trustworthiness)},
+                    {"continuity", or_null(comparison.continuity)},
                     {"right_closures", comparison.right_closures},
                     {"wrong_closures", comparison.wrong_closures},
-                    {"odometry_shape_difference", nullptr}};
+                    {"odometry_procrustes_disparity", nullptr}};
   if (comparison.odometry_shape_difference) {
-    json["odometry_shape_difference"] = *comparison.odometry_shape_difference;
+    json["odometry_procrustes_disparity"] = *comparison.odometry_shape_difference;
   }
   return json;
 }
 
 void print_comparison(const MapComparison& comparison, const MappedRun& run, Session& session) {
-  session.print("beside the true positions: shape difference " +
+  session.print("beside the ground truth: Procrustes disparity (shape difference) " +
                 session.strong(fixed(comparison.shape_difference, 4)) + ", " +
                 fixed(comparison.rms_m, 2) + " m rms" +
                 (run.wheels ? "" : " with a free scale of " + fixed(comparison.scale, 2)));
   if (comparison.odometry_shape_difference) {
-    session.print("the wheels alone: shape difference " +
+    session.print("the wheels alone: Procrustes disparity " +
                   fixed(*comparison.odometry_shape_difference, 4));
   }
-  session.print("neighbours kept: trustworthiness " + fixed(comparison.trustworthiness, 3) +
-                ", continuity " + fixed(comparison.continuity, 3) + "; closures right " +
-                std::to_string(comparison.right_closures) + ", wrong " +
+  if (comparison.trustworthiness) {
+    session.print("neighbours kept: trustworthiness " + fixed(*comparison.trustworthiness, 3) +
+                  ", continuity " + fixed(*comparison.continuity, 3));
+  }
+  session.print("closures: right " + std::to_string(comparison.right_closures) + ", wrong " +
                 std::to_string(comparison.wrong_closures));
 }
 #endif
@@ -103,18 +105,23 @@ void print_result(const MapArguments& wanted, const Dataset& recording, const Ma
   const std::size_t nodes = run.map.nodes.size();
   const double step_ms =
       1e3 * run.mapping_s / static_cast<double>(std::max<std::size_t>(1, recording.entries.size()));
-  const auto sizes = part_sizes(run.map);
+  const auto sizes = component_sizes(run.map);
 #ifdef PANONAV_COMMAND_SIMULATES
-  const auto comparison = compare_with_truth(recording, run);
+  const auto comparison = compare_with_ground_truth(recording, run);
 #endif
   if (session.json()) {
-    ordered_json json{{"memory", wanted.memory}, {"pictures", recording.entries.size()},
-                      {"nodes", nodes},          {"skipped", run.skipped},
-                      {"parts", sizes},          {"closures", number_of_closures(run.map)},
-                      {"scale_m", run.scale_m},  {"wheel_lengths", run.wheels},
-                      {"step_ms", step_ms},      {"truth", nullptr}};
+    ordered_json json{{"memory", wanted.memory},
+                      {"pictures", recording.entries.size()},
+                      {"nodes", nodes},
+                      {"skipped", run.skipped},
+                      {"connected_components", sizes},
+                      {"closures", number_of_closures(run.map)},
+                      {"scale_m", run.scale_m},
+                      {"wheel_lengths", run.wheels},
+                      {"step_ms", step_ms},
+                      {"ground_truth", nullptr}};
 #ifdef PANONAV_COMMAND_SIMULATES
-    if (comparison) json["truth"] = as_json(*comparison);
+    if (comparison) json["ground_truth"] = as_json(*comparison);
 #endif
     session.print(json.dump());
     return;
@@ -126,7 +133,7 @@ void print_result(const MapArguments& wanted, const Dataset& recording, const Ma
   if (sizes.size() > 1) {
     std::string text;
     for (const std::size_t size : sizes) text += (text.empty() ? "" : ", ") + std::to_string(size);
-    session.print(session.bad("The map is in " + std::to_string(sizes.size()) + " parts") +
+    session.print(session.bad("The map is in " + std::to_string(sizes.size()) + " components") +
                   " that nothing connects, of so many places: " + text);
   }
   const double height_m = wanted.mapper.odometry.camera_height_m;
@@ -198,9 +205,10 @@ Run declare(Arguments& arguments) {
   arguments.positional("MEMORY", wanted->memory,
                        "Memory file (NAME.panonav); views that it does not know are appended");
   declare_pictures(arguments, wanted->pictures);
-  arguments.option("--tum", wanted->tum,
-                   "Write the poses of the largest part to this file: TUM text, or CSV for a name "
-                   "that ends in .csv");
+  arguments.option(
+      "--tum", wanted->tum,
+      "Write the poses of the largest component to this file: TUM text, or CSV for a name "
+      "that ends in .csv");
   arguments.option("--graphml", wanted->graph, "Write the map as a graph to this file");
 #ifdef PANONAV_COMMAND_SIMULATES
   arguments.option("--picture", wanted->picture,
@@ -226,7 +234,7 @@ Verb map_verb() {
           "its; all\n"
           "else comes from the views. Without odometry, --camera-height-m makes metres of lengths. "
           "What\n"
-          "nothing connects is kept as separate parts.",
+          "nothing connects is kept as separate components.",
           "  panonav map run office.panonav\n"
           "  panonav map run office.panonav --picture map.png --graphml map.graphml --tum map.tum\n"
           "  panonav map walk walk.panonav --camera-height-m 0.6\n"

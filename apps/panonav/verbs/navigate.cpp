@@ -24,7 +24,7 @@ struct NavigateArguments {
   std::string scene;
   std::optional<std::string> start;
   std::optional<std::string> kidnap;
-  std::optional<std::string> passages;
+  std::optional<std::string> edges;
   std::optional<std::string> route;
   std::optional<std::string> log;
   std::optional<std::string> picture;
@@ -67,7 +67,7 @@ ordered_json as_json(const NavigationDecision& decision, const Pose2& pose,
                      const RobotNavigator& robot) {
   auto events = ordered_json::array();
   for (const NavigationEvent event : decision.events) events.push_back(name_of(event));
-  return {{"look", decision.step},
+  return {{"step", decision.step},
           {"state", name_of(decision.state)},
           {"direction_rad", decision.direction_rad},
           {"advance_m", decision.advance_m},
@@ -97,9 +97,9 @@ std::string in_words(NavigationEvent event) {
     case NavigationEvent::obstructed:
       return "was stopped by something in its way";
     case NavigationEvent::closed:
-      return "takes a passage for blocked and plans anew";
+      return "takes an edge for blocked and plans anew";
     case NavigationEvent::reopened:
-      return "tries blocked passages again";
+      return "tries blocked edges again";
     case NavigationEvent::homing:
       return "goes home to the goal's view";
     case NavigationEvent::homing_failed:
@@ -144,32 +144,32 @@ ordered_json summary_json(const NavigateArguments& wanted, RobotNavigator& robot
                           const std::string& goal, const Pose2& start, const MissionRun& run) {
   const NavigationGraph& graph = robot.graph();
   const AreaPlanner& planner = robot.navigator().planner();
-  return {
-      {"memory", wanted.memory},
-      {"goal", goal},
-      {"scene", wanted.scene},
-      {"passages_from", name_of(robot.origin())},
-      {"route", or_null(wanted.route)},
-      {"views", graph.size()},
-      {"passages", graph.edges().size()},
-      {"areas", planner.areas().nodes.size()},
-      {"end", name_of(run.end)},
-      {"reason", reason_of(run.end)},
-      {"looks", run.decisions.size()},
-      {"closed_passages", planner.closed()},
-      {"start", pose_json(start)},
-      {"pose", pose_json(run.path.back())},
-      {"goal_distance_m", or_null(run.end_distance_m)},
-      {"travelled_m", run.travelled_m},
-      {"shortest_m", or_null(run.shortest_m)},
-      {"carried_after_look", run.carried_at ? ordered_json(*run.carried_at + 1) : ordered_json()}};
+  return {{"memory", wanted.memory},
+          {"goal", goal},
+          {"scene", wanted.scene},
+          {"edges_from", name_of(robot.origin())},
+          {"route", or_null(wanted.route)},
+          {"views", graph.size()},
+          {"edges", graph.edges().size()},
+          {"areas", planner.areas().nodes.size()},
+          {"end", name_of(run.end)},
+          {"reason", reason_of(run.end)},
+          {"steps", run.decisions.size()},
+          {"closed_edges", planner.closed()},
+          {"start", pose_json(start)},
+          {"pose", pose_json(run.path.back())},
+          {"goal_distance_m", or_null(run.end_distance_m)},
+          {"travelled_m", run.travelled_m},
+          {"shortest_m", or_null(run.shortest_m)},
+          {"kidnapped_after_step",
+           run.kidnapped_at ? ordered_json(*run.kidnapped_at + 1) : ordered_json()}};
 }
 
 void print_summary(const MissionRun& run, Session& session) {
   const std::string name(name_of(run.end));
   session.print((run.end == NavigationState::arrived ? session.good(name) : session.bad(name)) +
                 " after " + std::to_string(run.decisions.size()) +
-                " looks: " + std::string(reason_of(run.end)));
+                " steps: " + std::string(reason_of(run.end)));
   if (std::isfinite(run.end_distance_m)) {
     session.print("from where the goal's view was taken: " +
                   session.strong(fixed(run.end_distance_m, 3) + " m"));
@@ -179,8 +179,8 @@ void print_summary(const MissionRun& run, Session& session) {
     way += "; the shortest way is " + fixed(run.shortest_m, 2) + " m long";
   }
   session.print(way);
-  if (run.carried_at) {
-    session.print("carried away after look " + std::to_string(*run.carried_at + 1));
+  if (run.kidnapped_at) {
+    session.print("kidnapped after step " + std::to_string(*run.kidnapped_at + 1));
   }
 }
 
@@ -190,14 +190,15 @@ void write_log(const std::string& path, const MissionRun& run) {
   write_file(path, text);
 }
 
-/// Where the run begins, who is carried where.
+/// Where the run begins, who is kidnapped to where.
 Mission mission_of(const NavigateArguments& wanted, ViewId goal, const MissionPlace& place,
                    std::uint64_t seed) {
   constexpr std::uint64_t stream_of_starts = 4;
   Random random(seed, stream_of_starts);
   Mission mission{goal, place.free_space->random_pose(random), std::nullopt};
   if (wanted.start) mission.start = free_pose("--start", *wanted.start, *place.free_space);
-  if (wanted.kidnap) mission.carried_to = free_pose("--kidnap", *wanted.kidnap, *place.free_space);
+  if (wanted.kidnap)
+    mission.kidnapped_to = free_pose("--kidnap", *wanted.kidnap, *place.free_space);
   return mission;
 }
 
@@ -213,7 +214,7 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
                                 .base = wanted.mission.base,
                                 .route = wanted.route,
                                 .known_route = wanted.known_route};
-  if (wanted.passages) options.edges = graph_origin(*wanted.passages);
+  if (wanted.edges) options.edges = graph_origin(*wanted.edges);
   RobotNavigator robot(wanted.memory, wanted.goal, options, std::nullopt, &session.executor());
   const std::string goal_file = robot.info(robot.goal()).name;
   const RememberedPlace remembered = remembered_by(robot);
@@ -229,7 +230,7 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
   const Mission mission = mission_of(wanted, robot.goal(), place, seed);
   if (!session.json()) {
     session.print(std::to_string(robot.graph().size()) + " views, " +
-                  std::to_string(robot.graph().edges().size()) + " passages from " +
+                  std::to_string(robot.graph().edges().size()) + " edges from " +
                   (robot.origin() == GraphOrigin::arrangement
                        ? "an arrangement made now (panonav arrange would keep one)"
                        : "the memory's " + std::string(name_of(robot.origin()))));
@@ -268,7 +269,7 @@ Run declare(Arguments& arguments) {
                    "Where it starts: X,Y,HEADING_DEG; else a free place at random");
   arguments.option("--kidnap", wanted->kidnap,
                    "Carry it to X,Y,HEADING_DEG once half of the way is driven");
-  arguments.choice("--passages", wanted->passages, {"map", "lattice", "links", "arrangement"},
+  arguments.choice("--edges", wanted->edges, {"map", "lattice", "links", "arrangement"},
                    "What to plan over: a stored map, the memory's links, or an arrangement made "
                    "now (default: the first that is there)");
   arguments.option("--route", wanted->route,

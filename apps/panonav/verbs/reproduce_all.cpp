@@ -20,10 +20,10 @@ namespace fs = std::filesystem;
 constexpr const char* results_file = "results.json";
 constexpr const char* run_file = "run.json";
 // More than any run writes.
-constexpr std::size_t largest_file_bytes = 64 << 20;
+constexpr std::size_t max_file_bytes = 64 << 20;
 
 std::string text_of(const fs::path& path) {
-  const auto bytes = read_file(path, largest_file_bytes);
+  const auto bytes = read_file(path, max_file_bytes);
   return {bytes.begin(), bytes.end()};
 }
 

@@ -30,7 +30,7 @@ PaperReproduction run_f11(const ReproduceArguments& wanted, const std::filesyste
       " variants of two simulated places; loops closed, which its authors left to later work; "
       "a corridor of identical doors, Gazebo worlds and recordings where they are at hand, "
       "maps of up to " +
-      std::to_string(options.most_views) + " views. Published figures beside ours.";
+      std::to_string(options.max_views) + " views. Published figures beside ours.";
   return {std::move(lead), reproduce_f11(options, executor, progress)};
 }
 
@@ -86,7 +86,7 @@ PaperReproduction run_navigation(const ReproduceArguments& wanted, const std::fi
   options.scenes = std::min(options.scenes, options.runs);
   std::string lead =
       "What Menegatti, Maeda, Ishiguro 2004, section 3.5, leave to later work: maps of drives, "
-      "changes, a robot that is carried away, blocked passages. " +
+      "changes, a robot that is kidnapped, blocked edges. " +
       std::to_string(options.runs) +
       " missions from random starts to random goals in each kind of place, " +
       std::to_string(options.scenes) +

@@ -45,7 +45,7 @@ ordered_json as_json(const FollowedImage& image, bool headings_known) {
                     {"covariance", nullptr},
                     {"columns", 0},
                     {"changed", ordered_json::array()},
-                    {"truth", nullptr}};
+                    {"ground_truth", nullptr}};
   if (image.fix) {
     const RouteFix& fix = image.fix->fix;
     json["pose"] = pose_json(fix.pose);
@@ -61,12 +61,12 @@ ordered_json as_json(const FollowedImage& image, bool headings_known) {
     json["changed"].push_back({{"from_rad", range.from_rad}, {"to_rad", range.to_rad}});
   }
   if (image.truth) {
-    json["truth"] = {{"x_m", image.truth->x_m},
-                     {"y_m", image.truth->y_m},
-                     {"heading_rad", nullptr},
-                     {"along_m", image.true_place->along_m},
-                     {"lateral_m", image.true_place->lateral_m}};
-    if (headings_known) json["truth"]["heading_rad"] = image.truth->heading_rad;
+    json["ground_truth"] = {{"x_m", image.truth->x_m},
+                            {"y_m", image.truth->y_m},
+                            {"heading_rad", nullptr},
+                            {"along_m", image.true_place->along_m},
+                            {"lateral_m", image.true_place->lateral_m}};
+    if (headings_known) json["ground_truth"]["heading_rad"] = image.truth->heading_rad;
   }
   return json;
 }

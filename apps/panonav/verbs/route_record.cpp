@@ -32,7 +32,7 @@ struct RecordArguments {
   std::optional<std::string> horizon_rows;
   bool odometry = false;
   std::optional<std::string> report;
-  HorizonLineOptions line;
+  HorizonScanlineOptions line;
 };
 
 /// "17-20".

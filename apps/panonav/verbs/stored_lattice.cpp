@@ -15,7 +15,7 @@ void store_lattice(const Lattice& lattice, const VisualMemory& memory, MemoryFil
   const TopologicalMap map = map_of(lattice);
   std::vector<Link> links;
   for (const MapEdge& edge : map.edges) {
-    if (edge.weight < least_spring_weight || known.contains(std::minmax(edge.a, edge.b))) continue;
+    if (edge.weight < min_spring_weight || known.contains(std::minmax(edge.a, edge.b))) continue;
     links.push_back({edge.a, edge.b, edge.kind});
   }
   file.link(links);

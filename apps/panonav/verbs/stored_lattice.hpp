@@ -6,7 +6,7 @@
 namespace panonav::command {
 
 /// Springs that kept less than this of themselves contradict the others and become no links.
-inline constexpr double least_spring_weight = 0.25;
+inline constexpr double min_spring_weight = 0.25;
 
 /// Keeps an arrangement of the file's views in it: as the map "lattice", and as links where views
 /// have none yet. Throws FileError.

@@ -73,10 +73,10 @@ void check(const Arguments& arguments, const TrackArguments& wanted) {
                      to_text(*wanted.start_y_m) + "; allowed: " + to_text(-farthest_m) + " to " +
                      to_text(farthest_m));
   }
-  if (wanted.filter.least_particles > wanted.filter.most_particles) {
-    throw UsageError("--least-particles is " + std::to_string(wanted.filter.least_particles) +
-                     "; allowed: at most --most-particles, which is " +
-                     std::to_string(wanted.filter.most_particles));
+  if (wanted.filter.min_particles > wanted.filter.max_particles) {
+    throw UsageError("--min-particles is " + std::to_string(wanted.filter.min_particles) +
+                     "; allowed: at most --max-particles, which is " +
+                     std::to_string(wanted.filter.max_particles));
   }
 }
 
@@ -162,10 +162,10 @@ ordered_json as_json(const TrackedImage& image) {
           {"particles", estimate.particles},
           {"effective_particles", estimate.effective_particles},
           {"resampled", estimate.resampled},
-          {"redrawn", estimate.redrawn},
+          {"injected", estimate.injected},
           {"difference_here", optional_number(estimate.difference_here)},
           {"difference_anywhere", optional_number(estimate.difference_anywhere)},
-          {"truth", std::move(truth)}};
+          {"ground_truth", std::move(truth)}};
 }
 
 std::string place_text(const Pose2& pose) {
@@ -190,14 +190,14 @@ std::string as_text(const TrackedImage& image, Session& session) {
     return line + "an area around " + place_text(best.mean) + "  spread " +
            fixed(best.spread_m, 2) + " m";
   }
-  constexpr std::size_t most_shown = 3;
+  constexpr std::size_t max_shown = 3;
   line += std::to_string(estimate.modes.size()) + " places:";
-  for (std::size_t i = 0; i < std::min(most_shown, estimate.modes.size()); ++i) {
+  for (std::size_t i = 0; i < std::min(max_shown, estimate.modes.size()); ++i) {
     const PoseMode& mode = estimate.modes[i];
     line += (i > 0 ? ",  " : "  ") + place_text(mode.mean) + " (" + fixed(100.0 * mode.weight, 0) +
             " %)";
   }
-  return estimate.modes.size() > most_shown ? line + ", .." : line;
+  return estimate.modes.size() > max_shown ? line + ", .." : line;
 }
 
 std::string count_text(std::size_t count, std::size_t total) {
@@ -300,7 +300,7 @@ Verb track_verb() {
   return {"track", "Follow a moving robot through its pictures and odometry",
           "Monte-Carlo localisation: the robot need not know where it starts, several places that "
           "look\n"
-          "alike are kept until a picture tells them apart, and a robot that was carried away is "
+          "alike are kept until a picture tells them apart, and a robot that was kidnapped is "
           "found\n"
           "again. Ends with 1 when it was never localised.",
           "  panonav track office.panonav run\n"

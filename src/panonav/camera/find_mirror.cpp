@@ -34,13 +34,13 @@ constexpr double as_clear = 0.6;
 
 /// The disc in the middle is sought among these radii, in radii of the rim; its centre may be off
 /// by a lens that is not quite on the mirror's axis.
-constexpr double smallest_disc = 0.04;
-constexpr double largest_disc = 0.65;
+constexpr double min_disc = 0.04;
+constexpr double max_disc = 0.65;
 constexpr double disc_off_centre = 0.02;
 /// Least quality of its circle: lower when its inside is plain, because the scene around it is
 /// often as dark as the disc, which leaves gaps in its edge.
-constexpr double least_disc = 0.5;
-constexpr double least_plain_disc = 0.3;
+constexpr double min_disc_quality = 0.5;
+constexpr double min_plain_disc_quality = 0.3;
 
 /// What one search needs of one or several images.
 struct Evidence {
@@ -77,7 +77,7 @@ FieldCircle scaled(const FieldCircle& circle, double factor) {
 }
 
 CircleRange scaled(const CircleRange& range, double factor) {
-  return {range.lowest_radius * factor, range.highest_radius * factor, range.visible_part,
+  return {range.lowest_radius * factor, range.highest_radius * factor, range.visible_fraction,
           range.evenness};
 }
 
@@ -152,9 +152,9 @@ std::optional<double> disc_within(const Evidence& seen, std::span<const SmoothPl
                                   const FoundCircle& rim) {
   const double rim_radius = rim.radius_px / seen.middle_reduction;
   CircleRange range;
-  range.lowest_radius = std::max(3.0, smallest_disc * rim_radius);
-  range.highest_radius = largest_disc * rim_radius;
-  range.visible_part = 0.75;
+  range.lowest_radius = std::max(3.0, min_disc * rim_radius);
+  range.highest_radius = max_disc * rim_radius;
+  range.visible_fraction = 0.75;
   range.evenness = Evenness::mean;  // where the scene is dark, the dark disc has no edge
   const double reach_px = std::max(2.0, disc_off_centre * rim.radius_px);
   const PixelPoint centre{rim.centre.u_px / seen.middle_reduction,
@@ -168,13 +168,13 @@ std::optional<double> disc_within(const Evidence& seen, std::span<const SmoothPl
   for (const FieldCircle& candidate : concentric_candidates(
            seen.middle, centre.u_px, centre.v_px, reach_px / seen.middle_reduction, range, 1.0)) {
     const auto found = refined(seen, planes, climb(seen.middle, candidate, range));
-    if (!found || found->radius_px > largest_disc * rim.radius_px) continue;
+    if (!found || found->radius_px > max_disc * rim.radius_px) continue;
     const double off_px = distance_px(found->centre, rim.centre);
     if (off_px > reach_px) continue;
     const double inside = structure(planes, found->centre, 0.0, 0.9 * found->radius_px);
     const double outside =
         structure(planes, rim.centre, 1.1 * found->radius_px, 0.95 * rim.radius_px);
-    const double needed = inside < plain_ring * outside ? least_plain_disc : least_disc;
+    const double needed = inside < plain_ring * outside ? min_plain_disc_quality : min_disc_quality;
     if (found->quality < needed) continue;
     discs.push_back({found->quality, found->radius_px + off_px});
     best_quality = std::max(best_quality, found->quality);
@@ -202,7 +202,7 @@ std::vector<FieldCircle> best_circles(const Evidence& seen, const CircleRange& r
     const FieldCircle circle = climb(seen.middle, scaled(candidate, seen.coarse_reduction), range);
     if (circle.radius < range.lowest_radius || circle.radius > range.highest_radius) continue;
     const CircleScore found = score(seen.middle, circle, range.evenness);
-    if (found.visible < range.visible_part) continue;
+    if (found.visible < range.visible_fraction) continue;
     climbed.push_back({found.quality * std::sqrt(found.visible), circle});
   }
   std::stable_sort(climbed.begin(), climbed.end(),
@@ -229,18 +229,17 @@ struct Search {
 std::optional<Search> search(const Evidence& seen, std::span<const SmoothPlanes> planes,
                              const ImageSize& size, const MirrorSearchOptions& options) {
   CircleRange range;
-  range.lowest_radius =
-      options.smallest_rim * std::min(size.width, size.height) / seen.middle_reduction;
+  range.lowest_radius = options.min_rim * std::min(size.width, size.height) / seen.middle_reduction;
   range.highest_radius =
-      options.largest_rim * std::max(size.width, size.height) / seen.middle_reduction;
-  range.visible_part = options.visible_part;
+      options.max_rim * std::max(size.width, size.height) / seen.middle_reduction;
+  range.visible_fraction = options.visible_fraction;
 
   std::optional<FoundCircle> clearest;
   double clearest_merit = 0;
   FieldCircle start;
   for (const FieldCircle& circle : best_circles(seen, range)) {
     const auto found = refined(seen, planes, circle);
-    if (!found || found->quality < options.least_quality) continue;
+    if (!found || found->quality < options.min_quality) continue;
     const double merit =
         found->quality * std::sqrt(score(seen.middle, circle, range.evenness).visible);
     if (merit > clearest_merit) {
@@ -256,7 +255,7 @@ std::optional<Search> search(const Evidence& seen, std::span<const SmoothPlanes>
            seen.middle, start.u, start.v, concentric * start.radius, range, 2.0)) {
     const auto found = refined(seen, planes, climb(seen.middle, candidate, range));
     if (!found || found->quality < as_clear * clearest->quality ||
-        (found->radius_px > clearest->radius_px && found->quality < options.least_quality) ||
+        (found->radius_px > clearest->radius_px && found->quality < options.min_quality) ||
         distance_px(found->centre, clearest->centre) > concentric * found->radius_px) {
       continue;
     }
@@ -279,14 +278,17 @@ std::optional<Search> search(const Evidence& seen, std::span<const SmoothPlanes>
 void visit_options(MirrorSearchOptions& options, OptionVisitor& visitor) {
   using T = MirrorSearchOptions;
   constexpr OptionTable table{
-      option<&T::smallest_rim>("smallest radius of the mirror's rim, in shorter sides of the image",
-                               above(0), 2),
-      option<&T::largest_rim>("largest radius of the mirror's rim, in longer sides of the image",
-                              above(0), 2),
-      option<&T::visible_part>("least part of the rim that lies inside the frame", 0.25, 1),
-      option<&T::least_quality>(
-          "least quality of a rim, from 0 (any circle) to 1 (a sharp edge all around)", above(0),
-          1),
+      option<&T::min_rim>("smallest radius of the mirror's rim, in shorter sides of the image",
+                          above(0), 2)
+          .formerly("smallest_rim"),
+      option<&T::max_rim>("largest radius of the mirror's rim, in longer sides of the image",
+                          above(0), 2)
+          .formerly("largest_rim"),
+      option<&T::visible_fraction>("least part of the rim that lies inside the frame", 0.25, 1)
+          .formerly("visible_part"),
+      option<&T::min_quality>(
+          "least quality of a rim, from 0 (any circle) to 1 (a sharp edge all around)", above(0), 1)
+          .formerly("least_quality"),
   };
   table.visit(options, visitor);
 }

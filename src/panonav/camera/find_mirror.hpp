@@ -40,10 +40,10 @@ struct MirrorCircle {
 };
 
 struct MirrorSearchOptions {
-  double smallest_rim = 0.2;    ///< smallest rim radius, in shorter sides of the image; (0, 2]
-  double largest_rim = 0.75;    ///< largest rim radius, in longer sides of the image; (0, 2]
-  double visible_part = 0.6;    ///< least part of the rim inside the frame; [0.25, 1]
-  double least_quality = 0.55;  ///< a rim below this is no rim; (0, 1]
+  double min_rim = 0.2;           ///< smallest rim radius, in shorter sides of the image; (0, 2]
+  double max_rim = 0.75;          ///< largest rim radius, in longer sides of the image; (0, 2]
+  double visible_fraction = 0.6;  ///< least part of the rim inside the frame; [0.25, 1]
+  double min_quality = 0.55;      ///< a rim below this is no rim; (0, 1]
   friend bool operator==(const MirrorSearchOptions&, const MirrorSearchOptions&) = default;
 };
 void visit_options(MirrorSearchOptions& options, OptionVisitor& visitor);
@@ -53,7 +53,7 @@ void visit_options(MirrorSearchOptions& options, OptionVisitor& visitor);
 /// Several images count together, so that what moves averages out and rim and camera remain. Of
 /// several circles about one centre the rim is the largest that has the scene's structure just
 /// inside: a plain ring around the mirror (its holder) does not belong to it. Empty when no circle
-/// reaches `least_quality`.
+/// reaches `min_quality`.
 /// Limits: other round things that fill the picture are taken for a mirror, no picture can tell
 /// them apart; in surroundings as patterned as the scene a mirror may be missed; a ring whose inner
 /// edge hardly differs from the scene counts as part of the mirror.

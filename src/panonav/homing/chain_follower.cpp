@@ -69,8 +69,7 @@ void ChainFollower::aim_at_next(const Pose2& target_from_robot) {
   target_ = next(*target_);
   steps_to_target_ = 0;
   way_m_ = length(*target_from_robot_);
-  most_steps_to_target_ =
-      3 + 3 * static_cast<int>(std::ceil(way_m_ / pursuit_options_.longest_step_m));
+  max_steps_to_target_ = 3 + 3 * static_cast<int>(std::ceil(way_m_ / pursuit_options_.max_step_m));
 }
 
 bool ChainFollower::contradicts_odometry(const HomeVector& vector) const noexcept {
@@ -106,7 +105,7 @@ ChainDecision ChainFollower::decide(const HomingView& current, const Pose2& move
       }
     }
     target_ = best;
-    most_steps_to_target_ = pursuit_options_.most_steps;
+    max_steps_to_target_ = pursuit_options_.max_steps;
   } else if (target_from_robot_) {
     target_from_robot_ = *target_from_robot_ * moved;
     unseen_m_ += length(moved);
@@ -128,7 +127,7 @@ ChainDecision ChainFollower::decide(const HomingView& current, const Pose2& move
         contradicts &&
         length(*target_from_robot_) < pursuit_options_.typical_distance_m * options_.switch_length;
     const bool given_up =
-        !is_near && !passed && (is_there_by_odometry || steps_to_target_ >= most_steps_to_target_);
+        !is_near && !passed && (is_there_by_odometry || steps_to_target_ >= max_steps_to_target_);
     if (is_near || passed) unseen_m_ = 0.0;
     if (is_near || passed || given_up) {
       // Heading by the compass. Position by the vector where it is short, else by odometry.
@@ -162,7 +161,7 @@ ChainDecision ChainFollower::decide(const HomingView& current, const Pose2& move
         (contradicts || vector.length() == 0.0 || (!near && off_rad > options_.mistrust_rad))) {
       decision.by_odometry = true;
       decision.turn_rad = expected_rad;
-      decision.advance_m = std::min(pursuit_options_.longest_step_m, length(expected));
+      decision.advance_m = std::min(pursuit_options_.max_step_m, length(expected));
       return decision;
     }
     // The compass does not drift.
@@ -170,8 +169,8 @@ ChainDecision ChainFollower::decide(const HomingView& current, const Pose2& move
   }
   if (is_last(*target_)) return approach_last(current);
   decision.turn_rad = vector.direction_rad();
-  decision.advance_m = std::min(pursuit_options_.longest_step_m,
-                                pursuit_options_.typical_distance_m * vector.length());
+  decision.advance_m =
+      std::min(pursuit_options_.max_step_m, pursuit_options_.typical_distance_m * vector.length());
   return decision;
 }
 

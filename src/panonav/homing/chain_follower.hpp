@@ -84,7 +84,7 @@ class ChainFollower {
   std::optional<Pose2> target_from_robot_;  // by odometry; unknown on the way to the first
   double way_m_ = 0.0;                      // to the target, when it became the target
   int steps_to_target_ = 0;
-  int most_steps_to_target_ = 0;
+  int max_steps_to_target_ = 0;
   double unseen_m_ = 0.0;  // since the last snapshot that was reached
   std::optional<HomingPursuit> pursuit_;
 };

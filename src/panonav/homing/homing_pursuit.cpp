@@ -28,12 +28,14 @@ void visit_options(HomingPursuitOptions& options, OptionVisitor& visitor) {
       option<&T::middle>("highest frequency of the second stage", 1, 62),
       option<&T::fine>("highest frequency of the third stage", 1, 62),
       option<&T::typical_distance_m>("typical distance of the things around", above(0), 1000),
-      option<&T::longest_step_m>("longest way between two views", above(0), 100),
+      option<&T::max_step_m>("longest way between two views", above(0), 100)
+          .formerly("longest_step_m"),
       option<&T::stop_length>("homing stops when the vector is shorter, in units of R", 0, 1),
-      option<&T::shortest_step_m>("homing stops when the step is shorter", above(0), 100),
-      option<&T::patience>("homing stops when the views became no more alike for so many steps", 1,
-                           1e6),
-      option<&T::most_steps>("steps after which a run ends", 1, 1e6),
+      option<&T::min_step_m>("homing stops when the step is shorter", above(0), 100)
+          .formerly("shortest_step_m"),
+      option<&T::patience>(
+          "homing stops when the views became no more similar for this number of steps", 1, 1e6),
+      option<&T::max_steps>("steps after which a run ends", 1, 1e6).formerly("most_steps"),
       option<&T::arrived_difference>("largest difference of the views at home", 0, 2),
   };
   table.visit(options, visitor);
@@ -77,10 +79,10 @@ FourierHomingOptions HomingPursuit::vector_of_stage(const HomingView& current) c
 PursuitDecision HomingPursuit::decide(const HomingView& current) {
   PursuitDecision decision;
   decision.difference = image_difference(home_, current);
-  ++steps_since_least_;
-  if (decision.difference < least_difference_) {
-    least_difference_ = decision.difference;
-    steps_since_least_ = 0;
+  ++steps_since_min_;
+  if (decision.difference < min_difference_) {
+    min_difference_ = decision.difference;
+    steps_since_min_ = 0;
   }
   for (;;) {
     const FourierHomingOptions options = vector_of_stage(current);
@@ -96,11 +98,11 @@ PursuitDecision HomingPursuit::decide(const HomingView& current) {
     direction_in_home_rad_ = direction_in_home_rad;
     decision.turn_rad = vector.direction_rad();
     decision.advance_m =
-        gain_ * std::min(options_.longest_step_m, options_.typical_distance_m * vector.length());
+        gain_ * std::min(options_.max_step_m, options_.typical_distance_m * vector.length());
     const bool stops = vector.length() < options_.stop_length ||
-                       decision.advance_m < options_.shortest_step_m ||
-                       steps_since_least_ >= options_.patience;
-    if (state_ == PursuitState::moving && !stops && steps_ >= options_.most_steps) {
+                       decision.advance_m < options_.min_step_m ||
+                       steps_since_min_ >= options_.patience;
+    if (state_ == PursuitState::moving && !stops && steps_ >= options_.max_steps) {
       state_ = PursuitState::exhausted;
     }
     if (state_ == PursuitState::moving && !stops) {
@@ -109,8 +111,8 @@ PursuitDecision HomingPursuit::decide(const HomingView& current) {
     }
     if (state_ == PursuitState::moving && goes_on(decision.difference)) {
       ++stage_;
-      least_difference_ = decision.difference;
-      steps_since_least_ = 0;
+      min_difference_ = decision.difference;
+      steps_since_min_ = 0;
       gain_ = 1.0;
       direction_in_home_rad_.reset();
       continue;

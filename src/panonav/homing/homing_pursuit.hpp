@@ -27,16 +27,16 @@ struct HomingPursuitOptions {
   int middle = 4;
   int fine = 10;
   double typical_distance_m = 3.0;  ///< R_typ, of the things around [S06 section 3]
-  double longest_step_m = 0.3;      ///< l_max [S06 section 3]
+  double max_step_m = 0.3;          ///< l_max [S06 section 3]
   /// Homing stops when the vector is shorter, in units of R: the root of S06's epsilon.
   double stop_length = 0.01;
   /// Homing also stops when steps have become shorter than this, because successive vectors opposed
   /// each other.
-  double shortest_step_m = 0.01;
+  double min_step_m = 0.01;
   /// Homing also stops when the views have not become more similar for this many steps: the robot
   /// runs in circles or along an obstacle.
   int patience = 10;
-  int most_steps = 60;
+  int max_steps = 60;
   /// The robot has arrived when the views differ by no more than this where homing stops, by
   /// `image_difference` [S06 section 4.3].
   double arrived_difference = 0.08;
@@ -90,8 +90,8 @@ class HomingPursuit {
   int steps_ = 0;
   double gain_ = 1.0;
   std::optional<double> direction_in_home_rad_;  // of the step before
-  double least_difference_ = 2.0;                // of the stage
-  int steps_since_least_ = 0;
+  double min_difference_ = 2.0;                  // of the stage
+  int steps_since_min_ = 0;
   PursuitState state_ = PursuitState::moving;
 };
 

@@ -68,7 +68,7 @@ TomlTable copy_of(const toml::table& table) {
 // Names joined by dots make nested tables, and the parser follows them by recursion without a
 // bound. Throws FileError when any stretch of text could be a name of too many parts.
 void require_shallow_names(std::string_view text, const std::filesystem::path& path) {
-  constexpr int most_parts = 64;
+  constexpr int max_parts = 64;
   std::size_t line_number = 0;
   while (!text.empty()) {
     const std::size_t end = std::min(text.find('\n'), text.size());
@@ -81,10 +81,10 @@ void require_shallow_names(std::string_view text, const std::filesystem::path& p
     for (const char c : line) {
       constexpr std::string_view borders = "=,[]{}";
       if (borders.find(c) != std::string_view::npos) dots = 0;
-      if (c == '.' && ++dots >= most_parts) {
+      if (c == '.' && ++dots >= max_parts) {
         throw FileError(path.string(), "line " + std::to_string(line_number) +
                                            " has a name of too many parts; allowed: up to " +
-                                           std::to_string(most_parts));
+                                           std::to_string(max_parts));
       }
     }
   }

@@ -14,7 +14,7 @@ struct DistanceKernels {
   uint32_t (*masked_l1)(const uint8_t* a, const uint8_t* b, const uint8_t* mask, size_t count);
 
   /// For each view v of 8 * octets views: bounds[v] = max(0, constant + sum_g steps[g] *
-  /// L1(sketch of v & mask, values)[group g] - min(slacks[v], largest_slack)), and the smallest of
+  /// L1(sketch of v & mask, values)[group g] - min(slacks[v], max_slack)), and the smallest of
   /// them. The sketches of 8 views are interleaved: first group of views 0 .. 7, second group of
   /// views 0 .. 7, .. The caller guarantees that each bound stays below 2^31 and octets >= 1.
   uint32_t (*sketch_bounds)(const uint8_t* sketches, const int32_t* slacks, size_t octets,

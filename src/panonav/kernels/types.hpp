@@ -20,7 +20,7 @@ struct SketchQuery {
   size_t groups;          ///< compared; a multiple of 8 for `sketch_bounds_at`
   size_t stored_groups;   ///< of each view, >= groups
   int32_t constant;       ///< added to every bound
-  int32_t largest_slack;  ///< slacks above are taken as this
+  int32_t max_slack;      ///< slacks above are taken as this
 };
 
 /// Sizes of what `match_columns` compares.

@@ -15,11 +15,11 @@ double RankedMatch::score_of(double difference) const {
   return (difference + least) * std::pow(match.dissimilarity + least, weight_of_dissimilarity);
 }
 
-ColumnRanking::ColumnRanking(const VisualMemory& memory, int components, int most_kept)
+ColumnRanking::ColumnRanking(const VisualMemory& memory, int components, int max_kept)
     : memory_(&memory), components_(components) {
   require(components >= 0 && components <= memory.shape().components, "components", components,
           "0 (all) or 1 .. " + to_text(memory.shape().components));
-  if (memory.size() > static_cast<std::size_t>(most_kept)) return;
+  if (memory.size() > static_cast<std::size_t>(max_kept)) return;
   kept_views_.assign(memory.views().begin(), memory.views().end());
   kept_.reserve(kept_views_.size());
   for (const ViewId view : kept_views_) kept_.emplace_back(memory.packed(view), components);

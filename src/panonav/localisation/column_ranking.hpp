@@ -27,10 +27,10 @@ struct RankedMatch {
 /// occluded parts from others and use the phases too.
 class ColumnRanking {
  public:
-  /// Keeps the column profiles of all views of a memory of at most `most_kept` views, 2.5 kB each;
+  /// Keeps the column profiles of all views of a memory of at most `max_kept` views, 2.5 kB each;
   /// those of other views are made anew for each query. The memory must outlive *this.
   /// `components`: compared, 0 for all. Throws ContractError on more than the memory's.
-  explicit ColumnRanking(const VisualMemory& memory, int components = 0, int most_kept = 1000);
+  explicit ColumnRanking(const VisualMemory& memory, int components = 0, int max_kept = 1000);
 
   /// Ascending (score, view). `allowed_rows` as in SearchMask. Cost: 1
   /// microsecond a match whose profiles are kept, about 10 for others.

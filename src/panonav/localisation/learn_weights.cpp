@@ -16,9 +16,9 @@ namespace {
 
 constexpr double near_spacings = 1.25;  // the four neighbours of a square grid, two on a path
 constexpr double far_spacings = 1.75;   // beyond the diagonal of a square grid
-constexpr std::size_t most_near = 4;
-constexpr std::size_t most_far = 12;
-constexpr std::size_t least_anchors = 16;
+constexpr std::size_t max_near = 4;
+constexpr std::size_t max_far = 12;
+constexpr std::size_t min_anchors = 16;
 constexpr std::size_t folds = 4;
 // Penalties in units of the mean diagonal of the moments; infinity gives equal weights.
 constexpr std::array<double, 7> penalties = {
@@ -78,8 +78,8 @@ std::vector<double> best_weights(const Moments& moments, double penalty) {
   const auto curvature = [&](std::size_t i, std::size_t j) {
     return moments.second[i * size + j] / n + strength * ((i == j ? 1.0 : 0.0) - share);
   };
-  constexpr int most_rounds = 2000;
-  for (int round = 0; round < most_rounds; ++round) {
+  constexpr int max_rounds = 2000;
+  for (int round = 0; round < max_rounds; ++round) {
     double change = 0.0;
     for (std::size_t i = 0; i < size; ++i) {
       double rest = moments.first[i] / n;
@@ -127,15 +127,15 @@ bool add_margins(const VisualMemory& memory, std::span<const PosedView> posed, d
   }
   std::ranges::stable_sort(near, {},
                            [&](const PosedView& v) { return distance(v.position, here); });
-  if (near.size() > most_near) near.resize(most_near);
+  if (near.size() > max_near) near.resize(max_near);
 
   const std::array<ViewId, 1> excluded{anchor};
-  const auto found = memory.search(memory.packed(anchor), {.top = 4 * static_cast<int>(most_far)},
+  const auto found = memory.search(memory.packed(anchor), {.top = 4 * static_cast<int>(max_far)},
                                    {.excluded_views = excluded, .allowed_rows = {}});
   std::vector<ViewId> far;
   for (const Match& match : found.matches) {
     const auto& pose = memory.info(match.view).pose;
-    if (far.size() < most_far && pose &&
+    if (far.size() < max_far && pose &&
         distance(pose->position(), here) > far_spacings * spacing_m) {
       far.push_back(match.view);
     }
@@ -167,7 +167,7 @@ bool add_margins(const VisualMemory& memory, std::span<const PosedView> posed, d
 void visit_options(WeightLearningOptions& options, OptionVisitor& visitor) {
   using T = WeightLearningOptions;
   constexpr OptionTable table{
-      option<&T::sampled_views>("views used for learning", least_anchors),
+      option<&T::sampled_views>("views used for learning", min_anchors),
       option<&T::seed>("seed of the draw of views", 0),
   };
   table.visit(options, visitor);
@@ -185,7 +185,7 @@ std::optional<ComponentWeights> learn_component_weights(const VisualMemory& memo
     ids.push_back(view);
     positions.push_back(posed.back().position);
   }
-  if (posed.size() < least_anchors) return std::nullopt;
+  if (posed.size() < min_anchors) return std::nullopt;
   const double spacing_m = VoronoiCells(positions).spacing_m();
   if (!(spacing_m > 0.0)) return std::nullopt;
 
@@ -199,7 +199,7 @@ std::optional<ComponentWeights> learn_component_weights(const VisualMemory& memo
     used += add_margins(memory, posed, spacing_m, anchors[i], fold[i * folds / anchors.size()]);
   }
   const bool every_fold = std::ranges::all_of(fold, [](const Moments& m) { return m.count > 0; });
-  if (used < least_anchors || !every_fold) return std::nullopt;
+  if (used < min_anchors || !every_fold) return std::nullopt;
 
   const auto margin_left_out = [&](double penalty) {
     double sum = 0.0;

@@ -34,7 +34,7 @@ constexpr std::size_t references = 4;  // the corners of a grid's square
 std::optional<double> absolute_heading(const VisualMemory& memory,
                                        std::span<const LocalisedMatch> matches) {
   constexpr double agreement_rad = radians(15.0);
-  constexpr double least_difference = 1e-2;
+  constexpr double min_difference = 1e-2;
   std::optional<double> centre_rad;
   double sum = 0.0;
   double weights = 0.0;
@@ -45,7 +45,7 @@ std::optional<double> absolute_heading(const VisualMemory& memory,
     if (!centre_rad) centre_rad = heading_rad;
     const double offset = angle_difference(heading_rad, *centre_rad);
     if (std::abs(offset) > agreement_rad) continue;
-    const double weight = std::pow(std::max(least_difference, match.column_difference), -4.0);
+    const double weight = std::pow(std::max(min_difference, match.column_difference), -4.0);
     sum += weight * offset;
     weights += weight;
   }
@@ -60,7 +60,7 @@ std::shared_ptr<const ColumnRanking> ranking_of(const VisualMemory& memory,
                                                 const LocaliserOptions& options) {
   validate(options);
   return std::make_shared<const ColumnRanking>(memory, options.components,
-                                               std::max(options.compared_views, 1));
+                                               std::max(options.reranked_views, 1));
 }
 
 // Which of the best references is the nearest one: a position that many references agree on says it
@@ -84,9 +84,10 @@ void visit_options(LocaliserOptions& options, OptionVisitor& visitor) {
   constexpr OptionTable table{
       option<&T::top>("matches listed", 1, 1e6),
       option<&T::components>("Fourier components compared, 0 for all", 0),
-      option<&T::compared_views>("views compared column by column when the nearest ones do not "
+      option<&T::reranked_views>("views compared column by column when the nearest ones do not "
                                  "explain the picture; 0 keeps the order of dissimilarity",
-                                 0, 1e6),
+                                 0, 1e6)
+          .formerly("compared_views"),
   };
   table.visit(options, visitor);
 }
@@ -130,19 +131,19 @@ Localisation Localiser::localise(const PackedSignature& query, const SearchMask&
   const int first = std::max(options_.top, PositionModel::candidates);
   std::vector<RankedMatch> ranked = nearest(first);
   if (ranked.empty()) return result;
-  const auto least_difference = [&] {
+  const auto min_difference = [&] {
     return std::ranges::min(ranked, {}, [](const RankedMatch& r) { return r.columns.difference; })
         .columns.difference;
   };
-  if (options_.compared_views > first && least_difference() > place_model_.neighbouring) {
-    ranked = nearest(options_.compared_views);
+  if (options_.reranked_views > first && min_difference() > place_model_.neighbouring) {
+    ranked = nearest(options_.reranked_views);
   }
-  result.known = least_difference() <= place_model_.threshold;
+  result.known = min_difference() <= place_model_.threshold;
   // Profiles of the references are kept over all rows.
-  if (options_.compared_views > 0 && mask.allowed_rows.empty()) {
+  if (options_.reranked_views > 0 && mask.allowed_rows.empty()) {
     support_.put_best_supported_first(ColumnProfiles(query, options_.components), ranked);
   }
-  if (options_.compared_views == 0) {
+  if (options_.reranked_views == 0) {
     std::ranges::sort(ranked, {}, [](const RankedMatch& r) {
       return std::pair(r.match.dissimilarity, r.match.view);
     });
@@ -162,7 +163,7 @@ Localisation Localiser::localise(const PackedSignature& query, const SearchMask&
   if (result.known) {
     result.position = interpolate_position(*ranking_, position_model_, ranked);
     result.heading_rad = absolute_heading(*memory_, result.matches);
-    if (result.position && options_.compared_views > 0) {
+    if (result.position && options_.reranked_views > 0) {
       put_nearest_first(*memory_, result.position->position, result.matches);
     }
   }

@@ -50,7 +50,7 @@ struct LocaliserOptions {
   /// Views compared column by column when those of least dissimilarity do not explain the query,
   /// because people stand in view or the light has changed. 0: the order of dissimilarity stands,
   /// and columns decide only whether the place is known.
-  int compared_views = 1000;
+  int reranked_views = 1000;
 };
 void visit_options(LocaliserOptions& options, OptionVisitor& visitor);
 
@@ -74,7 +74,7 @@ class Localiser {
   /// Topological localisation. The exact search finds the views of least dissimilarity; comparing
   /// columns puts them in order. When the best of them differs more than neighbouring views of the
   /// memory do, a part of the view may be hidden, which the dissimilarity cannot know: then up to
-  /// `compared_views` views are compared. Between places that look alike the references around each
+  /// `reranked_views` views are compared. Between places that look alike the references around each
   /// decide (`NeighbourSupport`). By the visual compass, near the turn at which the columns
   /// fit, follows the heading relative to each match; then whether the place is known, the position
   /// between the references [M04 footnote 1] and the absolute heading: the weighted mean over the

@@ -23,25 +23,25 @@ namespace {
 constexpr int searched_views = 16;
 constexpr int searched_when_localised = 4;
 constexpr std::size_t followed_sites = 256;
-constexpr double least_followed = 1e-3;  // share of the weight near a site
+constexpr double min_followed = 1e-3;  // share of the weight near a site
 constexpr std::size_t followed_when_localised = 16;
-constexpr int most_stages = 6;
-constexpr double least_share = 0.05;
+constexpr int max_stages = 6;
+constexpr double min_share = 0.05;
 constexpr double nothing_left = 1e-37;      // the least exponential is 1e-38
 constexpr double enough_effective = 200.0;  // stand for a mode in three dimensions
-constexpr double most_against = 9.0;        // about 1 : 10 000
+constexpr double max_against = 9.0;         // about 1 : 10 000
 // Chances from one image to the next.
-constexpr double carried_away = 0.01;
+constexpr double kidnapped = 0.01;
 constexpr double leaving = 0.02;
 constexpr double coming_back = 0.1;
 // Log-likelihood ratio that a view of another place reaches by chance; one in a hundred reaches it
 // (docs/decisions.md).
 constexpr double by_chance = 1.0;
-constexpr double most_for = 5.0;
-constexpr double most_for_alike = 2.0;
+constexpr double max_for = 5.0;
+constexpr double max_for_similar = 2.0;
 constexpr double localised_weight = 0.9;
-constexpr double memorised_reach = 2.0;  // times the spacing or the range of likeness
-constexpr double least_redrawn = 0.5;    // particles' worth of weight
+constexpr double memorised_reach = 2.0;  // times the spacing or the range of similarity
+constexpr double min_injected = 0.5;     // particles' worth of weight
 constexpr double nothing_known = 0.9;  // chance of being elsewhere than where particles were strewn
 // Deviations of new particles from the reference that tells them: within its square of the grid,
 // and within the turns that explain a view.
@@ -77,9 +77,9 @@ struct MonteCarloLocaliser::Implementation {
         random(static_cast<std::uint64_t>(options.seed)) {
     validate(options);
     validate(odometry);
-    require(options.least_particles <= options.most_particles, "least_particles",
-            options.least_particles, "<= most_particles, " + to_text(options.most_particles));
-    if (options.redraw == Redraw::topological) areas.emplace(ranking->memory());
+    require(options.min_particles <= options.max_particles, "min_particles", options.min_particles,
+            "<= max_particles, " + to_text(options.max_particles));
+    if (options.injection == ParticleInjection::topological) areas.emplace(ranking->memory());
   }
 
   [[nodiscard]] PoseBins bins() const { return {.cell_m = model.spacing_m, .headings = 24}; }
@@ -143,8 +143,8 @@ struct MonteCarloLocaliser::Implementation {
   Weighed take_bearable_share(double& share);
   double weigh();
   void resample(std::size_t count, bool spread);
-  int redraw_explained(double log_here);
-  int redraw_fixed(const PackedSignature& view);
+  int inject_explained(double log_here);
+  int inject_fixed(const PackedSignature& view);
   MonteCarloEstimate observe(const PackedSignature& view);
   void describe(MonteCarloEstimate& estimate, const ParticleModes& found) const;
 };
@@ -165,46 +165,46 @@ void MonteCarloLocaliser::Implementation::compare_views(const PackedSignature& v
   compare_found(was_localised ? searched_when_localised : searched_views);
 
   const auto carried = likelihood.sites_near_most(
-      particles, was_localised ? followed_when_localised : followed_sites, least_followed);
+      particles, was_localised ? followed_when_localised : followed_sites, min_followed);
   for (const std::uint32_t site : carried) likelihood.compare(site);
 
   const auto best_of = [&](std::span<const std::uint32_t> of) {
     std::optional<std::uint32_t> best;
     for (const std::uint32_t site : of) {
-      if (likelihood.compared(site) && (!best || sites[site].likeness > sites[*best].likeness)) {
+      if (likelihood.compared(site) &&
+          (!best || sites[site].similarity > sites[*best].similarity)) {
         best = site;
       }
     }
     return best;
   };
-  const auto here = likelihood.least_difference(carried);
-  const auto anywhere_least = likelihood.least_difference(likelihood.compared_sites());
-  const bool held = was_localised && here && anywhere_least && *here <= *anywhere_least;
-  if (knows_nothing ||
-      (!held && anywhere_least && *anywhere_least > model.neighbouring_difference)) {
-    if (sites.size() <= static_cast<std::size_t>(options.compared_views)) {
+  const auto here = likelihood.min_difference(carried);
+  const auto min_anywhere = likelihood.min_difference(likelihood.compared_sites());
+  const bool held = was_localised && here && min_anywhere && *here <= *min_anywhere;
+  if (knows_nothing || (!held && min_anywhere && *min_anywhere > model.neighbouring_difference)) {
+    if (sites.size() <= static_cast<std::size_t>(options.reranked_views)) {
       for (std::uint32_t s = 0; s < sites.size(); ++s) likelihood.compare(s);
-    } else if (options.compared_views > searched_views) {
-      compare_found(options.compared_views);
+    } else if (options.reranked_views > searched_views) {
+      compare_found(options.reranked_views);
     }
   }
   if (const auto best = best_of(likelihood.compared_sites())) {
     const Point2 place = sites[*best].position;
     for (const std::uint32_t site : likelihood.sites_near(place)) likelihood.compare(site);
   }
-  latest.difference_here = likelihood.least_difference(carried);
-  latest.difference_anywhere = likelihood.least_difference(likelihood.compared_sites());
+  latest.difference_here = likelihood.min_difference(carried);
+  latest.difference_anywhere = likelihood.min_difference(likelihood.compared_sites());
   latest.views_compared = likelihood.compared_sites().size();
 }
 
-// The uniform and the topological redraw: new particles in the place of random ones.
-int MonteCarloLocaliser::Implementation::redraw_fixed(const PackedSignature& view) {
+// The uniform and the topological injection: new particles in the place of random ones.
+int MonteCarloLocaliser::Implementation::inject_fixed(const PackedSignature& view) {
   const std::size_t size = particles.size();
   std::size_t count = 0;
   std::vector<Match> candidates;
-  if (options.redraw == Redraw::uniform) {
-    count = std::min(size, static_cast<std::size_t>(options.redraw_number));
-  } else if (options.redraw == Redraw::topological) {
+  if (options.injection == ParticleInjection::uniform) {
+    count = std::min(size, static_cast<std::size_t>(options.injection_number));
+  } else if (options.injection == ParticleInjection::topological) {
     constexpr double tolerance = 0.25;
     auto levels =
         localise_hierarchically(ranking->memory(), *areas, view,
@@ -212,12 +212,13 @@ int MonteCarloLocaliser::Implementation::redraw_fixed(const PackedSignature& vie
     if (!levels.empty()) candidates = std::move(levels.back().candidates);
     std::erase_if(candidates, [&](const Match& m) { return !likelihood.site_of(m.view); });
     if (candidates.empty()) return 0;
-    count = static_cast<std::size_t>(std::lround(options.redraw_share * static_cast<double>(size)));
+    count =
+        static_cast<std::size_t>(std::lround(options.injection_share * static_cast<double>(size)));
   }
   for (std::size_t n = 0; n < count; ++n) {
     const std::size_t replaced = random.index(size);
     Pose2 pose;
-    if (options.redraw == Redraw::uniform) {
+    if (options.injection == ParticleInjection::uniform) {
       const double heading = borrowed_heading();
       pose = anywhere(options.compass ? std::nullopt : std::optional(heading));
     } else {
@@ -277,11 +278,11 @@ double MonteCarloLocaliser::Implementation::weigh() {
   // Views from nearly the same place are alike, also in what misleads: they count for less, as far
   // as views at that distance resemble each other.
   const double whole =
-      knows_nothing ? 1.0 : std::max(least_share, 1.0 - std::exp(-travelled_m / model.range_m));
+      knows_nothing ? 1.0 : std::max(min_share, 1.0 - std::exp(-travelled_m / model.range_m));
   double evidence = 0.0;
   double evidence_in_full = 0.0;
   double left = whole;
-  for (int stage = 0; stage < most_stages; ++stage) {
+  for (int stage = 0; stage < max_stages; ++stage) {
     log_ratios.resize(particles.size());
     likelihood.log_ratios(particles, log_ratios);
     const double most = *std::ranges::max_element(log_ratios);
@@ -291,7 +292,7 @@ double MonteCarloLocaliser::Implementation::weigh() {
     if (stage == 0) evidence_in_full = most + std::log(take_share(1.0).sum);
     double share = left;
     const double sum =
-        (stage + 1 == most_stages ? take_share(share) : take_bearable_share(share)).sum;
+        (stage + 1 == max_stages ? take_share(share) : take_bearable_share(share)).sum;
     if (!(sum > nothing_left)) {  // what explains the view had lost all its weight
       std::ranges::fill(particles.weight, 1.0 / static_cast<double>(particles.size()));
       return evidence_in_full;
@@ -346,7 +347,7 @@ void MonteCarloLocaliser::Implementation::resample(std::size_t count, bool sprea
 
 // New particles where the view is explained, with the share of the weight that their evidence
 // earns them.
-int MonteCarloLocaliser::Implementation::redraw_explained(double log_here) {
+int MonteCarloLocaliser::Implementation::inject_explained(double log_here) {
   std::vector<Candidate> places;
   Particles told;
   const auto add = [&](Candidate candidate) {
@@ -355,7 +356,7 @@ int MonteCarloLocaliser::Implementation::redraw_explained(double log_here) {
   };
   for (const std::uint32_t site : likelihood.compared_sites()) {
     add({site, false});
-    if (tells_heading(site) && likelihood.sites()[site].other_likeness > 0.0F) add({site, true});
+    if (tells_heading(site) && likelihood.sites()[site].other_similarity > 0.0F) add({site, true});
   }
   if (places.empty()) return 0;
   std::vector<double> values(told.size());
@@ -373,12 +374,12 @@ int MonteCarloLocaliser::Implementation::redraw_explained(double log_here) {
   const double log_there = most + std::log(share * sum + unexplained * std::exp(-most));
   latest.log_there = log_there;
   // A robot that was outside may come back anywhere.
-  const double hazard = knows_nothing ? nothing_known : carried_away + (1.0 - inside) * coming_back;
+  const double hazard = knows_nothing ? nothing_known : kidnapped + (1.0 - inside) * coming_back;
   const double odds =
       hazard / (1.0 - hazard) * std::exp(std::clamp(log_there - log_here, -50.0, 50.0));
   const double mass = odds / (1.0 + odds);
   const auto size = static_cast<double>(particles.size());
-  if (mass * size < least_redrawn) return 0;
+  if (mass * size < min_injected) return 0;
 
   const auto count =
       static_cast<std::size_t>(std::max(1L, std::lround(std::max(0.05, 0.9 * mass) * size)));
@@ -389,7 +390,7 @@ int MonteCarloLocaliser::Implementation::redraw_explained(double log_here) {
   likelihood.log_ratios(fresh, fresh_values);
   double fresh_sum = 0.0;
   for (std::size_t n = 0; n < fresh.size(); ++n) {
-    fresh.weight[n] = std::exp(std::max(fresh_values[n] - most, -most_against)) / values[drawn[n]];
+    fresh.weight[n] = std::exp(std::max(fresh_values[n] - most, -max_against)) / values[drawn[n]];
     fresh_sum += fresh.weight[n];
   }
   // They take the places of the lightest particles.
@@ -414,25 +415,26 @@ MonteCarloEstimate MonteCarloLocaliser::Implementation::observe(const PackedSign
   latest = {};
   likelihood.arrange(particles);
   compare_views(view, was_localised);
-  if (options.redraw == Redraw::uniform || options.redraw == Redraw::topological) {
-    latest.redrawn = redraw_fixed(view);
+  if (options.injection == ParticleInjection::uniform ||
+      options.injection == ParticleInjection::topological) {
+    latest.injected = inject_fixed(view);
   }
   latest.log_here = weigh();
   double evidence = latest.log_here;
-  if (options.redraw == Redraw::explained) {
-    latest.redrawn = redraw_explained(latest.log_here);
-    evidence = std::max(evidence, latest.log_there + std::log(carried_away));
+  if (options.injection == ParticleInjection::explained) {
+    latest.injected = inject_explained(latest.log_here);
+    evidence = std::max(evidence, latest.log_there + std::log(kidnapped));
   }
   // Where nothing is known yet, a view like one of the memory's speaks for being inside.
   if (latest.difference_anywhere) {
     const double margin = (model.explained_difference - *latest.difference_anywhere) /
                           std::max(0.05, model.far_difference - model.explained_difference);
-    evidence = std::max(evidence, std::min(most_for_alike, 4.0 * margin) + by_chance);
+    evidence = std::max(evidence, std::min(max_for_similar, 4.0 * margin) + by_chance);
   }
   knows_nothing = false;
   travelled_m = 0.0;
   inside = inside * (1.0 - leaving) + (1.0 - inside) * coming_back;
-  const double ratio = std::exp(std::clamp(evidence - by_chance, -by_chance, most_for));
+  const double ratio = std::exp(std::clamp(evidence - by_chance, -by_chance, max_for));
   inside = inside * ratio / (inside * ratio + 1.0 - inside);
 
   const ParticleModes found = find_modes(particles, bins());
@@ -442,8 +444,8 @@ MonteCarloEstimate MonteCarloLocaliser::Implementation::observe(const PackedSign
   if (latest.effective_particles < options.resample_below * static_cast<double>(particles.size())) {
     latest.resampled = true;
     resample(std::clamp(kld_sample_size(found.occupied_bins, options.kld_error),
-                        static_cast<std::size_t>(options.least_particles),
-                        static_cast<std::size_t>(options.most_particles)),
+                        static_cast<std::size_t>(options.min_particles),
+                        static_cast<std::size_t>(options.max_particles)),
              false);
   }
   return latest;
@@ -492,7 +494,7 @@ MonteCarloLocaliser& MonteCarloLocaliser::operator=(MonteCarloLocaliser&&) noexc
 
 void MonteCarloLocaliser::start_anywhere(std::optional<double> heading_rad) {
   auto& own = *implementation_;
-  const auto count = static_cast<std::size_t>(own.options.most_particles);
+  const auto count = static_cast<std::size_t>(own.options.max_particles);
   own.particles.resize(count);
   // Spread evenly over the references: as many particles as references leave none without one.
   const std::size_t sites = own.likelihood.sites().size();
@@ -511,7 +513,7 @@ void MonteCarloLocaliser::start_anywhere(std::optional<double> heading_rad) {
 void MonteCarloLocaliser::start_at(const Pose2& pose, double deviation_m,
                                    double heading_deviation_rad) {
   auto& own = *implementation_;
-  const auto count = static_cast<std::size_t>(own.options.most_particles);
+  const auto count = static_cast<std::size_t>(own.options.max_particles);
   own.particles.resize(count);
   for (std::size_t i = 0; i < count; ++i) {
     const double x = own.random.normal(pose.x_m, deviation_m);

@@ -17,7 +17,7 @@ namespace panonav {
 
 /// Particle injection: how many particles are replaced at each image, so that a kidnapped robot is
 /// found again, and where the new ones are drawn.
-enum class Redraw {
+enum class ParticleInjection {
   none,         ///< none
   uniform,      ///< a fixed number, anywhere in the memorised area: the standard way
   topological,  ///< a fixed share, in the areas of the best matches [M03 section 4.1]
@@ -25,15 +25,15 @@ enum class Redraw {
 };
 
 struct MonteCarloOptions {
-  int least_particles = 200;
-  int most_particles = 5000;
+  int min_particles = 200;
+  int max_particles = 5000;
   double kld_error = 0.05;      ///< allowed between the particles' distribution and the true one
   double resample_below = 0.5;  ///< effective sample size, share of the particles
   bool compass = true;          ///< the visual compass weighs headings too
-  Redraw redraw = Redraw::explained;
-  double redraw_share = 0.1;  ///< of a topological redraw [M03 section 4.1]
-  int redraw_number = 50;     ///< of a uniform redraw [M03 figure 8]
-  int compared_views = 1000;  ///< compared column by column when no near view explains the picture
+  ParticleInjection injection = ParticleInjection::explained;
+  double injection_share = 0.1;  ///< of a topological injection [M03 section 4.1]
+  int injection_number = 50;     ///< of a uniform injection [M03 figure 8]
+  int reranked_views = 1000;  ///< compared column by column when no near view explains the picture
   int seed = 1;
 };
 void visit_options(MonteCarloOptions& options, OptionVisitor& visitor);
@@ -58,13 +58,13 @@ struct MonteCarloEstimate {
   int particles = 0;
   double effective_particles = 0.0;  ///< before resampling
   bool resampled = false;
-  int redrawn = 0;
+  int injected = 0;
   /// The minimum difference (`ColumnMatch`) of the view to the references near the particles, and
   /// to those anywhere; empty when none was compared.
   std::optional<double> difference_here;
   std::optional<double> difference_anywhere;
   /// Log-likelihood of the view relative to that of a view that nothing explains: where the
-  /// particles were, and anywhere in the memory (only with `Redraw::explained`).
+  /// particles were, and anywhere in the memory (only with `ParticleInjection::explained`).
   double log_here = 0.0;
   double log_there = 0.0;
   /// Belief that the robot is in the memorised area, 0 .. 1; lost below one half.

@@ -14,10 +14,10 @@ namespace panonav {
 
 namespace {
 
-constexpr std::size_t most_neighbours = 8;  // of a grid
-constexpr std::size_t counted_views = 4;    // the corners of a grid's square
-constexpr double spacings = 1.5;            // more than the diagonal of a grid's square
-constexpr std::size_t most_looked_at = 30;
+constexpr std::size_t max_neighbours = 8;  // of a grid
+constexpr std::size_t counted_views = 4;   // the corners of a grid's square
+constexpr double spacings = 1.5;           // more than the diagonal of a grid's square
+constexpr std::size_t max_examined = 30;
 constexpr double looked_at_share = 1.25;
 constexpr double heading_tolerance_rad = radians(20.0);
 
@@ -73,7 +73,7 @@ std::vector<ViewId> NeighbourSupport::neighbours(ViewId view) const {
   std::ranges::sort(found);
   std::vector<ViewId> views;
   for (const auto& [distance_m, neighbour] : found) {
-    if (views.size() == most_neighbours) break;
+    if (views.size() == max_neighbours) break;
     views.push_back(neighbour);
   }
   return views;
@@ -121,7 +121,7 @@ void NeighbourSupport::put_best_supported_first(const ColumnProfiles& query,
   const double limit = looked_at_share * ranked.front().score();
   const RankedMatch* chosen = nullptr;
   double least = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < std::min(most_looked_at, ranked.size()); ++i) {
+  for (std::size_t i = 0; i < std::min(max_examined, ranked.size()); ++i) {
     if (ranked[i].score() > limit) break;
     const auto difference = supported_difference(query, ranked[i]);
     if (difference && ranked[i].score_of(*difference) < least) {

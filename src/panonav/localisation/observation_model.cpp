@@ -25,12 +25,12 @@ namespace {
 constexpr std::size_t near_sites = 12;  // as many as decide a likelihood
 constexpr double far_spacings = 6.0;
 constexpr double fitted_spacings = 4.0;
-constexpr double least_range_spacings = 0.4;
-constexpr double most_range_spacings = 20.0;
+constexpr double min_range_spacings = 0.4;
+constexpr double max_range_spacings = 20.0;
 // Beyond this no view is told apart better, and one odd view would count for all others.
-constexpr double most_log_likelihood = 50.0;
+constexpr double max_log_likelihood = 50.0;
 // Columns tell turns in steps; three of them are what a neighbouring view may be off by.
-constexpr double least_heading_width_rad = 3.0 * 2.0 * std::numbers::pi / ColumnProfiles::columns;
+constexpr double min_heading_width_rad = 3.0 * 2.0 * std::numbers::pi / ColumnProfiles::columns;
 
 struct Site {
   ViewId view;
@@ -87,39 +87,40 @@ class LeftOutView {
 };
 
 // Negative for views more unlike than views far from each other are on average.
-double likeness_of(const ColumnMatch& match, double far) {
+double similarity_of(const ColumnMatch& match, double far) {
   return far * far - match.difference * match.difference;
 }
 
-// Slope of the logarithm of the mean likeness over distance. At no distance a view is like itself,
-// so the line starts at far^2. Bins that have fallen to a twentieth of that say nothing but noise.
-double fit_range(std::span<const std::pair<double, double>> distance_and_likeness, double spacing_m,
-                 double far) {
+// Slope of the logarithm of the mean similarity over distance. At no distance a view is like
+// itself, so the line starts at far^2. Bins that have fallen to a twentieth of that say nothing but
+// noise.
+double fit_range(std::span<const std::pair<double, double>> distance_and_similarity,
+                 double spacing_m, double far) {
   constexpr auto bins = static_cast<std::size_t>(2.0 * fitted_spacings);
-  std::array<double, bins> distances{}, likenesses{}, counts{};
-  for (const auto& [distance_m, likeness] : distance_and_likeness) {
+  std::array<double, bins> distances{}, similarities{}, counts{};
+  for (const auto& [distance_m, similarity] : distance_and_similarity) {
     const auto bin = static_cast<std::size_t>(2.0 * distance_m / spacing_m);
     if (bin >= bins) continue;
     distances[bin] += distance_m;
-    likenesses[bin] += likeness;
+    similarities[bin] += similarity;
     counts[bin] += 1.0;
   }
   double product = 0.0;
   double square = 0.0;
   for (std::size_t b = 0; b < bins; ++b) {
-    if (!(likenesses[b] > 0.05 * far * far * counts[b])) continue;
+    if (!(similarities[b] > 0.05 * far * far * counts[b])) continue;
     const double distance_m = distances[b] / counts[b];
-    product -= counts[b] * distance_m * std::log(likenesses[b] / (counts[b] * far * far));
+    product -= counts[b] * distance_m * std::log(similarities[b] / (counts[b] * far * far));
     square += counts[b] * distance_m * distance_m;
   }
   // Nothing like a view beside it: what is known is that the range is no longer than that.
-  if (!(square > 0.0)) return least_range_spacings * spacing_m;
-  if (!(product > 0.0)) return most_range_spacings * spacing_m;
-  return std::clamp(square / product, least_range_spacings * spacing_m,
-                    most_range_spacings * spacing_m);
+  if (!(square > 0.0)) return min_range_spacings * spacing_m;
+  if (!(product > 0.0)) return max_range_spacings * spacing_m;
+  return std::clamp(square / product, min_range_spacings * spacing_m,
+                    max_range_spacings * spacing_m);
 }
 
-/// Squared likeness explained at each candidate place, the view's own one first.
+/// Squared similarity explained at each candidate place, the view's own one first.
 using Explained = std::vector<double>;
 
 // The sharpness that gives the places of the views left out the highest probability among all
@@ -128,7 +129,7 @@ double fit_sharpness(std::span<const Explained> views) {
   std::vector<double> own;
   for (const Explained& view : views) own.push_back(view.front());
   const double typical = quantile(own, 0.5);
-  const double highest = typical > 0.0 ? most_log_likelihood / typical : 1.0;
+  const double highest = typical > 0.0 ? max_log_likelihood / typical : 1.0;
   const auto slope = [&](double sharpness) {
     double sum = 0.0;
     for (const Explained& view : views) {
@@ -171,9 +172,9 @@ ObservationModel learn_observation_model(const ColumnRanking& ranking,
                                          const ObservationModelOptions& options) {
   validate(options);
   const std::vector<Site> sites = posed_sites(ranking.memory());
-  require(sites.size() >= static_cast<std::size_t>(ObservationModel::least_views),
+  require(sites.size() >= static_cast<std::size_t>(ObservationModel::min_views),
           "views with a position in the memory", static_cast<double>(sites.size()),
-          ">= " + to_text(ObservationModel::least_views));
+          ">= " + to_text(ObservationModel::min_views));
   std::vector<Point2> positions;
   std::vector<ViewId> views;
   for (const Site& site : sites) {
@@ -227,7 +228,7 @@ ObservationModel learn_observation_model(const ColumnRanking& ranking,
       const double distance_m = distance(sites[s].position, here.position);
       if (distance_m > fitted_spacings * model.spacing_m) break;
       const ColumnMatch& match = left_out[i].match(s);
-      curve.emplace_back(distance_m, likeness_of(match, model.far_difference));
+      curve.emplace_back(distance_m, similarity_of(match, model.far_difference));
       if (distance_m <= 1.5 * model.spacing_m && here.heading_rad && sites[s].heading_rad) {
         turns.push_back(std::abs(
             angle_difference(*sites[s].heading_rad + match.heading_rad, *here.heading_rad)));
@@ -237,12 +238,12 @@ ObservationModel learn_observation_model(const ColumnRanking& ranking,
   model.range_m = fit_range(curve, model.spacing_m, model.far_difference);
   model.neighbouring_difference =
       model.far_difference * std::sqrt(1.0 - std::exp(-model.spacing_m / model.range_m));
-  model.heading_width_rad = least_heading_width_rad;
+  model.heading_width_rad = min_heading_width_rad;
   if (!turns.empty()) {
     // Three median errors; turns at which the columns fit by chance or by symmetry are no errors.
     std::erase_if(turns, [](double turn) { return turn > std::numbers::pi / 4; });
     if (!turns.empty()) {
-      model.heading_width_rad = std::max(3.0 * quantile(turns, 0.5), least_heading_width_rad);
+      model.heading_width_rad = std::max(3.0 * quantile(turns, 0.5), min_heading_width_rad);
     }
   }
 
@@ -262,7 +263,7 @@ ObservationModel learn_observation_model(const ColumnRanking& ranking,
             std::exp(-distance(sites[s].position, sites[where].position) / model.range_m);
         square += expected * expected;
         product +=
-            expected * std::max(0.0, likeness_of(left_out[i].match(s), model.far_difference));
+            expected * std::max(0.0, similarity_of(left_out[i].match(s), model.far_difference));
       }
       return square > 0.0 ? product * product / square : 0.0;
     };

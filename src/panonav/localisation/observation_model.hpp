@@ -17,20 +17,20 @@ void visit_options(ObservationModelOptions& options, OptionVisitor& visitor);
 /// How alike views are at a distance, in one memory, and how much of a position that tells. Plain
 /// numbers, learnt from the memory's posed views, so that they can be kept beside it.
 ///
-/// The likeness of two views is far_difference^2 - difference^2 (`ColumnMatch`), never below 0. A
-/// view's likeness to references at the distance r of its place is expected as
+/// The similarity of two views is far_difference^2 - difference^2 (`ColumnMatch`), never below 0. A
+/// view's similarity to references at the distance r of its place is expected as
 /// amplitude * exp(-r / range_m): [M04 section 2.2] the dissimilarity grows with distance and
 /// saturates. The amplitude says how well the view as a whole is explained; people in view, light
 /// and noise lower it, so it is free, and only the pattern over the references places the robot.
 struct ObservationModel {
   /// Fewest posed views to learn from.
-  static constexpr int least_views = 8;
+  static constexpr int min_views = 8;
 
   double spacing_m = 0.0;       ///< between references
   double far_difference = 0.6;  ///< median difference of two views far from each other
-  double range_m = 0.0;         ///< distance at which the likeness has fallen to 1/e
-  /// Half the inverse square of the deviation of a likeness from its expectation: log-likelihood
-  /// for each squared unit of likeness explained.
+  double range_m = 0.0;         ///< distance at which the similarity has fallen to 1/e
+  /// Half the inverse square of the deviation of a similarity from its expectation: log-likelihood
+  /// for each squared unit of similarity explained.
   double sharpness = 0.0;
   double heading_width_rad = 0.0;        ///< headings farther off than this do not explain a view
   double explained_difference = 0.5;     ///< a view of the memory's places differs by less from the
@@ -40,7 +40,7 @@ struct ObservationModel {
   friend bool operator==(const ObservationModel&, const ObservationModel&) = default;
 };
 
-/// Throws OptionError, and ContractError on a memory with fewer than `least_views` posed views or
+/// Throws OptionError, and ContractError on a memory with fewer than `min_views` posed views or
 /// with all of them in one place. Cost: one comparison of columns for each pair of a sampled and a
 /// compared view, 0.25 s for the defaults and a memory of 1000 views; and a place model.
 [[nodiscard]] ObservationModel learn_observation_model(const ColumnRanking& ranking,

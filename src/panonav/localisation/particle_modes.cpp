@@ -116,7 +116,7 @@ std::int32_t bin_at(double cells) {
 
 }  // namespace
 
-ParticleModes find_modes(const Particles& particles, const PoseBins& bins, double least_weight) {
+ParticleModes find_modes(const Particles& particles, const PoseBins& bins, double min_weight) {
   require(bins.cell_m > 0.0, "side of a bin", bins.cell_m, "> 0 m");
   require(bins.headings >= 1, "sectors of the circle", bins.headings, ">= 1");
   ParticleModes result;
@@ -153,8 +153,8 @@ ParticleModes find_modes(const Particles& particles, const PoseBins& bins, doubl
   for (const std::uint32_t seed : order) {
     if (cells[seed].mode >= 0) continue;
     // No later mode can be heavier than all its bins at this weight.
-    constexpr double most_bins = (2 * reach + 1) * (2 * reach + 1) * (2 * reach + 1);
-    if (cells[seed].weight * most_bins < least_weight * sum) break;
+    constexpr double max_bins = (2 * reach + 1) * (2 * reach + 1) * (2 * reach + 1);
+    if (cells[seed].weight * max_bins < min_weight * sum) break;
     double weight = 0.0;
     const std::int32_t turn_reach = bins.headings > 2 * reach ? reach : 0;
     for (std::int32_t dx = -reach; dx <= reach; ++dx) {
@@ -176,7 +176,7 @@ ParticleModes find_modes(const Particles& particles, const PoseBins& bins, doubl
   std::vector<int> ranks(weights.size(), -1);
   std::vector<int> by_weight;
   for (int m = 0; m < modes; ++m) {
-    if (weights[static_cast<std::size_t>(m)] >= least_weight * sum) by_weight.push_back(m);
+    if (weights[static_cast<std::size_t>(m)] >= min_weight * sum) by_weight.push_back(m);
   }
   std::ranges::stable_sort(by_weight, std::greater{},
                            [&](int m) { return weights[static_cast<std::size_t>(m)]; });

@@ -57,10 +57,10 @@ struct ParticleModes {
 
 /// Clusters particles around the heaviest bin, then around the heaviest bin of the rest, and so on:
 /// a mode is a bin and the bins up to two beside it, without those of earlier modes. Modes below
-/// `least_weight` of the whole are not kept. Deterministic; cost linear in particles, and in bins
+/// `min_weight` of the whole are not kept. Deterministic; cost linear in particles, and in bins
 /// times modes.
 [[nodiscard]] ParticleModes find_modes(const Particles& particles, const PoseBins& bins,
-                                       double least_weight = 0.01);
+                                       double min_weight = 0.01);
 
 /// Root mean square distance of the particles from their mean; 0 for none.
 [[nodiscard]] double spread_of(const Particles& particles);

@@ -55,7 +55,7 @@ PlaceModel learn_place_model(const ColumnRanking& ranking, const PlaceModelOptio
   const auto seed = static_cast<std::uint64_t>(options.seed);
   const std::vector<ViewId> sample = sample_views(memory.views(), options.sampled_views, seed);
   model.sampled_views = static_cast<int>(sample.size());
-  if (memory.size() < static_cast<std::size_t>(PlaceModel::least_views)) return model;
+  if (memory.size() < static_cast<std::size_t>(PlaceModel::min_views)) return model;
 
   const std::vector<ViewId> compared =
       sample_views(memory.views(), options.compared_views, seed + 1);
@@ -90,7 +90,7 @@ PlaceModel learn_place_model(const ColumnRanking& ranking, const PlaceModelOptio
   model.mirrored = quantile(nearest_of_mirrored, 0.5);
   double least =
       std::min(PlaceModel::related_share * model.arbitrary, PlaceModel::unrelated_difference);
-  if (beside.size() >= static_cast<std::size_t>(PlaceModel::least_views)) {
+  if (beside.size() >= static_cast<std::size_t>(PlaceModel::min_views)) {
     model.beside = quantile(beside, 0.9);
     least = std::min(least, *model.beside);
   }

@@ -28,16 +28,16 @@ struct PlaceModel {
   /// something to do with each other.
   static constexpr double related_share = 0.88;
   /// Fewest views to learn from.
-  static constexpr int least_views = 8;
+  static constexpr int min_views = 8;
 
   double threshold = unlearnt_threshold;
-  bool learnt = false;  ///< false: fewer than `least_views` views
+  bool learnt = false;  ///< false: fewer than `min_views` views
   int sampled_views = 0;
-  double neighbouring = 0.0;  ///< median difference of a view to the one most alike of all others
+  double neighbouring = 0.0;  ///< median difference of a view to the most similar one of all others
   double arbitrary = 0.0;     ///< median difference between two views
-  double mirrored = 0.0;      ///< median difference of a mirrored view to the one most alike
+  double mirrored = 0.0;      ///< median difference of a mirrored view to the most similar one
   /// Nine of ten views differ by no more from the one taken nearest to them; empty where fewer than
-  /// `least_views` of the sampled views have a position.
+  /// `min_views` of the sampled views have a position.
   std::optional<double> beside;
   friend bool operator==(const PlaceModel&, const PlaceModel&) = default;
 };

@@ -22,7 +22,7 @@ constexpr std::array<double, 6> neighbourhoods = {1.6, 2.3, 3.2, 4.5, 6.5, 9.0};
 constexpr std::array<double, 3> exponents = {1.0, 1.25, 1.5};
 // Share of the typical kriging variance that stays even where the query equals a reference: sensor
 // noise.
-constexpr double least_variance = 0.1;
+constexpr double min_variance = 0.1;
 constexpr double coverage = 0.95;
 
 // Posed views, the best match first.
@@ -143,7 +143,7 @@ PositionModel learn_position_model(const ColumnRanking& ranking,
   PositionModel model;
   model.components = ranking.components();
   const double spacing_m = VoronoiCells(positions).spacing_m();
-  if (posed.size() < PositionModel::least_views || spacing_m == 0.0) return model;
+  if (posed.size() < PositionModel::min_views || spacing_m == 0.0) return model;
 
   const std::vector<ViewId> sample =
       sample_views(posed, options.sampled_views, static_cast<std::uint64_t>(options.seed));
@@ -162,10 +162,10 @@ PositionModel learn_position_model(const ColumnRanking& ranking,
     truths.push_back(memory.info(view).pose->position());
     differences.push_back(neighbours.back().to_query(0));
   }
-  if (neighbours.size() < PositionModel::least_views) return model;
+  if (neighbours.size() < PositionModel::min_views) return model;
   model.sampled_views = static_cast<int>(neighbours.size());
-  constexpr double least_unit = 1e-4;  // for memories of equal views
-  model.difference_unit = std::max(least_unit, quantile(differences, 0.5));
+  constexpr double min_unit = 1e-4;  // for memories of equal views
+  model.difference_unit = std::max(min_unit, quantile(differences, 0.5));
 
   // Views whose nearest match only looks alike say nothing on how to interpolate; a wide
   // neighbourhood would then win because the middle of many wrong places is wrong by less.
@@ -200,7 +200,7 @@ PositionModel learn_position_model(const ColumnRanking& ranking,
   model.variance_unit = quantile(best_variances, 0.5);
   std::vector<double> ratios;
   for (std::size_t i = 0; i < best_errors.size(); ++i) {
-    const double variance = best_variances[i] + least_variance * model.variance_unit;
+    const double variance = best_variances[i] + min_variance * model.variance_unit;
     if (variance > 0.0) ratios.push_back(best_errors[i] / std::sqrt(variance));
   }
   model.median_error_m = quantile(best_errors, 0.5);
@@ -230,7 +230,7 @@ std::optional<PositionEstimate> interpolate_position(const ColumnRanking& rankin
       krige(neighbours, model.neighbourhood_m, model.exponent, model.difference_unit);
   estimate.position = kriged.position;
   estimate.radius_m = model.radius_m_per_deviation *
-                      std::sqrt(kriged.variance + least_variance * model.variance_unit);
+                      std::sqrt(kriged.variance + min_variance * model.variance_unit);
   for (std::size_t i = 0; i < kriged.used.size(); ++i) {
     estimate.shares.push_back({neighbours.views[kriged.used[i]], kriged.weights[i]});
   }

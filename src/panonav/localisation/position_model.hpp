@@ -20,12 +20,12 @@ void visit_options(PositionModelOptions& options, OptionVisitor& visitor);
 /// leaving one out. Plain numbers, so that it can be kept beside the memory.
 struct PositionModel {
   /// Fewest posed views to learn from.
-  static constexpr int least_views = 8;
+  static constexpr int min_views = 8;
   /// Best matches that may take part in an interpolation, before those far from the best one are
   /// left out. Further references change positions by less than their error.
   static constexpr int candidates = 16;
 
-  bool learnt = false;  ///< false: fewer than `least_views` posed views; the nearest view's
+  bool learnt = false;  ///< false: fewer than `min_views` posed views; the nearest view's
                         ///< position is the answer
   int components = 0;   ///< over which views were compared; 0: all
   int sampled_views = 0;

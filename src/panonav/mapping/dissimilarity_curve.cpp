@@ -53,7 +53,7 @@ DissimilarityCurve::DissimilarityCurve(double slope) {
   constexpr double kLarge = 1e12;
   knots_ = {{}, {kLarge, kLarge * slope, 0.0}};
   range_ = kLarge * slope;
-  largest_dissimilarity_ = kLarge;
+  max_dissimilarity_ = kLarge;
 }
 
 DissimilarityCurve::DissimilarityCurve(std::span<const DissimilarityAtDistance> pairs,
@@ -104,8 +104,8 @@ DissimilarityCurve::DissimilarityCurve(std::span<const DissimilarityAtDistance> 
   }
   if (knots_.size() == 1) knots_.push_back({1.0, 0.0, 0.0});
 
-  largest_dissimilarity_ = kShareOfLevel * level;
-  range_ = distance(largest_dissimilarity_);
+  max_dissimilarity_ = kShareOfLevel * level;
+  range_ = distance(max_dissimilarity_);
 }
 
 double DissimilarityCurve::distance(double dissimilarity) const {

@@ -32,10 +32,10 @@ class DissimilarityCurve {
   [[nodiscard]] double distance(double dissimilarity) const;
   /// E of [M04 eq. 5]: root mean square error of a distance read as `distance`; rising with it.
   [[nodiscard]] double error(double distance) const;
-  /// x_1 of [M04 eq. 5]: the largest distance that can be read. Views above `largest_dissimilarity`
+  /// x_1 of [M04 eq. 5]: the largest distance that can be read. Views above `max_dissimilarity`
   /// are unrelated.
   [[nodiscard]] double range() const noexcept { return range_; }
-  [[nodiscard]] double largest_dissimilarity() const noexcept { return largest_dissimilarity_; }
+  [[nodiscard]] double max_dissimilarity() const noexcept { return max_dissimilarity_; }
   /// K of [M04 eq. 5]: stiffness of a spring of this rest length, 1 .. 0 and 0.1 at `range`.
   [[nodiscard]] double stiffness(double distance) const;
 
@@ -51,7 +51,7 @@ class DissimilarityCurve {
  private:
   std::vector<Knot> knots_;  // ascending in all three; the first one is 0
   double range_ = 0.0;
-  double largest_dissimilarity_ = 0.0;
+  double max_dissimilarity_ = 0.0;
 };
 
 }  // namespace panonav

@@ -13,13 +13,13 @@ namespace panonav {
 namespace {
 
 // Steps by which the next is judged.
-constexpr std::size_t most_latest = 15;
-constexpr std::size_t least_latest = 3;
+constexpr std::size_t max_latest = 15;
+constexpr std::size_t min_latest = 3;
 // Before the first of them: times the length that the views' default scale gives.
 constexpr std::array<double, 4> first_guesses{0.5, 1.0, 2.0, 4.0};
-constexpr double most_relative_deviation = 0.2;
-constexpr double most_relative_change = 2.0;  // either way, against the latest steps
-constexpr double least_length = 0.03;         // in camera heights; shorter steps tell no scale
+constexpr double max_relative_deviation = 0.2;
+constexpr double max_relative_change = 2.0;  // either way, against the latest steps
+constexpr double min_length = 0.03;          // in camera heights; shorter steps tell no scale
 
 }  // namespace
 
@@ -29,7 +29,7 @@ GroundLengths::GroundLengths(double camera_height_m) : camera_height_m_(camera_h
 }
 
 std::optional<double> GroundLengths::scale_m() const {
-  if (latest_scales_m_.size() < least_latest) return std::nullopt;
+  if (latest_scales_m_.size() < min_latest) return std::nullopt;
   return upper_median(latest_scales_m_);
 }
 
@@ -55,12 +55,12 @@ bool GroundLengths::correct(const HomingView& before, const HomingView& after, V
   if (found) {
     const double length = std::hypot(found->x, found->y);
     const double expected = known_m ? *known_m * step.length_in_views / camera_height_m_ : length;
-    if (found->deviation < most_relative_deviation * length &&
-        length < most_relative_change * expected && expected < most_relative_change * length) {
-      if (length > least_length) {
+    if (found->deviation < max_relative_deviation * length &&
+        length < max_relative_change * expected && expected < max_relative_change * length) {
+      if (length > min_length) {
         latest_scales_m_.push_back(length * camera_height_m_ / step.length_in_views);
       }
-      if (latest_scales_m_.size() > most_latest) latest_scales_m_.erase(latest_scales_m_.begin());
+      if (latest_scales_m_.size() > max_latest) latest_scales_m_.erase(latest_scales_m_.begin());
       motion = {found->x * camera_height_m_, found->y * camera_height_m_, motion.heading_rad};
       return true;
     }

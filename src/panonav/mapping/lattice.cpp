@@ -123,12 +123,13 @@ class Arranger {
       pairs.push_back(std::minmax(step.a, step.b));
       edges.push_back({step.a, step.b, 1.0});
     }
-    // Where motion tells how all views hang together, likeness is asked only for views that it
+    // Where motion tells how all views hang together, similarity is asked only for views that it
     // brings near to each other.
-    const auto parts = LatticeGraph(size(), edges).parts();
-    by_motion_ = !motions_.empty() && std::ranges::count(parts, 0U) == static_cast<long>(size());
+    const auto components = LatticeGraph(size(), edges).components();
+    by_motion_ =
+        !motions_.empty() && std::ranges::count(components, 0U) == static_cast<long>(size());
     if (!by_motion_) {
-      const auto alike = views_.most_alike(options_, executor_);
+      const auto alike = views_.most_similar(options_, executor_);
       pairs.insert(pairs.end(), alike.begin(), alike.end());
     }
     measure(pairs);
@@ -174,8 +175,8 @@ class Arranger {
   [[nodiscard]] std::vector<Point2> positions() const { return positions_of(start_.poses); }
 
   void link_near_views() {
-    const auto near =
-        nearest_points(positions(), start_.parts, static_cast<std::size_t>(options_.neighbours));
+    const auto near = nearest_points(positions(), start_.components,
+                                     static_cast<std::size_t>(options_.neighbours));
     std::vector<NodePair> pairs;
     for (std::size_t i = 0; i < near.size(); ++i) {
       for (const std::size_t j : near[i]) pairs.push_back(std::minmax(i, j));
@@ -201,7 +202,7 @@ class Arranger {
     for (std::size_t i = 0; i < kFarPairs; ++i) {
       const auto a = static_cast<std::size_t>(random.index(size()));
       const auto b = static_cast<std::size_t>(random.index(size()));
-      if (a == b || start_.parts[a] != start_.parts[b]) continue;
+      if (a == b || start_.components[a] != start_.components[b]) continue;
       drawn.push_back({views_.dissimilarity(std::minmax(a, b)), laid_out(a, b)});
     }
     if (drawn.empty()) return std::nullopt;
@@ -265,7 +266,7 @@ class Arranger {
     auto& springs = lattice_.springs;
     springs.clear();
     for (const LatticeSpring& spring : measured_) {
-      if (spring.dissimilarity > lattice_.curve.largest_dissimilarity() || !agrees(spring)) {
+      if (spring.dissimilarity > lattice_.curve.max_dissimilarity() || !agrees(spring)) {
         continue;
       }
       springs.push_back(spring);
@@ -276,7 +277,7 @@ class Arranger {
   }
 
   /// Leaves out springs most of whose triangles do not close, or, where motion has told which views
-  /// are near, none. A view without any that does hangs on the one part
+  /// are near, none. A view without any that does hangs on the one component
   /// to which most of its springs lead, so that it never joins two; or on others of its kind.
   void keep_confirmed() {
     auto& springs = lattice_.springs;
@@ -290,11 +291,11 @@ class Arranger {
       has_support[springs[s].a] = 1;
       has_support[springs[s].b] = 1;
     }
-    const auto parts = LatticeGraph(size(), confirmed).parts();
+    const auto components = LatticeGraph(size(), confirmed).components();
     std::vector<std::map<std::size_t, std::size_t>> leads_to(size());
     for (const LatticeSpring& spring : springs) {
-      if (has_support[spring.b] != 0) ++leads_to[spring.a][parts[spring.b]];
-      if (has_support[spring.a] != 0) ++leads_to[spring.b][parts[spring.a]];
+      if (has_support[spring.b] != 0) ++leads_to[spring.a][components[spring.b]];
+      if (has_support[spring.a] != 0) ++leads_to[spring.b][components[spring.a]];
     }
     const auto hangs_on = [&](std::size_t node) -> std::optional<std::size_t> {
       if (leads_to[node].empty()) return std::nullopt;
@@ -307,8 +308,8 @@ class Arranger {
       const bool supported_a = has_support[a] != 0;
       const bool supported_b = has_support[b] != 0;
       const bool keep = closes[s] > enough ||
-                        (!supported_a && supported_b && hangs_on(a) == parts[b]) ||
-                        (supported_a && !supported_b && hangs_on(b) == parts[a]) ||
+                        (!supported_a && supported_b && hangs_on(a) == components[b]) ||
+                        (supported_a && !supported_b && hangs_on(b) == components[a]) ||
                         (!supported_a && !supported_b && !hangs_on(a) && !hangs_on(b));
       if (keep) kept.push_back(springs[s]);
     }
@@ -344,7 +345,8 @@ class Arranger {
     if (by_motion_) return;
     std::vector<GraphEdge> edges;
     for (const auto& spring : joined()) edges.push_back({spring.a, spring.b, 1.0});
-    if (start_.poses.empty() || LatticeGraph(size(), edges).parts() != start_.parts) start();
+    if (start_.poses.empty() || LatticeGraph(size(), edges).components() != start_.components)
+      start();
   }
 
   [[nodiscard]] std::vector<SpringTerm> terms() const {
@@ -395,7 +397,7 @@ class Arranger {
       return;
     }
     std::vector<double> nearest;
-    const auto near = nearest_points(positions(), start_.parts, 1);
+    const auto near = nearest_points(positions(), start_.components, 1);
     for (std::size_t i = 0; i < near.size(); ++i) {
       if (near[i].empty()) continue;
       const double length = laid_out(i, near[i].front());
@@ -417,16 +419,18 @@ class Arranger {
     // In the unit of the result.
     fit_curve();
     learn_errors(lattice_.springs, lattice_.curve, lattice_.errors);
-    auto& parts = lattice_.parts;
-    for (const std::size_t part : start_.parts) parts.resize(std::max(parts.size(), part + 1));
-    std::vector<std::optional<Pose2>> part_from_frame(parts.size());
+    auto& components = lattice_.components;
+    for (const std::size_t component : start_.components)
+      components.resize(std::max(components.size(), component + 1));
+    std::vector<std::optional<Pose2>> component_from_frame(components.size());
     for (std::size_t i = 0; i < size(); ++i) {
-      const std::size_t part = start_.parts[i];
-      if (!part_from_frame[part]) part_from_frame[part] = inverse(start_.poses[i]);
-      lattice_.nodes[i].part = part;
-      lattice_.nodes[i].pose = *part_from_frame[part] * start_.poses[i];
-      ++parts[part].views;
-      parts[part].handedness_known = start_.handedness_known[part] != 0;
+      const std::size_t component = start_.components[i];
+      if (!component_from_frame[component])
+        component_from_frame[component] = inverse(start_.poses[i]);
+      lattice_.nodes[i].component = component;
+      lattice_.nodes[i].pose = *component_from_frame[component] * start_.poses[i];
+      ++components[component].views;
+      components[component].handedness_known = start_.handedness_known[component] != 0;
     }
   }
 
@@ -448,7 +452,7 @@ class Arranger {
 void visit_options(LatticeOptions& options, OptionVisitor& visitor) {
   using T = LatticeOptions;
   constexpr OptionTable table{
-      option<&T::neighbours>("springs that each view asks for, to the views most alike", 1, 1000),
+      option<&T::neighbours>("springs that each view asks for, to the most similar views", 1, 1000),
       option<&T::components>("Fourier components compared, 0 for all", 0),
       option<&T::phases>("take directions and headings from phases"),
       option<&T::landmarks>("views from which the start is laid out", 3, 2000),

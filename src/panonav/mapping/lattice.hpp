@@ -49,8 +49,8 @@ void visit_options(CoarseMotionOptions& options, OptionVisitor& visitor);
 /// A view in the arrangement.
 struct LatticeNode {
   ViewId view;
-  Pose2 pose;            ///< in its component's frame; heading 0 without phases
-  std::size_t part = 0;  ///< index of its group
+  Pose2 pose;                 ///< in its component's frame; heading 0 without phases
+  std::size_t component = 0;  ///< index of its group
 };
 
 struct LatticeSpring {
@@ -75,7 +75,7 @@ struct SpringErrors {
 
 /// A connected component: views that springs join. Each component has its own frame, and nothing is
 /// known of their relative poses.
-struct LatticePart {
+struct LatticeComponent {
   std::size_t views = 0;
   /// False: it may as well be the mirror image.
   bool handedness_known = false;
@@ -83,9 +83,9 @@ struct LatticePart {
 
 /// Views with the poses that their springs give them.
 struct Lattice {
-  std::vector<LatticeNode> nodes;      ///< one for each view of the memory, in its order
-  std::vector<LatticeSpring> springs;  ///< ascending (a, b)
-  std::vector<LatticePart> parts;      ///< the largest first
+  std::vector<LatticeNode> nodes;            ///< one for each view of the memory, in its order
+  std::vector<LatticeSpring> springs;        ///< ascending (a, b)
+  std::vector<LatticeComponent> components;  ///< the largest first
   DissimilarityCurve curve{1.0};
   SpringErrors errors;
   /// True: metres, from the coarse motion. False: the unit is the median distance of a view to its

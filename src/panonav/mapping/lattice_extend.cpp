@@ -76,17 +76,18 @@ class Extender {
     std::vector<LatticeSpring> springs = springs_to(view, node, excluded);
     number_.emplace(view, node);
     std::map<std::size_t, std::size_t> leads_to;
-    for (const auto& spring : springs) ++leads_to[lattice_.nodes[spring.a].part];
+    for (const auto& spring : springs) ++leads_to[lattice_.nodes[spring.a].component];
     if (leads_to.empty()) {
-      lattice_.nodes.push_back({view, {}, lattice_.parts.size()});
-      lattice_.parts.push_back({.views = 1, .handedness_known = false});
+      lattice_.nodes.push_back({view, {}, lattice_.components.size()});
+      lattice_.components.push_back({.views = 1, .handedness_known = false});
       return;
     }
-    const std::size_t part =
+    const std::size_t component =
         std::ranges::max_element(leads_to, {}, [](const auto& p) { return p.second; })->first;
-    std::erase_if(springs, [&](const auto& s) { return lattice_.nodes[s.a].part != part; });
-    lattice_.nodes.push_back({view, {}, part});
-    ++lattice_.parts[part].views;
+    std::erase_if(springs,
+                  [&](const auto& s) { return lattice_.nodes[s.a].component != component; });
+    lattice_.nodes.push_back({view, {}, component});
+    ++lattice_.components[component].views;
     lattice_.springs.insert(lattice_.springs.end(), springs.begin(), springs.end());
     place(node, springs);
     relax_around(node, springs);
@@ -100,7 +101,7 @@ class Extender {
     const auto found = memory_.search(seen, {options_.neighbours, options_.components},
                                       {.excluded_views = excluded});
     for (const Match& match : found.matches) {
-      if (match.dissimilarity > lattice_.curve.largest_dissimilarity()) continue;
+      if (match.dissimilarity > lattice_.curve.max_dissimilarity()) continue;
       LatticeSpring spring{.a = number_.at(match.view),
                            .b = node,
                            .dissimilarity = static_cast<double>(match.dissimilarity)};

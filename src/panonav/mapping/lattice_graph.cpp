@@ -30,23 +30,23 @@ LatticeGraph::LatticeGraph(std::size_t nodes, std::span<const GraphEdge> edges)
   }
 }
 
-std::vector<std::size_t> LatticeGraph::parts() const {
+std::vector<std::size_t> LatticeGraph::components() const {
   DisjointSets sets(size());
   for (std::size_t node = 0; node < size(); ++node) {
     for (const Neighbour& neighbour : neighbours(node)) sets.join(node, neighbour.node);
   }
   std::vector<std::size_t> found = sets.numbered();
   std::vector<std::size_t> sizes;
-  for (const std::size_t part : found) {
-    sizes.resize(std::max(sizes.size(), part + 1));
-    ++sizes[part];
+  for (const std::size_t component : found) {
+    sizes.resize(std::max(sizes.size(), component + 1));
+    ++sizes[component];
   }
   std::vector<std::size_t> order(sizes.size());
   std::iota(order.begin(), order.end(), 0U);
   std::ranges::stable_sort(order, [&](auto a, auto b) { return sizes[a] > sizes[b]; });
   std::vector<std::size_t> number(sizes.size());
   for (std::size_t i = 0; i < order.size(); ++i) number[order[i]] = i;
-  for (std::size_t& part : found) part = number[part];
+  for (std::size_t& component : found) component = number[component];
   return found;
 }
 

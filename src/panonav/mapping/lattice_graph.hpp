@@ -33,7 +33,7 @@ class LatticeGraph {
 
   /// Number of each node's connected component. Components are numbered by size, the largest first,
   /// then by their first node.
-  [[nodiscard]] std::vector<std::size_t> parts() const;
+  [[nodiscard]] std::vector<std::size_t> components() const;
 
   /// Length of the shortest path from `from` to every node, infinite where there is none
   /// (Dijkstra).

@@ -5,7 +5,7 @@ namespace panonav {
 TopologicalMap map_of(const Lattice& lattice) {
   TopologicalMap map;
   for (const LatticeNode& node : lattice.nodes)
-    map.nodes.push_back({node.view, node.pose, node.part});
+    map.nodes.push_back({node.view, node.pose, node.component});
   for (const LatticeSpring& spring : lattice.springs) {
     const LatticeNode& a = lattice.nodes[spring.a];
     const LatticeNode& b = lattice.nodes[spring.b];

@@ -24,11 +24,13 @@ void visit_options(LoopClosureOptions& options, OptionVisitor& visitor) {
   using T = LoopClosureOptions;
   constexpr OptionTable table{
       option<&T::candidates>("places looked at for each view", 1, 1000),
-      option<&T::shortest_loop_m>("views nearer along the way are no candidates", above(0), 1e6),
-      option<&T::most_residual>("share of the views' energy that a closure may leave unexplained",
-                                0, 1),
-      option<&T::most_length>("distance between the views of a closure in units of R, at most", 0,
-                              2),
+      option<&T::min_loop_m>("views nearer along the way are no candidates", above(0), 1e6)
+          .formerly("shortest_loop_m"),
+      option<&T::max_residual>("share of the views' energy that a closure may leave unexplained", 0,
+                               1)
+          .formerly("most_residual"),
+      option<&T::max_length>("distance between the views of a closure in units of R, at most", 0, 2)
+          .formerly("most_length"),
       option<&T::heading_tolerance_rad>("by which compass, way there and way back may differ", 0,
                                         3.2),
       option<&T::return_tolerance>("how far from the start there and back may lead, in units of R",
@@ -38,7 +40,8 @@ void visit_options(LoopClosureOptions& options, OptionVisitor& visitor) {
                                   1000),
       option<&T::sequence>("successive views whose closures must agree", 1, 1000),
       option<&T::spacing_m>("way between closures that are told", 0, 1e6),
-      option<&T::most_drift>("drift of the odometry for each metre since the last closure", 0, 100),
+      option<&T::max_drift>("drift of the odometry for each metre since the last closure", 0, 100)
+          .formerly("most_drift"),
   };
   table.visit(options, visitor);
 }
@@ -49,7 +52,7 @@ LoopClosureFinder::LoopClosureFinder(const VisualMemory& memory, const LoopClosu
   validate(options);
   validate(odometry);
   odometry_.rule = StepRule::home_vector;  // the other gives no direction
-  odometry_.most_residual = options.most_residual;
+  odometry_.max_residual = options.max_residual;
 }
 
 std::vector<ViewId> LoopClosureFinder::near_on_way(std::span<const PassedNode> nodes,
@@ -57,12 +60,12 @@ std::vector<ViewId> LoopClosureFinder::near_on_way(std::span<const PassedNode> n
   std::vector<ViewId> views;
   const double here_m = nodes[node].way_m;
   for (std::size_t i = node;; --i) {
-    if (here_m - nodes[i].way_m > options_.shortest_loop_m) break;
+    if (here_m - nodes[i].way_m > options_.min_loop_m) break;
     views.push_back(nodes[i].view);
     if (i == 0) break;
   }
   for (std::size_t i = node + 1; i < nodes.size(); ++i) {
-    if (nodes[i].way_m - here_m > options_.shortest_loop_m) break;
+    if (nodes[i].way_m - here_m > options_.min_loop_m) break;
     views.push_back(nodes[i].view);
   }
   return views;
@@ -79,7 +82,7 @@ std::optional<LoopClosure> LoopClosureFinder::compare(std::size_t earlier, std::
                                                       const OdometryView& earlier_view,
                                                       const OdometryView& later_view) const {
   const auto there = visual_step(earlier_view, later_view, odometry_);
-  if (!there || there->length_in_views > options_.most_length) return std::nullopt;
+  if (!there || there->length_in_views > options_.max_length) return std::nullopt;
   const auto back = visual_step(later_view, earlier_view, odometry_);
   if (!back) return std::nullopt;
   const Pose2 round_trip = there->before_from_after * back->before_from_after;
@@ -111,7 +114,7 @@ std::optional<LoopClosure> LoopClosureFinder::best_closure(std::span<const Passe
     if (!candidate) continue;
     // Of neighbours on the way the first, which is the most similar, stands for the place.
     const bool known = std::ranges::any_of(looked_at, [&](std::size_t i) {
-      return std::abs(nodes[i].way_m - nodes[*candidate].way_m) < 0.25 * options_.shortest_loop_m;
+      return std::abs(nodes[i].way_m - nodes[*candidate].way_m) < 0.25 * options_.min_loop_m;
     });
     if (known) continue;
     if (static_cast<int>(looked_at.size()) == options_.candidates) break;
@@ -127,7 +130,7 @@ std::optional<LoopClosure> LoopClosureFinder::best_closure(std::span<const Passe
     // Another passage through the same place speaks for it, not against.
     return other.residual < options_.distinctness * best.residual &&
            gap(place, poses[other.earlier] * other.earlier_from_later) >
-               options_.most_length * odometry_.scale_m;
+               options_.max_length * odometry_.scale_m;
   });
   if (ambiguous) return std::nullopt;
   return best;
@@ -143,8 +146,8 @@ bool LoopClosureFinder::is_reciprocal(std::span<const PassedNode> nodes,
   return std::ranges::any_of(found.matches, [&](const Match& match) {
     const auto node = node_of(nodes, match.view);
     if (!node) return false;
-    return nodes[closure.later].way_m - nodes[*node].way_m < options_.shortest_loop_m ||
-           gap(poses[*node], poses[closure.earlier]) < options_.most_length * odometry_.scale_m;
+    return nodes[closure.later].way_m - nodes[*node].way_m < options_.min_loop_m ||
+           gap(poses[*node], poses[closure.earlier]) < options_.max_length * odometry_.scale_m;
   });
 }
 
@@ -155,8 +158,7 @@ bool LoopClosureFinder::is_in_reach(std::span<const PassedNode> nodes, std::span
   const double since_m = std::min(loop_m, here_m - closed_way_m_);
   constexpr double share_within_closed = 0.2;
   const double allowed_m =
-      odometry_.scale_m +
-      options_.most_drift * (since_m + share_within_closed * (loop_m - since_m));
+      odometry_.scale_m + options_.max_drift * (since_m + share_within_closed * (loop_m - since_m));
   return gap(poses[closure.earlier] * closure.earlier_from_later, poses[closure.later]) < allowed_m;
 }
 

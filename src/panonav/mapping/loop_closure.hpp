@@ -18,11 +18,11 @@ struct LoopClosureOptions {
   /// Candidates for each view, from the memory's search.
   int candidates = 5;
   /// Views nearer than this along the path are no candidates: there is no loop to close.
-  double shortest_loop_m = 3.0;
+  double min_loop_m = 3.0;
   /// The view explains the candidate up to this share of the energy of both.
-  double most_residual = 0.2;
+  double max_residual = 0.2;
   /// Farther apart, in units of R, the views are not reliable.
-  double most_length = 0.3;
+  double max_length = 0.3;
   /// Largest disagreement on the heading between the compass and the home vectors there and back.
   double heading_tolerance_rad = 0.15;
   /// Largest distance between start and end after both home vectors, in units of R.
@@ -38,7 +38,7 @@ struct LoopClosureOptions {
   double spacing_m = 0.5;
   /// Drift of the odometry, in metres for each metre, beyond which no closure is believed: counted
   /// from the last closure, and a fifth of it along the rest of the loop. One R comes on top.
-  double most_drift = 0.1;
+  double max_drift = 0.1;
 };
 void visit_options(LoopClosureOptions& options, OptionVisitor& visitor);
 

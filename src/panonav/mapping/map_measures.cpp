@@ -25,6 +25,13 @@ std::vector<std::size_t> ranks_around(std::span<const Point2> points, std::size_
 
 }  // namespace
 
+bool is_comparable(std::span<const Point2> map, std::span<const Point2> truth) {
+  const auto has_extent = [](std::span<const Point2> points) {
+    return std::ranges::any_of(points, [&](const Point2& p) { return p != points.front(); });
+  };
+  return map.size() >= 3 && truth.size() == map.size() && has_extent(map) && has_extent(truth);
+}
+
 NeighbourPreservation neighbour_preservation(std::span<const Point2> map,
                                              std::span<const Point2> truth, int neighbours) {
   const std::size_t n = map.size();

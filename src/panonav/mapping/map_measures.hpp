@@ -10,6 +10,10 @@
 
 namespace panonav {
 
+/// Whether the shapes of two sets of points can be compared: as many points in both, at least
+/// three, and neither all at one place.
+[[nodiscard]] bool is_comparable(std::span<const Point2> map, std::span<const Point2> truth);
+
 /// How well a map preserves neighbourhoods (Venna and Kaski 2001); 1 is perfect, chance gives about
 /// 0.5.
 struct NeighbourPreservation {

@@ -64,13 +64,13 @@ class Problem {
       : nodes_(nodes), edges_(edges) {
     fixed_.assign(nodes.size(), 0);
     std::ranges::copy(fixed, fixed_.begin());
-    const auto parts = connected_parts(nodes.size(), edges);
-    std::vector<std::uint8_t> held(nodes.size(), 0);  // by part
-    for (std::size_t i = 0; i < nodes.size(); ++i) held[parts[i]] |= fixed_[i];
+    const auto components = connected_components(nodes.size(), edges);
+    std::vector<std::uint8_t> held(nodes.size(), 0);  // by component
+    for (std::size_t i = 0; i < nodes.size(); ++i) held[components[i]] |= fixed_[i];
     for (std::size_t i = 0; i < nodes.size(); ++i) {
-      if (held[parts[i]] != 0) continue;
+      if (held[components[i]] != 0) continue;
       fixed_[i] = 1;
-      held[parts[i]] = 1;
+      held[components[i]] = 1;
     }
     weights_.assign(edges.size(), 1.0);
   }
@@ -130,7 +130,7 @@ class Problem {
     equations_.begin(static_cast<int>(nodes_.size() * unknowns));
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
       for (std::size_t u = 0; u < unknowns; ++u) {
-        // A part may hang on nothing but edges whose weight has fallen to almost nothing.
+        // A component may hang on nothing but edges whose weight has fallen to almost nothing.
         const double held = fixed_[i] != 0 ? 1.0 : 1e-9;
         const auto at = static_cast<int>(i * unknowns + u);
         equations_.add(at, at, held);
@@ -193,7 +193,7 @@ class Problem {
 void visit_options(PoseGraphOptions& options, OptionVisitor& visitor) {
   using T = PoseGraphOptions;
   constexpr OptionTable table{
-      option<&T::most_iterations>("steps of the solver", 1, 1000),
+      option<&T::max_iterations>("steps of the solver", 1, 1000).formerly("most_iterations"),
       option<&T::settled_m>("solved when no position changes by more", above(0), 1e6),
       option<&T::doubt_deviations>(
           "error at which a loop closure loses its weight, in standard deviations", above(0), 1e6),
@@ -217,14 +217,14 @@ PoseGraphReport optimise_pose_graph(std::span<Pose2> nodes, std::span<const Pose
   // The first steps trust every edge.
   double scale = doubtful ? std::numeric_limits<double>::infinity() : wanted;
   report.settled = false;
-  while (report.iterations < options.most_iterations) {
+  while (report.iterations < options.max_iterations) {
     ++report.iterations;
     const double change = problem.step();
     const bool still = change <= options.settled_m;
     if (std::isinf(scale)) {
       // Where edges lose their weight, positions need not be exact.
       constexpr double nearly_m = 0.05;
-      if (change > nearly_m && report.iterations < options.most_iterations / 4) continue;
+      if (change > nearly_m && report.iterations < options.max_iterations / 4) continue;
       scale = std::max(wanted, problem.weigh(scale));
     } else if (scale > wanted) {
       scale = std::max(wanted, 0.25 * scale);
@@ -239,7 +239,7 @@ PoseGraphReport optimise_pose_graph(std::span<Pose2> nodes, std::span<const Pose
   return report;
 }
 
-std::vector<std::size_t> connected_parts(std::size_t nodes, std::span<const PoseEdge> edges) {
+std::vector<std::size_t> connected_components(std::size_t nodes, std::span<const PoseEdge> edges) {
   DisjointSets sets(nodes);
   for (const PoseEdge& edge : edges) sets.join(edge.a, edge.b);
   return sets.numbered();

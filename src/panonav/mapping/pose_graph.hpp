@@ -24,7 +24,7 @@ struct PoseEdge {
 };
 
 struct PoseGraphOptions {
-  int most_iterations = 40;
+  int max_iterations = 40;
   /// The optimisation has converged when no position changes by more than this.
   double settled_m = 1e-3;
   /// An edge that may be an outlier has half its weight at this many standard deviations.
@@ -52,8 +52,8 @@ PoseGraphReport optimise_pose_graph(std::span<Pose2> nodes, std::span<const Pose
                                     std::span<const std::uint8_t> fixed = {});
 
 /// The connected component of each node, numbered from 0 in the order of their first nodes.
-[[nodiscard]] std::vector<std::size_t> connected_parts(std::size_t nodes,
-                                                       std::span<const PoseEdge> edges);
+[[nodiscard]] std::vector<std::size_t> connected_components(std::size_t nodes,
+                                                            std::span<const PoseEdge> edges);
 
 /// Residual of an edge at the nodes' poses, in standard deviations. The edge must be valid.
 [[nodiscard]] double edge_tension(const PoseEdge& edge, std::span<const Pose2> nodes);

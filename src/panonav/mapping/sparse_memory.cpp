@@ -182,8 +182,9 @@ TopologicalMap contract_map(const TopologicalMap& map, const SparseSelection& se
     moved.b = representatives.of(edge.b);
     const MapNode* const a = node_of(moved.a);
     const MapNode* const b = node_of(moved.b);
-    // A view outside of the map, or of another part, may stand for one in it.
-    if (moved.a == moved.b || a == nullptr || b == nullptr || a->part != b->part) continue;
+    // A view outside of the map, or of another component, may stand for one in it.
+    if (moved.a == moved.b || a == nullptr || b == nullptr || a->component != b->component)
+      continue;
     if (!pairs.insert(moved.a, moved.b)) continue;
     if (moved.a != edge.a || moved.b != edge.b) moved.a_from_b = inverse(a->pose) * b->pose;
     left.edges.push_back(moved);
@@ -192,14 +193,14 @@ TopologicalMap contract_map(const TopologicalMap& map, const SparseSelection& se
 }
 
 SparseLoss measure_loss(const VisualMemory& memory, const SparseSelection& selection,
-                        std::size_t most_asked) {
-  require(most_asked >= 1, "most_asked", static_cast<double>(most_asked), ">= 1");
+                        std::size_t max_asked) {
+  require(max_asked >= 1, "max_asked", static_cast<double>(max_asked), ">= 1");
   SparseLoss loss;
   const std::size_t count = selection.redundant.size();
   if (count == 0) return loss;
   std::vector<ViewId> dropped;
   for (const RedundantView& redundant : selection.redundant) dropped.push_back(redundant.view);
-  const std::size_t asked = std::min(count, most_asked);
+  const std::size_t asked = std::min(count, max_asked);
   std::vector<double> differences;
   std::vector<double> before_m;
   std::vector<double> after_m;

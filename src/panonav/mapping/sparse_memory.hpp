@@ -72,9 +72,9 @@ struct SparseLoss {
   std::optional<Positions> positions;
 };
 
-/// Asks for at most `most_asked` dropped views, evenly spread. Throws ContractError unless
-/// most_asked >= 1.
+/// Asks for at most `max_asked` dropped views, evenly spread. Throws ContractError unless
+/// max_asked >= 1.
 [[nodiscard]] SparseLoss measure_loss(const VisualMemory& memory, const SparseSelection& selection,
-                                      std::size_t most_asked = 1000);
+                                      std::size_t max_asked = 1000);
 
 }  // namespace panonav

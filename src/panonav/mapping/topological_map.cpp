@@ -15,8 +15,8 @@ namespace panonav {
 namespace {
 
 // Even a robot that stands still has so much error in a step: the noise of the pictures.
-constexpr double least_position_deviation_m = 0.005;
-constexpr double least_heading_deviation_rad = 0.003;
+constexpr double min_position_deviation_m = 0.005;
+constexpr double min_heading_deviation_rad = 0.003;
 // Of the position that a closure tells: what the views leave unexplained shortens the way between
 // them; for each unit of residual, in units of R.
 constexpr double closure_deviation = 1.0;
@@ -24,7 +24,7 @@ constexpr double closure_position_deviation_m = 0.02;
 constexpr double closure_turn_deviation = 0.05;
 constexpr double closure_heading_deviation_rad = 0.01;
 // Known steps by which the scale is judged: the latest, as R is another in every room.
-constexpr std::size_t most_known_lengths = 15;
+constexpr std::size_t max_known_lengths = 15;
 constexpr double refuted_weight = 0.1;
 // Closures that are right within so many standard deviations do not pull.
 constexpr double pulling_deviations = 3.0;
@@ -68,10 +68,10 @@ void validate(const TopologicalMap& map) {
   }
 }
 
-std::size_t number_of_parts(const TopologicalMap& map) {
-  std::set<std::size_t> parts;
-  for (const MapNode& node : map.nodes) parts.insert(node.part);
-  return parts.size();
+std::size_t number_of_components(const TopologicalMap& map) {
+  std::set<std::size_t> components;
+  for (const MapNode& node : map.nodes) components.insert(node.component);
+  return components.size();
 }
 
 void visit_options(MappingOptions& options, OptionVisitor& visitor) {
@@ -81,7 +81,7 @@ void visit_options(MappingOptions& options, OptionVisitor& visitor) {
           "a view becomes a node when it differs from the last by more; 0: every view", 0, 1),
       option<&T::close_loops>("look for places passed before"),
       option<&T::bridge_m>(
-          "length of steps that neither views nor wheels show; 0: a new part begins", 0, 1e6),
+          "length of steps that neither views nor wheels show; 0: a new component begins", 0, 1e6),
       option<&T::wheel_lengths>("take the length of steps from the wheels"),
       option<&T::step_deviation>("deviation of positions read from views, for each metre", above(0),
                                  10),
@@ -121,14 +121,14 @@ void TopologicalMapper::add_step(const std::optional<VisualStep>& step,
         {here - 1, here, {options_.bridge_m, 0.0, 0.0}, options_.bridge_m, any_heading_rad});
     weights_.push_back(1.0);
     poses_.push_back(poses_.back() * edges_.back().a_from_b);
-    parts_.push_back(parts_.back());
+    components_.push_back(components_.back());
     nodes_[here].way_m = nodes_[here - 1].way_m + options_.bridge_m;
     return;
   }
   if (!step && !moved) {
     // A frame of its own; the way goes on, so that its views are no candidates for each other.
-    update.new_part = true;
-    parts_.push_back(parts_.back() + 1);
+    update.new_component = true;
+    components_.push_back(components_.back() + 1);
     poses_.emplace_back();
     nodes_[here].way_m = nodes_[here - 1].way_m;
     return;
@@ -138,11 +138,11 @@ void TopologicalMapper::add_step(const std::optional<VisualStep>& step,
   if (step && wheels) motion = with_length(motion, length(*moved));
   const double length_m = length(motion);
   const double position = wheels ? options_.wheel_deviation : options_.step_deviation;
-  edges_.push_back({here - 1, here, motion, position * length_m + least_position_deviation_m,
-                    options_.turn_deviation * length_m + least_heading_deviation_rad});
+  edges_.push_back({here - 1, here, motion, position * length_m + min_position_deviation_m,
+                    options_.turn_deviation * length_m + min_heading_deviation_rad});
   weights_.push_back(1.0);
   poses_.push_back(poses_.back() * motion);
-  parts_.push_back(parts_.back());
+  components_.push_back(components_.back());
   nodes_[here].way_m = nodes_[here - 1].way_m + length_m;
 }
 
@@ -160,12 +160,12 @@ MapUpdate TopologicalMapper::add(ViewId view, OdometryView seen,
   nodes_.push_back({view, 0.0});
   if (nodes_.size() == 1) {
     poses_.emplace_back();
-    parts_.push_back(0);
-    update.new_part = true;
+    components_.push_back(0);
+    update.new_component = true;
   } else {
     if (moved && update.step && options_.wheel_lengths) {
       known_lengths_.push_back({update.step->length_in_views, length(*moved)});
-      if (known_lengths_.size() > most_known_lengths) known_lengths_.erase(known_lengths_.begin());
+      if (known_lengths_.size() > max_known_lengths) known_lengths_.erase(known_lengths_.begin());
     }
     add_step(update.step, moved, update);
   }
@@ -181,7 +181,7 @@ void TopologicalMapper::close_loops(MapUpdate& update) {
   const double scale_m = this->scale_m();
   update.closures = finder_.find(nodes_, poses_, *odometry_.last(), scale_m);
   for (const LoopClosure& closure : update.closures) {
-    join_parts(closure);
+    join_components(closure);
     const double length_m = length(closure.earlier_from_later);
     edges_.push_back({closure.earlier, closure.later, closure.earlier_from_later,
                       closure_deviation * closure.residual * scale_m + closure_position_deviation_m,
@@ -227,15 +227,15 @@ void TopologicalMapper::optimise_latest() {
   for (const auto& [node, at] : number) poses_[node] = poses[at];
 }
 
-void TopologicalMapper::join_parts(const LoopClosure& closure) {
-  const std::size_t kept = parts_[closure.earlier];
-  const std::size_t joined = parts_[closure.later];
+void TopologicalMapper::join_components(const LoopClosure& closure) {
+  const std::size_t kept = components_[closure.earlier];
+  const std::size_t joined = components_[closure.later];
   if (kept == joined) return;
   const Pose2 kept_from_joined =
       poses_[closure.earlier] * closure.earlier_from_later * inverse(poses_[closure.later]);
   for (std::size_t i = 0; i < size(); ++i) {
-    if (parts_[i] != joined) continue;
-    parts_[i] = kept;
+    if (components_[i] != joined) continue;
+    components_[i] = kept;
     poses_[i] = kept_from_joined * poses_[i];
   }
 }
@@ -264,8 +264,8 @@ TopologicalMap TopologicalMapper::map() const {
   TopologicalMap map;
   std::map<std::size_t, std::size_t> number;
   for (std::size_t i = 0; i < size(); ++i) {
-    const auto part = number.try_emplace(parts_[i], number.size()).first->second;
-    map.nodes.push_back({nodes_[i].view, poses_[i], part});
+    const auto component = number.try_emplace(components_[i], number.size()).first->second;
+    map.nodes.push_back({nodes_[i].view, poses_[i], component});
   }
   for (std::size_t i = 0; i < edges_.size(); ++i) {
     const PoseEdge& edge = edges_[i];

@@ -17,8 +17,8 @@ namespace panonav {
 /// A node of the map: a view and its pose.
 struct MapNode {
   ViewId view;
-  Pose2 pose;            ///< in the frame of its connected component
-  std::size_t part = 0;  ///< its connected component; components have no common frame
+  Pose2 pose;                 ///< in the frame of its connected component
+  std::size_t component = 0;  ///< its connected component; components have no common frame
   friend bool operator==(const MapNode&, const MapNode&) = default;
 };
 
@@ -44,7 +44,7 @@ struct TopologicalMap {
 void validate(const TopologicalMap& map);
 
 /// The number of connected components.
-[[nodiscard]] std::size_t number_of_parts(const TopologicalMap& map);
+[[nodiscard]] std::size_t number_of_components(const TopologicalMap& map);
 
 struct MappingOptions {
   /// A view becomes a node when it differs from the last node by more (`image_difference`, 0 .. 1):
@@ -70,7 +70,7 @@ void visit_options(MappingOptions& options, OptionVisitor& visitor);
 /// What the mapper did with a view.
 struct MapUpdate {
   std::optional<VisualStep> step;     ///< from the node before
-  bool new_part = false;              ///< nothing connects the view with the node before
+  bool new_component = false;         ///< nothing connects the view with the node before
   std::vector<LoopClosure> closures;  ///< that became certain; numbers of nodes
   bool optimised = false;             ///< the whole map was
 };
@@ -115,7 +115,7 @@ class TopologicalMapper {
   void add_step(const std::optional<VisualStep>& step, const std::optional<Pose2>& moved,
                 MapUpdate& update);
   void close_loops(MapUpdate& update);
-  void join_parts(const LoopClosure& closure);
+  void join_components(const LoopClosure& closure);
   void optimise_latest();
   void optimise();
 
@@ -126,7 +126,7 @@ class TopologicalMapper {
   LoopClosureFinder finder_;
   std::vector<PassedNode> nodes_;
   std::vector<Pose2> poses_;
-  std::vector<std::size_t> parts_;
+  std::vector<std::size_t> components_;
   std::vector<PoseEdge> edges_;
   std::vector<double> weights_;
   std::vector<KnownLength> known_lengths_;

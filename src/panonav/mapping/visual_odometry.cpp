@@ -83,8 +83,8 @@ void visit_options(VisualOdometryOptions& options, OptionVisitor& visitor) {
       option<&T::iterations>("times that the home vector is refined", 0, 20),
       option<&T::nearer_side>(
           "take out of turns what things nearer on one side of the way do to them"),
-      option<&T::most_residual>("share of the views' energy that a step may leave unexplained", 0,
-                                1),
+      option<&T::max_residual>("share of the views' energy that a step may leave unexplained", 0, 1)
+          .formerly("most_residual"),
   };
   table.visit(options, visitor);
 }
@@ -99,7 +99,7 @@ std::optional<VisualStep> visual_step(const OdometryView& before, const Odometry
   validate(options);
   auto step = options.rule == StepRule::published ? published_step(before, after, options)
                                                   : home_vector_step(before, after, options);
-  if (step && step->residual > options.most_residual) return std::nullopt;
+  if (step && step->residual > options.max_residual) return std::nullopt;
   return step;
 }
 

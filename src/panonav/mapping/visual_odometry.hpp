@@ -43,7 +43,7 @@ struct VisualOdometryOptions {
   bool nearer_side = true;
   /// A step is not believed when turn and displacement leave more than this share of the energy of
   /// the views unexplained.
-  double most_residual = 0.5;
+  double max_residual = 0.5;
 };
 void visit_options(VisualOdometryOptions& options, OptionVisitor& visitor);
 

@@ -114,8 +114,8 @@ VisualMemory::VisualMemory(SignatureShape shape, float full_scale,
   require(shape.rows >= 1, "rows", shape.rows, ">= 1");
   require(shape.components >= 1, "components", shape.components, ">= 1");
   // Sums of differences, and of sums over blocks with their rounding, then stay far below 2^30.
-  constexpr double most_bytes = 1 << 20;
-  require(static_cast<double>(shape.rows) * shape.components < most_bytes, "rows x components",
+  constexpr double max_bytes = 1 << 20;
+  require(static_cast<double>(shape.rows) * shape.components < max_bytes, "rows x components",
           static_cast<double>(shape.rows) * shape.components, "< 2^20");
   require(std::isfinite(full_scale) && full_scale > 0.0F, "full_scale", full_scale, "finite, > 0");
   implementation_ = std::make_unique<Implementation>(shape, full_scale, elevations);

@@ -53,9 +53,9 @@ StepSampler::StepSampler(const Pose2& step, const OdometryNoise& noise)
   translation_deviation_m_ =
       deviation(noise.translation_from_translation, noise.translation_from_rotation);
   // A heading is unknown long before this.
-  constexpr double most_deviation_rad = 1000.0;
+  constexpr double max_deviation_rad = 1000.0;
   rotation_deviation_rad_ = std::min(
-      most_deviation_rad, deviation(noise.rotation_from_translation, noise.rotation_from_rotation));
+      max_deviation_rad, deviation(noise.rotation_from_translation, noise.rotation_from_rotation));
   step_.heading_rad = wrap_angle(step.heading_rad);
 }
 

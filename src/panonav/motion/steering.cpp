@@ -13,7 +13,7 @@ void visit_options(SteeringOptions& options, OptionVisitor& visitor) {
   using T = SteeringOptions;
   constexpr OptionTable table{
       option<&T::turn_gain>("share of the error of direction turned in one step", 0.01, 1),
-      option<&T::most_turn_rad>("turned in one step at most", 0.01, 3.2),
+      option<&T::max_turn_rad>("turned in one step at most", 0.01, 3.2).formerly("most_turn_rad"),
       option<&T::travel_gain>("share of the way that is left driven in one step", 0.01, 1),
       option<&T::step_m>("driven in one step at most", 1e-3, 10),
       option<&T::on_spot_rad>("the robot turns on the spot for larger errors of direction", 0.05,
@@ -26,8 +26,8 @@ void visit_options(PathFollowerOptions& options, OptionVisitor& visitor) {
   using T = PathFollowerOptions;
   constexpr OptionTable table{
       option<&T::look_ahead_m>("the robot steers to the place of the path so far ahead", 0.01, 100),
-      option<&T::most_cut_m>("by which the straight way to that place may leave the path", 1e-3,
-                             10),
+      option<&T::max_cut_m>("by which the straight way to that place may leave the path", 1e-3, 10)
+          .formerly("most_cut_m"),
       option<&T::arrived_m>("so near to the end of the path the robot has arrived", 1e-3, 10),
       options_of<&T::steering>(),
   };
@@ -40,7 +40,7 @@ Pose2 steer_to(const Pose2& robot, Point2 goal, const SteeringOptions& options) 
   const double dy = goal.y_m - robot.y_m;
   const double off = angle_difference(std::atan2(dy, dx), robot.heading_rad);
   const double turn =
-      std::clamp(options.turn_gain * off, -options.most_turn_rad, options.most_turn_rad);
+      std::clamp(options.turn_gain * off, -options.max_turn_rad, options.max_turn_rad);
   const double travel_m =
       std::abs(off) > options.on_spot_rad
           ? 0.0
@@ -77,12 +77,12 @@ Point2 PathFollower::place_at(double along_m) const {
 // To the place nearest to the robot, from its last one on and not farther than it can have driven,
 // even if it has cut a corner.
 void PathFollower::advance(Point2 robot) {
-  const double most_m = along_m_ + 2.0 * options_.look_ahead_m;
+  const double max_m = along_m_ + 2.0 * options_.look_ahead_m;
   double least = std::numeric_limits<double>::infinity();
   double best_m = along_m_;
   const auto first = std::ranges::upper_bound(way_m_, along_m_);
   auto i = static_cast<std::size_t>(std::max<std::ptrdiff_t>(1, first - way_m_.begin()));
-  for (; i < path_.size() && way_m_[i - 1] <= most_m; ++i) {
+  for (; i < path_.size() && way_m_[i - 1] <= max_m; ++i) {
     const double ex = path_[i].x_m - path_[i - 1].x_m;
     const double ey = path_[i].y_m - path_[i - 1].y_m;
     const double length = way_m_[i] - way_m_[i - 1];
@@ -90,7 +90,7 @@ void PathFollower::advance(Point2 robot) {
     const double foot =
         ((robot.x_m - path_[i - 1].x_m) * ex + (robot.y_m - path_[i - 1].y_m) * ey) / length;
     const double there_m =
-        std::clamp(way_m_[i - 1] + std::clamp(foot, 0.0, length), along_m_, most_m);
+        std::clamp(way_m_[i - 1] + std::clamp(foot, 0.0, length), along_m_, max_m);
     const double off = distance(place_at(there_m), robot);
     if (off < least) {
       least = off;
@@ -105,7 +105,7 @@ Point2 PathFollower::place_ahead() const {
   const Point2 here = place();
   // Nearer, the robot would turn for every error of its position.
   double ahead_m = along_m_ + options_.look_ahead_m / 3.0;
-  const double most_m = along_m_ + options_.look_ahead_m;
+  const double max_m = along_m_ + options_.look_ahead_m;
   const auto leaves = [&](Point2 there) {
     const double ex = there.x_m - here.x_m;
     const double ey = there.y_m - here.y_m;
@@ -115,12 +115,12 @@ Point2 PathFollower::place_ahead() const {
     for (auto i = static_cast<std::size_t>(first - way_m_.begin());
          i < path_.size() && way_m_[i] < ahead_m; ++i) {
       const double off = (path_[i].x_m - here.x_m) * ey - (path_[i].y_m - here.y_m) * ex;
-      if (std::abs(off) > options_.most_cut_m * length) return true;
+      if (std::abs(off) > options_.max_cut_m * length) return true;
     }
     return false;
   };
   constexpr int steps = 8;
-  const double step_m = (most_m - ahead_m) / steps;
+  const double step_m = (max_m - ahead_m) / steps;
   Point2 there = place_at(ahead_m);
   for (int i = 0; i < steps; ++i) {
     ahead_m += step_m;

@@ -11,10 +11,10 @@ namespace panonav {
 
 /// Proportional control of a robot with differential drive.
 struct SteeringOptions {
-  double turn_gain = 0.8;      ///< of the error of direction, turned in one step
-  double most_turn_rad = 0.5;  ///< in one step
-  double travel_gain = 0.8;    ///< of the way that is left, driven in one step
-  double step_m = 0.05;        ///< driven in one step at most
+  double turn_gain = 0.8;     ///< of the error of direction, turned in one step
+  double max_turn_rad = 0.5;  ///< in one step
+  double travel_gain = 0.8;   ///< of the way that is left, driven in one step
+  double step_m = 0.05;       ///< driven in one step at most
   /// With a larger error of direction the robot turns on the spot. It then comes no nearer to
   /// obstacles beside its path than the path does.
   double on_spot_rad = 0.5;
@@ -31,7 +31,7 @@ struct PathFollowerOptions {
   double look_ahead_m = 0.3;  ///< the robot steers to a place of the path at most so far ahead
   /// That place is so near that the straight line to it leaves the path by no more than this.
   /// Corners are not cut where there may be no room.
-  double most_cut_m = 0.02;
+  double max_cut_m = 0.02;
   double arrived_m = 0.02;  ///< so near to the end of the path the robot has arrived
   SteeringOptions steering;
   friend bool operator==(const PathFollowerOptions&, const PathFollowerOptions&) = default;

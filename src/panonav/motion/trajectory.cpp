@@ -43,7 +43,7 @@ void Trajectory::append(const StampedPose& pose) {
   poses_.push_back(pose);
 }
 
-std::optional<Pose2> Trajectory::at(double stamp_s, double longest_gap_s) const {
+std::optional<Pose2> Trajectory::at(double stamp_s, double max_gap_s) const {
   const auto after =
       std::lower_bound(poses_.begin(), poses_.end(), stamp_s,
                        [](const StampedPose& pose, double stamp) { return pose.stamp_s < stamp; });
@@ -52,7 +52,7 @@ std::optional<Pose2> Trajectory::at(double stamp_s, double longest_gap_s) const 
   if (after == poses_.begin()) return std::nullopt;
   const StampedPose& before = *std::prev(after);
   const double gap = after->stamp_s - before.stamp_s;
-  if (gap > longest_gap_s) return std::nullopt;
+  if (gap > max_gap_s) return std::nullopt;
   return interpolate(before.pose, after->pose, (stamp_s - before.stamp_s) / gap);
 }
 

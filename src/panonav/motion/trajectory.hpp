@@ -35,9 +35,9 @@ class Trajectory {
   void append(const StampedPose& pose);
 
   /// Interpolated between the two poses around `stamp_s`; empty before the first and after the last
-  /// pose, and where those two are more than `longest_gap_s` apart. O(log n).
+  /// pose, and where those two are more than `max_gap_s` apart. O(log n).
   [[nodiscard]] std::optional<Pose2> at(
-      double stamp_s, double longest_gap_s = std::numeric_limits<double>::infinity()) const;
+      double stamp_s, double max_gap_s = std::numeric_limits<double>::infinity()) const;
 
   friend bool operator==(const Trajectory&, const Trajectory&) = default;
 

@@ -20,10 +20,12 @@ ErrorSummary summary(const std::vector<double>& errors) {
           quantile(errors, 0.95), *std::max_element(errors.begin(), errors.end())};
 }
 
-Pose2 aligned(const Alignment& truth_from_estimate, const Pose2& pose) {
-  const Point2 position = truth_from_estimate.apply(pose.position());
-  const double heading_rad = truth_from_estimate.reflected ? -pose.heading_rad : pose.heading_rad;
-  return {position.x_m, position.y_m, wrap_angle(heading_rad + truth_from_estimate.rotation_rad)};
+Pose2 aligned(const Alignment& ground_truth_from_estimate, const Pose2& pose) {
+  const Point2 position = ground_truth_from_estimate.apply(pose.position());
+  const double heading_rad =
+      ground_truth_from_estimate.reflected ? -pose.heading_rad : pose.heading_rad;
+  return {position.x_m, position.y_m,
+          wrap_angle(heading_rad + ground_truth_from_estimate.rotation_rad)};
 }
 
 /// For each pose the first one that lies `distance_m` farther along the true path.
@@ -56,7 +58,8 @@ void relative_errors(const std::vector<Pair>& pairs, double distance_m, Trajecto
 void visit_options(TrajectoryErrorOptions& options, OptionVisitor& visitor) {
   using T = TrajectoryErrorOptions;
   constexpr OptionTable table{
-      option<&T::longest_gap_s>("longest gap of the truth over which it is interpolated", above(0)),
+      option<&T::max_gap_s>("longest gap of the truth over which it is interpolated", above(0))
+          .formerly("longest_gap_s"),
       option<&T::relative_distance_m>(
           "distance along the true path over which the relative error is taken", above(0)),
       option<&T::align>("align the estimate with the truth first"),
@@ -71,7 +74,7 @@ std::optional<TrajectoryError> trajectory_error(const Trajectory& estimate, cons
   validate(options);
   std::vector<Pair> pairs;
   for (const StampedPose& stamped : estimate.poses()) {
-    const auto true_pose = truth.at(stamped.stamp_s, options.longest_gap_s);
+    const auto true_pose = truth.at(stamped.stamp_s, options.max_gap_s);
     if (true_pose) pairs.push_back({stamped.pose, *true_pose});
   }
   if (pairs.size() < 2) return std::nullopt;
@@ -86,20 +89,20 @@ std::optional<TrajectoryError> trajectory_error(const Trajectory& estimate, cons
       from.push_back(pair.estimate.position());
       to.push_back(pair.truth.position());
     }
-    error.truth_from_estimate =
+    error.ground_truth_from_estimate =
         align(from, to,
               {.allow_scale = options.align_scale, .allow_reflection = options.align_reflection});
   }
   std::vector<double> heading_rad;
   for (Pair& pair : pairs) {
-    pair.estimate = aligned(error.truth_from_estimate, pair.estimate);
+    pair.estimate = aligned(error.ground_truth_from_estimate, pair.estimate);
     error.position_errors_m.push_back(distance(pair.estimate.position(), pair.truth.position()));
     heading_rad.push_back(
         std::abs(angle_difference(pair.estimate.heading_rad, pair.truth.heading_rad)));
   }
   error.position_m = summary(error.position_errors_m);
   error.heading_rad = summary(heading_rad);
-  error.truth_from_estimate.rms_m = error.position_m.rms;
+  error.ground_truth_from_estimate.rms_m = error.position_m.rms;
   relative_errors(pairs, options.relative_distance_m, error);
   return error;
 }

@@ -12,7 +12,7 @@ namespace panonav {
 struct TrajectoryErrorOptions {
   /// The truth is interpolated to the stamps of the estimate; estimates in a gap of the truth
   /// longer than this are left out.
-  double longest_gap_s = 1.0;
+  double max_gap_s = 1.0;
   /// How far apart the poses of a relative error lie along the true path.
   double relative_distance_m = 1.0;
   bool align = true;              ///< false: both are in one frame already
@@ -35,7 +35,7 @@ struct ErrorSummary {
 struct TrajectoryError {
   std::size_t pairs = 0;     ///< estimates with a true pose at their stamp
   std::size_t left_out = 0;  ///< estimates without one
-  Alignment truth_from_estimate;
+  Alignment ground_truth_from_estimate;
   ErrorSummary position_m;   ///< absolute error of position, after alignment
   ErrorSummary heading_rad;  ///< absolute error of heading, after alignment; a reflected alignment
                              ///< turns headings round

@@ -60,10 +60,10 @@ void AreaViews::enter(const NavigationGraph& graph, const SubAreas& areas, std::
 }
 
 void AreaViews::load_ahead(const NavigationGraph& graph, const SubAreas& areas, std::size_t area,
-                           int most_views) {
+                           int max_views) {
   if (here_.area == area) return;
   if (ahead_.area != area) begin(graph, areas, area, ahead_);
-  load(ahead_, static_cast<std::size_t>(most_views));
+  load(ahead_, static_cast<std::size_t>(max_views));
 }
 
 const VisualMemory* AreaViews::part_of(ViewId view) const {

@@ -43,10 +43,10 @@ class AreaViews {
 
   /// Loads the area, or what of it was not loaded ahead.
   void enter(const NavigationGraph& graph, const SubAreas& areas, std::size_t area);
-  /// Loads some views of the area that will be entered next, `most_views` at most, so that no look
+  /// Loads some views of the area that will be entered next, `max_views` at most, so that no look
   /// has to wait for all of them. Another area than at the last call: what was loaded is dropped.
   void load_ahead(const NavigationGraph& graph, const SubAreas& areas, std::size_t area,
-                  int most_views);
+                  int max_views);
   /// Empty before the first `enter`.
   [[nodiscard]] std::optional<std::size_t> area() const noexcept;
   /// Views held, those loaded ahead included.

@@ -14,8 +14,9 @@ void visit_options(FieldOptions& options, OptionVisitor& visitor) {
   using T = FieldOptions;
   constexpr OptionTable table{
       option<&T::links_ahead>("edges ahead that count for a direction", 1, 100),
-      option<&T::most_bend_rad>("a way that has bent by more is not looked along any further", 0,
-                                std::numbers::pi),
+      option<&T::max_bend_rad>("a way that has bent by more is not looked along any further", 0,
+                               std::numbers::pi)
+          .formerly("most_bend_rad"),
   };
   table.visit(options, visitor);
 }
@@ -77,7 +78,7 @@ std::optional<double> direction_at(const NavigationGraph& graph, const SubAreas&
     const double y = node_from_next.y_m - node_from_here.y_m;
     if (x != 0.0 || y != 0.0) {
       const double along = std::atan2(y, x);
-      if (first && std::abs(angle_difference(along, *first)) > options.most_bend_rad) break;
+      if (first && std::abs(angle_difference(along, *first)) > options.max_bend_rad) break;
       if (!first) first = along;
       directions.push_back(std::atan2(node_from_next.y_m, node_from_next.x_m));
     }

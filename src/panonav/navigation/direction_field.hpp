@@ -17,7 +17,7 @@ struct FieldOptions {
   /// So many edges ahead count for a direction, where the way does not bend away.
   int links_ahead = 3;
   /// A way that has bent by more is not looked along any further: it may go round a corner.
-  double most_bend_rad = 0.7854;
+  double max_bend_rad = 0.7854;
 };
 void visit_options(FieldOptions& options, OptionVisitor& visitor);
 

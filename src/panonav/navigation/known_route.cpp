@@ -12,7 +12,7 @@ namespace panonav {
 
 namespace {
 
-constexpr double most_winding = 1.5;
+constexpr double max_winding = 1.5;
 
 // From one place in one direction: 1 as recorded, -1 back.
 std::optional<RouteStretch> follow_way(const KnownRoute& route, double start_m, double direction,
@@ -27,7 +27,7 @@ std::optional<RouteStretch> follow_way(const KnownRoute& route, double start_m, 
       const double ahead_m = direction * (along_m - at_m);
       if (ahead_m < 0.0 || (next_m && ahead_m >= direction * (*next_m - at_m))) continue;
       const double straight_m = distance(here, point_on_route(path, along_m));
-      if (ahead_m <= most_winding * straight_m) next_m = along_m;
+      if (ahead_m <= max_winding * straight_m) next_m = along_m;
     }
     if (!next_m) continue;
     at_m = *next_m;

@@ -24,7 +24,7 @@ namespace {
 
 // Of the median length: what an edge between pictures of one place costs at least, and what one
 // costs of which nothing is known.
-constexpr double least_length_share = 0.1;
+constexpr double min_length_share = 0.1;
 constexpr double unknown_length_share = 3.0;
 
 void require_valid(const NavigationEdge& edge) {
@@ -49,7 +49,7 @@ double length_of(const Pose2& motion) {
 // The motion that two readings tell: they are averaged, as each has its own error.
 std::optional<Pose2> motion_of(const PhaseReading& reading) {
   if (!reading.points) return Pose2{0.0, 0.0, reading.turn_rad};
-  if (reading.disagreement_rad > most_disagreement_rad) return std::nullopt;
+  if (reading.disagreement_rad > max_disagreement_rad) return std::nullopt;
   const double from_b = reading.direction_b_rad + reading.turn_rad - std::numbers::pi;
   const double direction =
       reading.direction_a_rad + 0.5 * angle_difference(from_b, reading.direction_a_rad);
@@ -67,15 +67,15 @@ void complete_lengths(std::vector<NavigationEdge>& edges) {
   const double typical = lengths.empty() ? 1.0 : upper_median(lengths);
   for (NavigationEdge& edge : edges) {
     const bool known = edge.a_from_b || edge.length > 0.0;
-    edge.length = known ? std::max(edge.length, least_length_share * typical)
-                        : unknown_length_share * typical;
+    edge.length =
+        known ? std::max(edge.length, min_length_share * typical) : unknown_length_share * typical;
   }
 }
 
 bool agree(const Pose2& a, const Pose2& b) {
   const double turned = angle_difference(a.heading_rad, b.heading_rad);
   const double aside = angle_difference(std::atan2(a.y_m, a.x_m), std::atan2(b.y_m, b.x_m));
-  return std::abs(turned) <= most_disagreement_rad && std::abs(aside) <= most_disagreement_rad;
+  return std::abs(turned) <= max_disagreement_rad && std::abs(aside) <= max_disagreement_rad;
 }
 
 // Whether most triangles with a third view that tell anything say the same of an edge, as
@@ -258,16 +258,16 @@ NavigationGraph graph_of_memory(const VisualMemory& memory, Executor& executor,
   return graph_of_links(MemoryViewSource(memory), memory.links(), motion, executor);
 }
 
-NavigationGraph graph_of_map(const TopologicalMap& map, double least_weight) {
+NavigationGraph graph_of_map(const TopologicalMap& map, double min_weight) {
   validate(map);
   std::vector<ViewId> views;
   for (const MapNode& node : map.nodes) views.push_back(node.view);
   std::vector<NavigationEdge> edges;
   for (const MapEdge& edge : map.edges) {
-    if (edge.weight < least_weight) continue;
+    if (edge.weight < min_weight) continue;
     const MapNode& a = *std::ranges::lower_bound(map.nodes, edge.a, {}, &MapNode::view);
     const MapNode& b = *std::ranges::lower_bound(map.nodes, edge.b, {}, &MapNode::view);
-    if (a.part != b.part) continue;
+    if (a.component != b.component) continue;
     const Pose2 a_from_b = inverse(a.pose) * b.pose;
     edges.push_back({edge.a, edge.b, length_of(a_from_b), a_from_b});
   }
@@ -282,7 +282,7 @@ struct NodePair {
   std::size_t b = 0;
 };
 
-// Nodes of one part of a map within `reach` of each other, without those that have an edge.
+// Nodes of one component of a map within `reach` of each other, without those that have an edge.
 std::vector<NodePair> near_pairs(const TopologicalMap& map, double reach) {
   std::set<std::pair<ViewId, ViewId>> known;
   for (const MapEdge& edge : map.edges) known.insert(std::minmax(edge.a, edge.b));
@@ -296,7 +296,7 @@ std::vector<NodePair> near_pairs(const TopologicalMap& map, double reach) {
     for (std::size_t j = i + 1; j < order.size(); ++j) {
       const MapNode& other = map.nodes[order[j]];
       if (other.pose.x_m - node.pose.x_m > reach) break;
-      if (other.part != node.part ||
+      if (other.component != node.component ||
           distance(node.pose.position(), other.pose.position()) > reach ||
           known.contains(std::minmax(node.view, other.view))) {
         continue;
@@ -311,8 +311,8 @@ std::vector<NodePair> near_pairs(const TopologicalMap& map, double reach) {
 }  // namespace
 
 NavigationGraph graph_of_map_and_neighbours(const TopologicalMap& map, const VisualMemory& memory,
-                                            Executor& executor, double least_weight) {
-  const NavigationGraph mapped = graph_of_map(map, least_weight);
+                                            Executor& executor, double min_weight) {
+  const NavigationGraph mapped = graph_of_map(map, min_weight);
   if (mapped.edges().empty()) return mapped;
   std::vector<double> lengths;
   std::vector<double> differences;
@@ -323,7 +323,7 @@ NavigationGraph graph_of_map_and_neighbours(const TopologicalMap& map, const Vis
   }
   // What a grid's diagonal is to its spacing; as different as nearly all edges are.
   const double reach = 1.5 * upper_median(lengths);
-  const double most_difference = quantile(differences, 0.9);
+  const double max_difference = quantile(differences, 0.9);
   const std::vector<NodePair> pairs = near_pairs(map, reach);
   std::vector<std::optional<NavigationEdge>> found(pairs.size());
   constexpr std::size_t pairs_per_chunk = 64;
@@ -334,11 +334,11 @@ NavigationGraph graph_of_map_and_neighbours(const TopologicalMap& map, const Vis
           const MapNode& b = map.nodes[pairs[i].b];
           const HomingView view_a = homing_view(memory.signature(a.view));
           const HomingView view_b = homing_view(memory.signature(b.view));
-          if (image_difference(view_a, view_b) > most_difference) continue;
+          if (image_difference(view_a, view_b) > max_difference) continue;
           const Pose2 laid_out = inverse(a.pose) * b.pose;
           const auto reading =
               read_phases(view_a, view_b, TurnHint{.turn_rad = laid_out.heading_rad});
-          if (!reading || reading->disagreement_rad > most_disagreement_rad) continue;
+          if (!reading || reading->disagreement_rad > max_disagreement_rad) continue;
           auto motion = motion_of(*reading);
           if (!motion) continue;
           const double length = length_of(laid_out);
@@ -363,7 +363,7 @@ struct Spring {
   std::optional<Pose2> motion;  // a_from_b by the phases; unit R
   double length = 0.0;          // in the arrangement
   double weight = 0.0;
-  bool one_part = false;
+  bool one_component = false;
   int support = 0;  // third views that confirm it
 };
 
@@ -371,8 +371,8 @@ struct Spring {
 // turn alone.
 void count_support(std::size_t views, std::vector<Spring>& springs) {
   // A third view joins two readings, each with the error of one.
-  constexpr double most_turn_rad = 0.35;
-  constexpr double most_off = 0.4;  // of the motion's length
+  constexpr double max_turn_rad = 0.35;
+  constexpr double max_off = 0.4;  // of the motion's length
   struct Way {
     std::size_t to;
     Pose2 motion;
@@ -393,8 +393,8 @@ void count_support(std::size_t views, std::vector<Spring>& springs) {
       const Pose2 around = first.motion * second->motion;
       const double off = distance(around.position(), spring.motion->position());
       const double turned = angle_difference(around.heading_rad, spring.motion->heading_rad);
-      spring.support += static_cast<int>(std::abs(turned) <= most_turn_rad &&
-                                         off <= most_off * length_of(*spring.motion));
+      spring.support += static_cast<int>(std::abs(turned) <= max_turn_rad &&
+                                         off <= max_off * length_of(*spring.motion));
     }
   }
 }
@@ -430,29 +430,29 @@ struct Candidate {
   NavigationEdge edge;
   NodePair ends;
   double far = 0.0;         // in spacings of the references around
-  bool joins_only = false;  // kept only where without it two parts would not be joined
+  bool joins_only = false;  // kept only where without it two components would not be joined
 };
 
-// How long the edges of springs are, in spacings of the references around: likeness falls faster
+// How long the edges of springs are, in spacings of the references around: similarity falls faster
 // with distance where things are near, so that the unit of phases and of the arrangement changes
 // from place to place. What the arrangement kept it laid out by the directions of all springs
 // around; of what it gave up the phases alone tell how far it leads.
 std::vector<Candidate> candidates_of(const std::vector<ViewId>& views,
-                                     const std::vector<Spring>& springs, double least_weight) {
+                                     const std::vector<Spring>& springs, double min_weight) {
   // The distance to the nearest of several views, each with an error, is a tenth below the spacing,
   // so this means two spacings: views of a square grid have others at 1.41 and 2.
-  constexpr double most_spacings = 2.3;
+  constexpr double max_spacings = 2.3;
   // An arrangement that is torn gives right springs up; so many third views speak for one then,
   // and it must be as short as those to nearest views are.
   constexpr int enough_support = 3;
-  constexpr double most_spacings_of_given_up = 1.5;
-  const auto is_given_up = [&](const Spring& spring) {
-    return spring.weight < least_weight || !spring.one_part;
+  constexpr double max_spacings_of_rejected = 1.5;
+  const auto is_rejected = [&](const Spring& spring) {
+    return spring.weight < min_weight || !spring.one_component;
   };
   std::vector<double> laid_out;
   std::vector<double> seen;
   for (const Spring& spring : springs) {
-    laid_out.push_back(is_given_up(spring) ? 0.0 : spring.length);
+    laid_out.push_back(is_rejected(spring) ? 0.0 : spring.length);
     seen.push_back(spring.motion ? length_of(*spring.motion) : 0.0);
   }
   const std::vector<double> spacings_laid_out = spacings_around(views.size(), springs, laid_out);
@@ -461,18 +461,18 @@ std::vector<Candidate> candidates_of(const std::vector<ViewId>& views,
   for (std::size_t i = 0; i < springs.size(); ++i) {
     const Spring& spring = springs[i];
     const auto [a, b] = spring.ends;
-    const bool given_up = is_given_up(spring);
-    const std::vector<double>& spacings = given_up ? spacings_seen : spacings_laid_out;
+    const bool rejected = is_rejected(spring);
+    const std::vector<double>& spacings = rejected ? spacings_seen : spacings_laid_out;
     const double spacing = 0.5 * (spacings[a] + spacings[b]);
-    const double length = given_up ? seen[i] : laid_out[i];
+    const double length = rejected ? seen[i] : laid_out[i];
     Candidate candidate{
         {views[a], views[b], 0.0, spring.motion}, spring.ends, unknown_length_share};
     if (std::isfinite(spacing) && (length > 0.0 || spring.motion)) {
       candidate.far = candidate.edge.length = length / spacing;
     }
     if (seen[i] > 0.0) scale_way(*candidate.edge.a_from_b, candidate.far / seen[i]);
-    candidate.joins_only = candidate.far > (given_up ? most_spacings_of_given_up : most_spacings) ||
-                           (given_up && spring.support < enough_support);
+    candidate.joins_only = candidate.far > (rejected ? max_spacings_of_rejected : max_spacings) ||
+                           (rejected && spring.support < enough_support);
     candidates.push_back(candidate);
   }
   return candidates;
@@ -483,7 +483,7 @@ std::vector<Candidate> candidates_of(const std::vector<ViewId>& views,
 void doubt_lonely_edges(std::size_t views, std::vector<Candidate>& candidates) {
   // On an open square grid with edges up to two spacings nearest neighbours have half of theirs
   // in common, views two spacings apart a quarter. One of these may be missing.
-  constexpr double least_common = 0.25;
+  constexpr double min_common = 0.25;
   std::vector<std::vector<std::size_t>> around(views);
   for (const Candidate& candidate : candidates) {
     if (candidate.joins_only) continue;
@@ -498,18 +498,18 @@ void doubt_lonely_edges(std::size_t views, std::vector<Candidate>& candidates) {
     const auto common = std::ranges::count_if(
         a, [&](std::size_t node) { return std::ranges::binary_search(b, node); });
     const auto others = static_cast<double>(std::max(a.size(), b.size()) - 1);
-    candidate.joins_only = static_cast<double>(common + 1) < least_common * others;
+    candidate.joins_only = static_cast<double>(common + 1) < min_common * others;
   }
 }
 
 // The edges of the springs that may be kept.
 std::vector<NavigationEdge> edges_of(const std::vector<ViewId>& views, std::vector<Spring> springs,
-                                     double least_weight) {
+                                     double min_weight) {
   count_support(views.size(), springs);
   std::erase_if(springs, [&](const Spring& spring) {
-    return (spring.weight < least_weight || !spring.one_part) && spring.support == 0;
+    return (spring.weight < min_weight || !spring.one_component) && spring.support == 0;
   });
-  std::vector<Candidate> candidates = candidates_of(views, springs, least_weight);
+  std::vector<Candidate> candidates = candidates_of(views, springs, min_weight);
   doubt_lonely_edges(views.size(), candidates);
   // Those in doubt last, and the nearest first: so they are left out where others lead there, too.
   std::ranges::stable_sort(candidates, {}, [](const Candidate& candidate) {
@@ -527,7 +527,7 @@ std::vector<NavigationEdge> edges_of(const std::vector<ViewId>& views, std::vect
 
 }  // namespace
 
-NavigationGraph graph_of_lattice(const Lattice& lattice, double least_weight) {
+NavigationGraph graph_of_lattice(const Lattice& lattice, double min_weight) {
   std::vector<ViewId> views;
   for (const LatticeNode& node : lattice.nodes) views.push_back(node.view);
   std::vector<Spring> springs;
@@ -539,14 +539,14 @@ NavigationGraph graph_of_lattice(const Lattice& lattice, double least_weight) {
                        spring.phases ? motion_of(*spring.phases) : std::nullopt,
                        distance(a.pose.position(), b.pose.position()),
                        spring.weight,
-                       a.part == b.part});
+                       a.component == b.component});
   }
-  std::vector<NavigationEdge> edges = edges_of(views, std::move(springs), least_weight);
+  std::vector<NavigationEdge> edges = edges_of(views, std::move(springs), min_weight);
   return {std::move(views), std::move(edges)};
 }
 
 NavigationGraph graph_of_stored_lattice(const TopologicalMap& arrangement, const ViewSource& source,
-                                        Executor& executor, double least_weight) {
+                                        Executor& executor, double min_weight) {
   validate(arrangement);
   std::vector<ViewId> views;
   for (const MapNode& node : arrangement.nodes) views.push_back(node.view);
@@ -561,11 +561,11 @@ NavigationGraph graph_of_stored_lattice(const TopologicalMap& arrangement, const
     const MapNode& b = arrangement.nodes[ends.b];
     links.push_back({edge.a, edge.b, edge.kind});
     springs.push_back({ends, std::nullopt, distance(a.pose.position(), b.pose.position()),
-                       edge.weight, a.part == b.part});
+                       edge.weight, a.component == b.component});
   }
   const std::vector<NavigationEdge> read = read_edges(source, links, executor);
   for (std::size_t i = 0; i < springs.size(); ++i) springs[i].motion = read[i].a_from_b;
-  std::vector<NavigationEdge> edges = edges_of(views, std::move(springs), least_weight);
+  std::vector<NavigationEdge> edges = edges_of(views, std::move(springs), min_weight);
   return {std::move(views), std::move(edges)};
 }
 

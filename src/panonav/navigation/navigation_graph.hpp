@@ -66,7 +66,7 @@ class NavigationGraph {
                                                     std::span<const std::size_t> from, int links);
 
 /// The two views of an edge must agree on its direction to this [mapping/lattice.hpp].
-inline constexpr double most_disagreement_rad = 0.78539816339744831;
+inline constexpr double max_disagreement_rad = 0.78539816339744831;
 
 /// An edge for each link, read from the phases of its two views by their home vectors [M04
 /// section 3.5]: no position is looked at. Lengths are in units of R, the typical distance of the
@@ -85,36 +85,36 @@ inline constexpr double most_disagreement_rad = 0.78539816339744831;
 [[nodiscard]] NavigationGraph graph_of_memory(const VisualMemory& memory, Executor& executor,
                                               std::span<const CoarseMotion> motion = {});
 
-/// An edge for each edge of a map within one part whose weight is at least `least_weight`: what
+/// An edge for each edge of a map within one component whose weight is at least `min_weight`: what
 /// lies below contradicts the rest of the map. Motions and lengths follow from the poses. Throws
 /// ContractError as `validate`.
-[[nodiscard]] NavigationGraph graph_of_map(const TopologicalMap& map, double least_weight = 0.1);
+[[nodiscard]] NavigationGraph graph_of_map(const TopologicalMap& map, double min_weight = 0.1);
 
-/// The same, and edges between nodes of one part that lie side by side in the map, up to one and
-/// a half of the median length of its edges, when their views look as alike as those of most edges
-/// and agree on a direction: a robot that comes by a place for the second time goes on as it went
-/// the first time. The memory must hold the map's views. Cost: a home vector and a half for each
-/// such pair.
+/// The same, and edges between nodes of one component that lie side by side in the map, up to one
+/// and a half of the median length of its edges, when their views look as alike as those of most
+/// edges and agree on a direction: a robot that comes by a place for the second time goes on as it
+/// went the first time. The memory must hold the map's views. Cost: a home vector and a half for
+/// each such pair.
 [[nodiscard]] NavigationGraph graph_of_map_and_neighbours(const TopologicalMap& map,
                                                           const VisualMemory& memory,
                                                           Executor& executor,
-                                                          double least_weight = 0.1);
+                                                          double min_weight = 0.1);
 
-/// An edge for each spring that kept `least_weight` of itself and is no longer than two spacings
+/// An edge for each spring that kept `min_weight` of itself and is no longer than two spacings
 /// of the references around, or that three third views confirm though the arrangement gave it up
 /// (one and a half spacings), if its ends have about a quarter of their neighbours in common:
 /// others lead to places that look alike. Of those that are left out thereby, the ones without
-/// which parts of the lattice would not be joined. Directions and turns follow from the phases of
-/// the two views, so that the distortion of the arrangement bends none of them. Lengths, in
+/// which components of the lattice would not be joined. Directions and turns follow from the phases
+/// of the two views, so that the distortion of the arrangement bends none of them. Lengths, in
 /// spacings of the references around, are those of the arrangement, and of the phases where it gave
 /// the spring up. Cost: the springs times those of a view.
-[[nodiscard]] NavigationGraph graph_of_lattice(const Lattice& lattice, double least_weight = 0.1);
+[[nodiscard]] NavigationGraph graph_of_lattice(const Lattice& lattice, double min_weight = 0.1);
 
 /// The same of a lattice that was stored as a map (`map_of`): the phases are read anew from the
 /// views, with the support that the edges of links need. Throws ContractError as `validate`, and
 /// on a view that the source has not. Cost: two home vectors an edge.
 [[nodiscard]] NavigationGraph graph_of_stored_lattice(const TopologicalMap& arrangement,
                                                       const ViewSource& source, Executor& executor,
-                                                      double least_weight = 0.1);
+                                                      double min_weight = 0.1);
 
 }  // namespace panonav

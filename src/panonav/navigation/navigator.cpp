@@ -16,16 +16,16 @@ namespace panonav {
 namespace {
 
 // A vector of less confidence is as likely as not but the error of reading it.
-constexpr double least_confidence = 0.5;
+constexpr double min_confidence = 0.5;
 // The next reference as the robot sees it now counts where it does not contradict the field.
-constexpr double most_correction_rad = std::numbers::pi / 3.0;
+constexpr double max_correction_rad = std::numbers::pi / 3.0;
 // A search step that is turned aside by more says nothing about the edge ahead.
-constexpr double most_aside_rad = 1.0;
+constexpr double max_aside_rad = 1.0;
 // An edge so much longer than usual is held to until its end. `step_m` is half a usual edge.
-constexpr double least_long = 2.0;
+constexpr double min_long = 2.0;
 constexpr double steps_of_edge = 2.0;
 // Fewer tell no home vector.
-constexpr int least_components = 3;
+constexpr int min_components = 3;
 
 MemoryScales learn_scales(const ViewSource& source, const AreaPlanner& planner,
                           const NavigatorOptions& options) {
@@ -37,8 +37,7 @@ MemoryScales learn_scales(const ViewSource& source, const AreaPlanner& planner,
   scales.full_scale = one.full_scale();
   scales.components = one.shape().components;
   const int coarse = options.coarse_components;
-  require(coarse == 0 || coarse >= least_components, "coarse_components", coarse,
-          "0, or 3 or more");
+  require(coarse == 0 || coarse >= min_components, "coarse_components", coarse, "0, or 3 or more");
   if (coarse < scales.components) scales.coarse_components = coarse;
   scales.place = learn_place_scale(source, graph);
   scales.coarse = scales.coarse_components == 0
@@ -104,7 +103,7 @@ void Navigator::Core::forget_plans(Step& step) {
 void Navigator::Core::plan_anew() {
   plan = {};
   if (views.area()) plan.field = planner.field(*views.area());
-  progress.least_way = std::numeric_limits<double>::infinity();
+  progress.min_way = std::numeric_limits<double>::infinity();
 }
 
 const Guide& Navigator::Core::guide() const {
@@ -116,10 +115,10 @@ const Guide& Navigator::Core::guide() const {
 // a reference beside it has sent it back.
 void Navigator::Core::begin_long_way() {
   const double length = relative_length(guide());
-  const bool came_back = progress.steps_in_vain >= options.agreeing_looks &&
-                         !progress.was_obstructed() && guide().way <= progress.least_way &&
+  const bool came_back = progress.steps_in_vain >= options.min_agreeing_steps &&
+                         !progress.was_obstructed() && guide().way <= progress.min_way &&
                          length > 0.0;
-  if (plan.under_way || (length < least_long && !came_back)) return;
+  if (plan.under_way || (length < min_long && !came_back)) return;
   const double steps = steps_of_edge * std::max(1.0, length);
   plan.under_way = {*place.node, guide(), static_cast<int>(std::ceil(steps))};
 }
@@ -128,7 +127,7 @@ void Navigator::Core::go_home(Step& step) {
   const ArrivalScale& arrival = goal->arrival;
   if (!homing) {
     HomingPursuitOptions pursuit = options.homing;
-    pursuit.longest_step_m = std::min(pursuit.longest_step_m, options.step_m);
+    pursuit.max_step_m = std::min(pursuit.max_step_m, options.step_m);
     pursuit.arrived_difference = arrival.difference;
     // Well inside: the vector has an error of its own.
     pursuit.stop_length = 0.25 * arrival.length;
@@ -142,7 +141,7 @@ void Navigator::Core::go_home(Step& step) {
   decision.next = graph().view(goal->node);
   decision.direction_rad = pursued.turn_rad;
   decision.advance_m = pursued.advance_m;
-  const bool obstructed = obstruction.level >= 2 * options.agreeing_looks;
+  const bool obstructed = obstruction.level >= 2 * options.min_agreeing_steps;
   if (pursued.state == PursuitState::moving && !obstructed) return;
   // Homing may stop for other reasons than a short vector; the place decides. Noise and new things
   // in view make a difference, too: a robot that sees no way left is there when the place may be
@@ -169,7 +168,7 @@ std::optional<double> Navigator::Core::way_back_rad(const SeenView& view) {
   }
   const HomeVector back =
       home_vector(views.view(graph().view(*place.known_node), view.components), view.view);
-  if (back.confidence <= least_confidence) return std::nullopt;
+  if (back.confidence <= min_confidence) return std::nullopt;
   return back.direction_rad();
 }
 
@@ -181,7 +180,8 @@ bool Navigator::Core::go_back(Step& step) {
   const auto direction_rad = way_back_rad(step.view);
   if (!direction_rad) return false;
   const SubAreas& areas = planner.areas();
-  if (place.doubt.unknown_steps == options.agreeing_looks && areas.area_of[node] == views.area()) {
+  if (place.doubt.unknown_steps == options.min_agreeing_steps &&
+      areas.area_of[node] == views.area()) {
     // Something hides the place that should come next, as what stands in the way does.
     const Guide& ahead = plan.field.at(areas.place_of[node]);
     if (ahead.reachable() && ahead.next != node) {
@@ -224,12 +224,12 @@ std::optional<double> Navigator::Core::direction_of(std::size_t from, const Guid
   const ViewId next = graph().view(ahead.next);
   if (!views.holds(next)) return direction;
   const HomeVector seen = home_vector(views.view(next, step.view.components), step.view.view);
-  if (seen.confidence <= least_confidence) return direction;
+  if (seen.confidence <= min_confidence) return direction;
   const double seen_rad = seen.direction_rad();
   const std::optional<double> known =
       direction || obstruction.now ? direction : step.heading_for_rad;
   const double off = known ? angle_difference(seen_rad, *known) : 0.0;
-  return std::abs(off) < most_correction_rad ? seen_rad - 0.5 * off : direction;
+  return std::abs(off) < max_correction_rad ? seen_rad - 0.5 * off : direction;
 }
 
 void Navigator::Core::follow(Step& step) {
@@ -251,7 +251,7 @@ void Navigator::Core::follow(Step& step) {
   step.decision.advance_m = options.step_m;
   last.direction_rad = step.decision.direction_rad;
   ++progress.tries.try_emplace(ahead.edge, EdgeTries{from, 0, 0}).first->second.steps;
-  if (obstruction.level >= 2 || std::abs(detour) < most_aside_rad) last.aimed_for = ahead.edge;
+  if (obstruction.level >= 2 || std::abs(detour) < max_aside_rad) last.aimed_for = ahead.edge;
 }
 
 // A leg along a route, where views leave no doubt of the place and nothing was in the way so far:
@@ -263,7 +263,7 @@ void Navigator::Core::begin_leg(Step& step) {
   }
   std::vector<ViewId> way;
   for (const std::size_t node : planner.planned_way(*place.node)) way.push_back(graph().view(node));
-  if (!pilot.begin(way, step.report.line, options.shortest_leg_m)) return;
+  if (!pilot.begin(way, step.report.line, options.min_leg_m)) return;
   plan.under_way.reset();
   step.note(NavigationEvent::route);
 }
@@ -272,8 +272,8 @@ void Navigator::Core::begin_leg(Step& step) {
 bool Navigator::Core::go_along_route(Step& step) {
   if (!pilot.drives()) {
     begin_leg(step);
-  } else if (pilot.unknown_looks() >= options.agreeing_looks ||
-             obstruction.level >= 2 * options.agreeing_looks ||
+  } else if (pilot.unknown_steps() >= options.min_agreeing_steps ||
+             obstruction.level >= 2 * options.min_agreeing_steps ||
              progress.steps_in_vain > patience()) {
     pilot.give_up();
     step.note(NavigationEvent::route_left);
@@ -309,7 +309,7 @@ void Navigator::Core::decide(Step& step) {
   // At an unknown place the robot waits for observations to agree; then it goes by the best guess.
   const int unknown_steps = place.doubt.unknown_steps;
   const bool waits =
-      unknown_steps > 0 && unknown_steps < options.agreeing_looks && !obstruction.now;
+      unknown_steps > 0 && unknown_steps < options.min_agreeing_steps && !obstruction.now;
   if (state == NavigationState::moving && !waits) {
     if (is_at_goal()) {
       pilot.stop();
@@ -319,7 +319,7 @@ void Navigator::Core::decide(Step& step) {
       if (!go_along_route(step)) follow(step);
     }
   }
-  if (state == NavigationState::moving && progress.steps >= options.most_looks) {
+  if (state == NavigationState::moving && progress.steps >= options.max_steps) {
     state = NavigationState::blocked;
   }
   last.view = step.view.view;

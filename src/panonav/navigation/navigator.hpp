@@ -31,16 +31,16 @@ struct NavigatorOptions {
   /// The last stretch. Its difference and length of arrival come from the references around the
   /// goal, its longest step is `step_m` at most.
   HomingPursuitOptions homing;
-  int agreeing_looks =
+  int min_agreeing_steps =
       3;  ///< observations that must agree before another place or a block is believed
   int lost_patience = 12;  ///< observations without a known place after which the robot is lost
   /// Observations without coming nearer to the goal, more along a longer edge than usual; from half
   /// of them on the robot searches around. Then the edge that was tried most counts as blocked.
-  int passage_patience = 8;
+  int edge_patience = 8;
   /// Of the way along a recorded route that is worth a leg: three steps.
-  double shortest_leg_m = 0.75;
-  int attempts = 3;       ///< times that closed edges, or the last stretch, are tried
-  int most_looks = 5000;  ///< after which a run ends as blocked
+  double min_leg_m = 0.75;
+  int attempts = 3;      ///< times that closed edges, or the last stretch, are tried
+  int max_steps = 5000;  ///< after which a run ends as blocked
 };
 void visit_options(NavigatorOptions& options, OptionVisitor& visitor);
 
@@ -79,8 +79,8 @@ struct RobotReport {
   /// navigator looks around it, so it need not be exact. For places that look alike, where a single
   /// view misleads. Leave it empty where the estimate is not certain: the views decide then.
   std::optional<ViewId> estimate;
-  /// The horizon line of this observation (route/horizon_line.hpp), for legs along routes; empty:
-  /// none.
+  /// The horizon scanline of this observation (route/horizon_scanline.hpp), for legs along routes;
+  /// empty: none.
   std::span<const float> line;
   /// How the robot moved since its last observation as its odometry has it, in the frame that it
   /// had then; for legs along routes.
@@ -94,7 +94,7 @@ struct NavigationDecision {
   double direction_rad = 0.0;     ///< in which to go, in the current robot frame
   double advance_m = 0.0;         ///< how far; 0 unless moving
   bool homing = false;            ///< the last stretch, by the home vector to the goal itself
-  bool on_route = false;          ///< a leg along a recorded route, by the horizon line
+  bool on_route = false;          ///< a leg along a recorded route, by the horizon scanline
   std::optional<ViewId> nearest;  ///< the place
   std::optional<ViewId> next;     ///< the reference ahead; of a leg that at its end
   std::size_t area = 0;           ///< that is loaded
@@ -111,8 +111,8 @@ struct NavigationDecision {
 /// Goes to a place over the memory by views alone [M04 section 3.5]: observe, find the
 /// nearest reference, take its direction, move, observe again; the last stretch by homing. As every
 /// observation decides anew, neither a distorted map nor a step that leads elsewhere matters. Where
-/// the way goes along a recorded route and the robot tells its horizon lines, it repeats the route
-/// instead [Y03]; views still tell its place, and that it was carried away.
+/// the way goes along a recorded route and the robot tells its horizon scanlines, it repeats the
+/// route instead [Y03]; views still tell its place, and that it was kidnapped.
 ///
 /// Holds the state of a run, and of the memory the views of one area, two at a border. Knows
 /// nothing of how the robot moves: `command_towards` (motion/velocity.hpp) does. Same calls, same

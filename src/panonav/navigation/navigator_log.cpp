@@ -46,22 +46,25 @@ std::string describe(const NavigationDecision& decision) {
 void visit_options(NavigatorOptions& options, OptionVisitor& visitor) {
   using T = NavigatorOptions;
   constexpr OptionTable table{
-      option<&T::step_m>("longest way between two looks", above(0), 100),
+      option<&T::step_m>("longest way between two steps", above(0), 100),
       option<&T::near_links>("the next place is looked for within so many edges of the last one", 1,
                              10),
       option<&T::coarse_components>("components compared in the open, 0 for all", 0, 1000),
-      option<&T::views_ahead>("views of the next area that a look loads", 0, 1e6),
+      option<&T::views_ahead>("views of the next area that a step loads", 0, 1e6),
       options_of<&T::homing>(),
-      option<&T::agreeing_looks>(
-          "looks that must agree before another place or a block is believed", 1, 1000),
-      option<&T::lost_patience>("looks without a known place after which the robot is lost", 1,
+      option<&T::min_agreeing_steps>(
+          "steps that must agree before another place or a block is believed", 1, 1000)
+          .formerly("agreeing_looks"),
+      option<&T::lost_patience>("steps without a known place after which the robot is lost", 1,
                                 1e6),
-      option<&T::passage_patience>(
-          "looks without coming nearer after which an edge counts as blocked", 1, 1e6),
-      option<&T::shortest_leg_m>("shortest way along a recorded route that is worth a leg",
-                                 above(0), 1000),
+      option<&T::edge_patience>("steps without coming nearer after which an edge counts as blocked",
+                                1, 1e6)
+          .formerly("passage_patience"),
+      option<&T::min_leg_m>("shortest way along a recorded route that is worth a leg", above(0),
+                            1000)
+          .formerly("shortest_leg_m"),
       option<&T::attempts>("times that closed edges, or the last stretch, are tried", 1, 1000),
-      option<&T::most_looks>("looks after which a run ends", 1, 1e9),
+      option<&T::max_steps>("steps after which a run ends", 1, 1e9).formerly("most_looks"),
   };
   table.visit(options, visitor);
 }

@@ -18,7 +18,7 @@ bool RoutePilot::begin(std::span<const ViewId> way, std::span<const float> line,
   std::optional<RouteStretch> planned;
   std::size_t chosen = 0;
   for (std::size_t i = 0; i < routes_.size(); ++i) {
-    if (given_up_.contains(i)) continue;
+    if (rejected_.contains(i)) continue;
     const auto found = stretch_along(routes_[i], routes_[i].along_m(way.front()), way);
     if (!found || found->length_m() < shortest_m) continue;
     if (planned && found->last <= planned->last) continue;
@@ -65,7 +65,7 @@ void RoutePilot::track(std::span<const float> line, const Pose2& moved) {
   // A place of the route that is not on the leg is of no use.
   known &=
       distance(tracker.pose()->position(), leg_->follower.place()) <= routes_[leg_->route].beside_m;
-  leg_->unknown_looks = known ? 0 : leg_->unknown_looks + 1;
+  leg_->unknown_steps = known ? 0 : leg_->unknown_steps + 1;
 }
 
 ViewId RoutePilot::place() const {
@@ -73,11 +73,11 @@ ViewId RoutePilot::place() const {
   const double driven_m = leg_->follower.along_m();
   const double along_m = stretch.from_m + (stretch.to_m < stretch.from_m ? -driven_m : driven_m);
   const auto off_m = [&](const KnownRoute::Reference& reference) {
-    double least_m = std::numeric_limits<double>::infinity();
+    double min_m = std::numeric_limits<double>::infinity();
     for (const double there_m : reference.along_m) {
-      least_m = std::min(least_m, std::abs(there_m - along_m));
+      min_m = std::min(min_m, std::abs(there_m - along_m));
     }
-    return least_m;
+    return min_m;
   };
   return std::ranges::min_element(routes_[leg_->route].references, {}, off_m)->view;
 }
@@ -89,7 +89,7 @@ void RoutePilot::take_aim() {
 }
 
 void RoutePilot::give_up() {
-  if (leg_) given_up_.insert(leg_->route);
+  if (leg_) rejected_.insert(leg_->route);
   stop();
 }
 

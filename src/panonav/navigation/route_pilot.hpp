@@ -26,7 +26,7 @@ class RoutePilot {
 
   /// Begins a leg of at least `shortest_m` along the route that leads farthest along the path,
   /// which starts with the robot's place. `line` must show that the robot is on the route, no
-  /// farther from that place than `shortest_m`. Routes that were given up are not used. Returns
+  /// farther from that place than `shortest_m`. Routes that were rejected are not used. Returns
   /// whether a leg began. Throws ContractError on a line of another length than the route's. Cost:
   /// that of `stretch_along` for each route, and of a search where one leads far enough.
   bool begin(std::span<const ViewId> way, std::span<const float> line, double shortest_m);
@@ -44,13 +44,13 @@ class RoutePilot {
   /// The reference beside the robot according to line and motion.
   [[nodiscard]] ViewId place() const;
   /// Number of consecutive observations that gave no place on the leg.
-  [[nodiscard]] int unknown_looks() const { return leg_->unknown_looks; }
+  [[nodiscard]] int unknown_steps() const { return leg_->unknown_steps; }
 
   /// Ends the leg, if there is one.
   void stop() noexcept { leg_.reset(); }
   /// Ends the leg; its route is not used again until `forgive`.
   void give_up();
-  void forgive() noexcept { given_up_.clear(); }
+  void forgive() noexcept { rejected_.clear(); }
 
  private:
   struct Leg {
@@ -60,12 +60,12 @@ class RoutePilot {
     PathFollower follower;
     ViewId end;
     std::optional<Point2> aim;
-    int unknown_looks = 0;
+    int unknown_steps = 0;
   };
   void take_aim();
 
   std::span<const KnownRoute> routes_;
-  std::set<std::size_t> given_up_;
+  std::set<std::size_t> rejected_;
   std::optional<Leg> leg_;
 };
 

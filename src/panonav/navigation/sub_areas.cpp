@@ -23,10 +23,10 @@ void visit_options(SubAreaOptions& options, OptionVisitor& visitor) {
 namespace {
 
 constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
-constexpr double least_side = 1.0 / 3.0;
+constexpr double min_side = 1.0 / 3.0;
 
 /// Some nodes of a graph with the edges among them, numbered anew.
-struct Part {
+struct Component {
   std::vector<std::size_t> nodes;  // ascending
   std::vector<std::size_t> begins, neighbours;
 
@@ -36,30 +36,30 @@ struct Part {
   }
 };
 
-Part part_of(const NavigationGraph& graph, std::vector<std::size_t> nodes,
-             std::vector<std::size_t>& number) {
-  Part part;
-  part.nodes = std::move(nodes);
-  for (std::size_t i = 0; i < part.size(); ++i) number[part.nodes[i]] = i;
-  part.begins.push_back(0);
-  for (const std::size_t node : part.nodes) {
+Component component_of(const NavigationGraph& graph, std::vector<std::size_t> nodes,
+                       std::vector<std::size_t>& number) {
+  Component component;
+  component.nodes = std::move(nodes);
+  for (std::size_t i = 0; i < component.size(); ++i) number[component.nodes[i]] = i;
+  component.begins.push_back(0);
+  for (const std::size_t node : component.nodes) {
     for (const NavigationGraph::Exit& exit : graph.exits(node)) {
-      if (number[exit.node] != none) part.neighbours.push_back(number[exit.node]);
+      if (number[exit.node] != none) component.neighbours.push_back(number[exit.node]);
     }
-    part.begins.push_back(part.neighbours.size());
+    component.begins.push_back(component.neighbours.size());
   }
-  for (const std::size_t node : part.nodes) number[node] = none;
-  return part;
+  for (const std::size_t node : component.nodes) number[node] = none;
+  return component;
 }
 
 // Edges from `from` to every node; `none` where there is no way over nodes with side `side`.
-std::vector<std::size_t> steps_from(const Part& part, std::size_t from,
+std::vector<std::size_t> steps_from(const Component& component, std::size_t from,
                                     std::span<const std::uint8_t> sides, std::uint8_t side) {
-  std::vector<std::size_t> steps(part.size(), none);
+  std::vector<std::size_t> steps(component.size(), none);
   std::vector<std::size_t> queue{from};
   steps[from] = 0;
   for (std::size_t head = 0; head < queue.size(); ++head) {
-    for (const std::size_t next : part.of(queue[head])) {
+    for (const std::size_t next : component.of(queue[head])) {
       if (steps[next] != none || sides[next] != side) continue;
       steps[next] = steps[queue[head]] + 1;
       queue.push_back(next);
@@ -76,19 +76,20 @@ std::size_t farthest(std::span<const std::size_t> steps) {
   return best;
 }
 
-// Approximates the second eigenvector of the random walk on a connected part. The walk is lazy, so
-// that its eigenvalues are not negative; the constant, its first eigenvector, is taken out.
-std::vector<double> second_eigenvector(const Part& part, int iterations) {
-  const std::vector<std::uint8_t> everywhere(part.size(), 0);
-  const auto outermost = farthest(steps_from(part, 0, everywhere, 0));
-  const auto steps = steps_from(part, outermost, everywhere, 0);
+// Approximates the second eigenvector of the random walk on a connected component. The walk is
+// lazy, so that its eigenvalues are not negative; the constant, its first eigenvector, is taken
+// out.
+std::vector<double> second_eigenvector(const Component& component, int iterations) {
+  const std::vector<std::uint8_t> everywhere(component.size(), 0);
+  const auto outermost = farthest(steps_from(component, 0, everywhere, 0));
+  const auto steps = steps_from(component, outermost, everywhere, 0);
   std::vector<double> values(steps.begin(), steps.end());
   std::vector<double> relaxed(values.size());
   for (int i = 0; i <= iterations; ++i) {
     double sum = 0.0;
     double weight = 0.0;
-    for (std::size_t n = 0; n < part.size(); ++n) {
-      const auto degree = static_cast<double>(part.of(n).size());
+    for (std::size_t n = 0; n < component.size(); ++n) {
+      const auto degree = static_cast<double>(component.of(n).size());
       sum += degree * values[n];
       weight += degree;
     }
@@ -98,10 +99,11 @@ std::vector<double> second_eigenvector(const Part& part, int iterations) {
       largest = std::max(largest, std::abs(value));
     }
     if (i == iterations || largest == 0.0) break;
-    for (std::size_t n = 0; n < part.size(); ++n) {
+    for (std::size_t n = 0; n < component.size(); ++n) {
       double around = 0.0;
-      for (const std::size_t next : part.of(n)) around += values[next];
-      relaxed[n] = 0.5 * (values[n] + around / static_cast<double>(part.of(n).size())) / largest;
+      for (const std::size_t next : component.of(n)) around += values[next];
+      relaxed[n] =
+          0.5 * (values[n] + around / static_cast<double>(component.of(n).size())) / largest;
     }
     values.swap(relaxed);
   }
@@ -109,24 +111,24 @@ std::vector<double> second_eigenvector(const Part& part, int iterations) {
 }
 
 // 1 for the nodes up to the cut of least normalised cut along the order of `values`.
-std::vector<std::uint8_t> best_cut(const Part& part, std::span<const double> values) {
-  std::vector<std::size_t> order(part.size());
+std::vector<std::uint8_t> best_cut(const Component& component, std::span<const double> values) {
+  std::vector<std::size_t> order(component.size());
   std::iota(order.begin(), order.end(), 0U);
   std::ranges::stable_sort(order, {}, [&](std::size_t n) { return values[n]; });
-  std::vector<std::uint8_t> sides(part.size(), 0);
-  const auto total = static_cast<double>(part.neighbours.size());
+  std::vector<std::uint8_t> sides(component.size(), 0);
+  const auto total = static_cast<double>(component.neighbours.size());
   const auto low =
-      static_cast<std::size_t>(std::ceil(least_side * static_cast<double>(part.size())));
+      static_cast<std::size_t>(std::ceil(min_side * static_cast<double>(component.size())));
   double cut = 0.0;
   double volume = 0.0;
   double best = std::numeric_limits<double>::infinity();
-  std::size_t best_count = part.size() / 2;
-  for (std::size_t count = 1; count < part.size(); ++count) {
+  std::size_t best_count = component.size() / 2;
+  for (std::size_t count = 1; count < component.size(); ++count) {
     const std::size_t node = order[count - 1];
     sides[node] = 1;
-    volume += static_cast<double>(part.of(node).size());
-    for (const std::size_t next : part.of(node)) cut += sides[next] != 0 ? -1.0 : 1.0;
-    if (count < low || part.size() - count < low) continue;
+    volume += static_cast<double>(component.of(node).size());
+    for (const std::size_t next : component.of(node)) cut += sides[next] != 0 ? -1.0 : 1.0;
+    if (count < low || component.size() - count < low) continue;
     const double normalised = cut / volume + cut / (total - volume);
     if (normalised < best) {
       best = normalised;
@@ -139,14 +141,15 @@ std::vector<std::uint8_t> best_cut(const Part& part, std::span<const double> val
 }
 
 // All nodes of a side but those of its largest piece change over.
-void give_away_fragments(const Part& part, std::uint8_t side, std::vector<std::uint8_t>& sides) {
-  std::vector<std::size_t> piece(part.size(), none);
+void give_away_fragments(const Component& component, std::uint8_t side,
+                         std::vector<std::uint8_t>& sides) {
+  std::vector<std::size_t> piece(component.size(), none);
   std::vector<std::size_t> sizes;
-  for (std::size_t n = 0; n < part.size(); ++n) {
+  for (std::size_t n = 0; n < component.size(); ++n) {
     if (sides[n] != side || piece[n] != none) continue;
-    const auto steps = steps_from(part, n, sides, side);
+    const auto steps = steps_from(component, n, sides, side);
     sizes.push_back(0);
-    for (std::size_t m = 0; m < part.size(); ++m) {
+    for (std::size_t m = 0; m < component.size(); ++m) {
       if (steps[m] == none) continue;
       piece[m] = sizes.size() - 1;
       ++sizes.back();
@@ -154,7 +157,7 @@ void give_away_fragments(const Part& part, std::uint8_t side, std::vector<std::u
   }
   if (sizes.size() < 2) return;
   const auto largest = static_cast<std::size_t>(std::ranges::max_element(sizes) - sizes.begin());
-  for (std::size_t n = 0; n < part.size(); ++n) {
+  for (std::size_t n = 0; n < component.size(); ++n) {
     if (piece[n] == none || piece[n] == largest) continue;
     sides[n] = static_cast<std::uint8_t>(1 - side);
   }
@@ -164,17 +167,17 @@ void give_away_fragments(const Part& part, std::uint8_t side, std::vector<std::u
 std::vector<std::vector<std::size_t>> pieces(const NavigationGraph& graph,
                                              const std::vector<std::size_t>& nodes,
                                              std::vector<std::size_t>& number) {
-  const Part part = part_of(graph, nodes, number);
-  std::vector<std::uint8_t> taken(part.size(), 0);
+  const Component component = component_of(graph, nodes, number);
+  std::vector<std::uint8_t> taken(component.size(), 0);
   std::vector<std::vector<std::size_t>> result;
-  for (std::size_t n = 0; n < part.size(); ++n) {
+  for (std::size_t n = 0; n < component.size(); ++n) {
     if (taken[n] != 0) continue;
-    const auto steps = steps_from(part, n, taken, 0);
+    const auto steps = steps_from(component, n, taken, 0);
     result.emplace_back();
-    for (std::size_t m = 0; m < part.size(); ++m) {
+    for (std::size_t m = 0; m < component.size(); ++m) {
       if (steps[m] == none) continue;
       taken[m] = 1;
-      result.back().push_back(part.nodes[m]);
+      result.back().push_back(component.nodes[m]);
     }
   }
   return result;
@@ -209,12 +212,13 @@ SubAreas divide(const NavigationGraph& graph, const SubAreaOptions& options) {
       areas.nodes.push_back(std::move(nodes));
       continue;
     }
-    const Part part = part_of(graph, std::move(nodes), number);
-    std::vector<std::uint8_t> sides = best_cut(part, second_eigenvector(part, options.iterations));
-    give_away_fragments(part, 1, sides);
-    give_away_fragments(part, 0, sides);
+    const Component component = component_of(graph, std::move(nodes), number);
+    std::vector<std::uint8_t> sides =
+        best_cut(component, second_eigenvector(component, options.iterations));
+    give_away_fragments(component, 1, sides);
+    give_away_fragments(component, 0, sides);
     std::vector<std::size_t> half[2];
-    for (std::size_t n = 0; n < part.size(); ++n) half[sides[n]].push_back(part.nodes[n]);
+    for (std::size_t n = 0; n < component.size(); ++n) half[sides[n]].push_back(component.nodes[n]);
     for (const auto& side : half) {
       for (auto& piece : pieces(graph, side, number)) open.push_back(std::move(piece));
     }

@@ -29,13 +29,13 @@ struct SubAreas {
 [[nodiscard]] SubAreas undivided(const NavigationGraph& graph);
 
 /// Divides the views along the bottlenecks of the graph, as doors are, into connected areas of
-/// similar size: the outlook of [M04 section 3.5]. Parts are halved again and again. The views of a
-/// part are put in order by the second eigenvector of its normalised Laplacian (Shi and Malik
-/// 2000), relaxed from the distances to its outermost view, and cut where the normalised cut is
-/// least, the smaller side having at least a third. What a cut leaves apart goes to the other side.
-/// Parts that nothing connects are areas of their own, however small. Deterministic. Throws
-/// OptionError. Cost: O(iterations edges log(areas)); 10,000 views with 12 links each take about
-/// half a second.
+/// similar size: the outlook of [M04 section 3.5]. Components are halved again and again. The views
+/// of a component are put in order by the second eigenvector of its normalised Laplacian (Shi and
+/// Malik 2000), relaxed from the distances to its outermost view, and cut where the normalised cut
+/// is least, the smaller side having at least a third. What a cut leaves apart goes to the other
+/// side. Components that nothing connects are areas of their own, however small. Deterministic.
+/// Throws OptionError. Cost: O(iterations edges log(areas)); 10,000 views with 12 links each take
+/// about half a second.
 [[nodiscard]] SubAreas divide(const NavigationGraph& graph, const SubAreaOptions& options = {});
 
 /// 1 for each node at most `links` edges away from a narrow gate, as doors are; 0 for the

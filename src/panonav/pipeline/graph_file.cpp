@@ -68,14 +68,14 @@ void write_graph(const std::filesystem::path& path, const TopologicalMap& map,
   }
   text +=
       "<key id=\"name\" for=\"node\" attr.name=\"name\" attr.type=\"string\"/>\n"
-      "<key id=\"part\" for=\"node\" attr.name=\"part\" attr.type=\"long\"/>\n"
+      "<key id=\"component\" for=\"node\" attr.name=\"component\" attr.type=\"long\"/>\n"
       "<key id=\"kind\" for=\"edge\" attr.name=\"kind\" attr.type=\"string\"/>\n"
       "<key id=\"weight\" for=\"edge\" attr.name=\"weight\" attr.type=\"double\"/>\n"
       "<graph edgedefault=\"directed\">\n";
   for (const MapNode& node : map.nodes) {
     text += "<node id=\"" + std::to_string(node.view.value) + "\">" +
             data("name", escaped(name(node.view))) + pose_data(node.pose) +
-            data("part", std::to_string(node.part)) + "</node>\n";
+            data("component", std::to_string(node.component)) + "</node>\n";
   }
   for (const MapEdge& edge : map.edges) {
     text += "<edge source=\"" + std::to_string(edge.a.value) + "\" target=\"" +

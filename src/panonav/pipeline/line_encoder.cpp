@@ -87,7 +87,7 @@ std::vector<float> LineEncoder::line(const Observation& observation) const {
 }
 
 std::vector<float> LineEncoder::line_of(const Panorama& panorama) const {
-  if (!route_.horizon_rows) return horizon_line(panorama, route_.line);
+  if (!route_.horizon_rows) return horizon_scanline(panorama, route_.line);
   const auto [first, last] = *route_.horizon_rows;
   if (last >= panorama.rows()) {
     throw ContractError("last of --horizon-rows", last,
@@ -97,9 +97,9 @@ std::vector<float> LineEncoder::line_of(const Panorama& panorama) const {
   const auto values =
       panorama.values().subspan(static_cast<std::size_t>(first) * columns,
                                 static_cast<std::size_t>(last - first + 1) * columns);
-  return horizon_line({last - first + 1, panorama.columns(), std::nullopt,
-                       std::vector<float>(values.begin(), values.end())},
-                      route_.line);
+  return horizon_scanline({last - first + 1, panorama.columns(), std::nullopt,
+                           std::vector<float>(values.begin(), values.end())},
+                          route_.line);
 }
 
 std::string route_named(const MemoryFile& memory, const std::optional<std::string>& name) {

@@ -7,7 +7,7 @@
 
 #include "panonav/io/panorama_reader.hpp"
 #include "panonav/pipeline/observation.hpp"
-#include "panonav/route/horizon_line.hpp"
+#include "panonav/route/horizon_scanline.hpp"
 #include "panonav/storage/memory_file.hpp"
 
 namespace panonav {
@@ -15,7 +15,7 @@ namespace panonav {
 /// What a route says of its lines beyond their bytes: how pictures became lines, and where the
 /// poses came from. Kept in the memory beside it.
 struct RouteSource {
-  HorizonLineOptions line;
+  HorizonScanlineOptions line;
   /// First and last row that show the horizon, counted from 0 at the top; for panoramas whose
   /// elevations are not known.
   std::optional<std::pair<int, int>> horizon_rows;
@@ -29,7 +29,7 @@ struct RouteSource {
                                        int columns);
 void remember_route_source(MemoryFile& memory, const std::string& name, const RouteSource& source);
 
-/// From observations to horizon lines, as a route has them. Several threads may use one.
+/// From observations to horizon scanlines, as a route has them. Several threads may use one.
 class LineEncoder {
  public:
   /// Throws ContractError on horizon rows for pictures whose elevations are known.

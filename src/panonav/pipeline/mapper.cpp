@@ -19,12 +19,12 @@ double seconds_since(Clock::time_point start) {
 
 }  // namespace
 
-std::size_t largest_part(const TopologicalMap& map) {
+std::size_t largest_component(const TopologicalMap& map) {
   std::map<std::size_t, std::size_t> sizes;
-  for (const MapNode& node : map.nodes) ++sizes[node.part];
+  for (const MapNode& node : map.nodes) ++sizes[node.component];
   std::size_t largest = 0;
-  for (const auto& [part, size] : sizes) {
-    if (size > sizes[largest]) largest = part;
+  for (const auto& [component, size] : sizes) {
+    if (size > sizes[largest]) largest = component;
   }
   return largest;
 }
@@ -94,9 +94,9 @@ MappedRun Mapper::finish() {
   file_.link(links);
   file_.save_map(map_name, run_.map);
   if (!any_pose_) {
-    const std::size_t part = largest_part(run_.map);
+    const std::size_t component = largest_component(run_.map);
     for (const MapNode& node : run_.map.nodes) {
-      if (node.part != part) continue;
+      if (node.component != component) continue;
       file_.set_pose(node.view, ReferencePose{node.pose.x_m, node.pose.y_m, node.pose.heading_rad});
     }
   }

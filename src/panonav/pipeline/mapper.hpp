@@ -60,7 +60,7 @@ class Mapper {
   Mapper(const Mapper&) = delete;
   Mapper& operator=(const Mapper&) = delete;
 
-  /// The part of `add` that several threads may do beside each other for observations to come.
+  /// The component of `add` that several threads may do beside each other for observations to come.
   /// Throws as `ViewEncoder::panorama`.
   [[nodiscard]] EncodedView encode(const Observation& observation) const;
   /// The next observation; whether it became a node. Throws as `encode`, FileError.
@@ -68,8 +68,8 @@ class Mapper {
   bool add(const Observation& observation) { return add(encode(observation)); }
 
   /// Optimises what is not yet, and stores the map and a link for each of its edges. Where no
-  /// observation had a pose, the views of the largest part get those of the map. More observations
-  /// may follow. Throws FileError.
+  /// observation had a pose, the views of the largest component get those of the map. More
+  /// observations may follow. Throws FileError.
   MappedRun finish();
 
   [[nodiscard]] const MemoryFile& memory() const noexcept { return file_; }
@@ -88,7 +88,7 @@ class Mapper {
   bool any_pose_ = false;
 };
 
-/// The part with the most nodes, of equal ones the first.
-[[nodiscard]] std::size_t largest_part(const TopologicalMap& map);
+/// The component with the most nodes, of equal ones the first.
+[[nodiscard]] std::size_t largest_component(const TopologicalMap& map);
 
 }  // namespace panonav

@@ -14,7 +14,7 @@
 
 namespace panonav {
 
-/// How far the camera's axis leans against the vertical: first about the robot's x axis, then about
+/// Tilt of the camera's axis against the vertical: first about the robot's x axis, then about
 /// its y axis, right-handed [REP 103].
 struct Tilt {
   double roll_rad = 0.0;

@@ -54,8 +54,8 @@ NavigationGraph graph_of(const MemoryFileViews& source, const std::optional<Grap
     origin = *wanted;
     auto graph = graph_from(origin, source, executor);
     if (graph) return std::move(*graph);
-    throw FileError(path, "has no " + std::string(name_of(origin)) +
-                              "; leave out --passages for what there is");
+    throw FileError(
+        path, "has no " + std::string(name_of(origin)) + "; leave out --edges for what there is");
   }
   for (std::size_t i = 0;; ++i) {
     origin = static_cast<GraphOrigin>(i);
@@ -140,7 +140,7 @@ void RobotNavigator::set_goal(const std::string& goal) {
   const auto node = graph().node_of(view);
   if (!node || graph().exits(*node).empty()) {
     throw FileError(views_.file().path().string(),
-                    "no passage leads to the view " + info(view).name +
+                    "no edge leads to the view " + info(view).name +
                         "; take another goal, or arrange the memory anew");
   }
   goal_ = view;
@@ -152,7 +152,7 @@ ReferenceInfo RobotNavigator::info(ViewId view) const {
   return views_.load({&view, 1}).info(view);
 }
 
-NavigationDecision RobotNavigator::look(const Observation& observation, RobotReport report) {
+NavigationDecision RobotNavigator::observe(const Observation& observation, RobotReport report) {
   std::vector<float> line;
   if (line_encoder_ && report.line.empty()) {
     line = line_encoder_->line(observation);
@@ -175,7 +175,7 @@ NavigationStep RobotNavigator::step(const Observation& observation, RobotReport 
   last_.decided =
       report.obstacle || time_left_s_ <= 0.0 || std::hypot(target_.x_m, target_.y_m) <= near_m;
   if (last_.decided) {
-    last_.decision = look(observation, report);
+    last_.decision = observe(observation, report);
     moved_ = {};
     const double way_m = last_.decision.advance_m;
     const double direction_rad = last_.decision.direction_rad;

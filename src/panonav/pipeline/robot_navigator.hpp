@@ -68,7 +68,7 @@ class RobotNavigator {
   /// To be called once in each period of the base. The robot decides anew when the step decided
   /// before is done, by odometry or else as commanded, and when `report` says that something
   /// stopped it; only then the picture is looked at. Throws as `ViewEncoder::signature` and
-  /// `Navigator::look`.
+  /// `Navigator::observe`.
   [[nodiscard]] NavigationStep step(const Observation& observation, RobotReport report = {});
 
   [[nodiscard]] GraphOrigin origin() const noexcept { return origin_; }
@@ -79,7 +79,7 @@ class RobotNavigator {
   [[nodiscard]] const MemoryFile& memory() const noexcept { return views_.file(); }
   /// What the memory knows of a view besides its signature; read from the file.
   [[nodiscard]] ReferenceInfo info(ViewId view) const;
-  /// For those who look and drive themselves.
+  /// For programs that observe and drive themselves.
   [[nodiscard]] Navigator& navigator() noexcept { return *navigator_; }
   [[nodiscard]] const ViewEncoder& encoder() const noexcept { return encoder_; }
   /// How lines are taken along its route; null without one.
@@ -88,7 +88,7 @@ class RobotNavigator {
   }
 
  private:
-  [[nodiscard]] NavigationDecision look(const Observation& observation, RobotReport report);
+  [[nodiscard]] NavigationDecision observe(const Observation& observation, RobotReport report);
 
   RobotNavigatorOptions options_;
   MemoryFileViews views_;

@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::size_t lines_at_once = 64;
 /// Between the end of a route and the line that goes on with it.
-constexpr double most_gap_m = 1.0;
+constexpr double max_gap_m = 1.0;
 
 std::string route_text(const MemoryFile& file, const std::string& name) {
   return "the route '" + name + "' in " + file.path().string();
@@ -18,7 +18,7 @@ std::string route_text(const MemoryFile& file, const std::string& name) {
 /// Lines can only go on with the same camera and in the same frame.
 RouteSource source_for(const MemoryFile& file, const RouteRecorderOptions& options) {
   require(options.every_m >= 0.0, "every_m", options.every_m, ">= 0");
-  RouteSource wanted{.line = options.line.value_or(HorizonLineOptions{}),
+  RouteSource wanted{.line = options.line.value_or(HorizonScanlineOptions{}),
                      .horizon_rows = options.horizon_rows,
                      .from_odometry = options.odometry};
   const auto known = file.route(options.name);
@@ -89,10 +89,10 @@ RouteRecorder::EncodedLine RouteRecorder::encode(const Observation& observation)
 void RouteRecorder::add(EncodedLine line) {
   if (!last_ && end_) {
     const double gap_m = distance(end_->position(), line.pose.position());
-    if (gap_m > most_gap_m) {
+    if (gap_m > max_gap_m) {
       throw FileError(file_.path().string(), "the first line lies " + short_number(gap_m) +
                                                  " m from the end of the route '" + options_.name +
-                                                 "'; allowed: at most " + short_number(most_gap_m) +
+                                                 "'; allowed: at most " + short_number(max_gap_m) +
                                                  " m, or another --name");
     }
   }

@@ -18,7 +18,7 @@ struct RouteRecorderOptions {
   std::string name = "route";  ///< of the route; it grows if it is there
   double every_m = 0.1;        ///< way between lines, >= 0
   /// Empty: as the route has them that is there, else the defaults.
-  std::optional<HorizonLineOptions> line;
+  std::optional<HorizonScanlineOptions> line;
   /// First and last row that show the horizon, counted from 0 at the top, of panoramas whose
   /// elevations are not known. Empty: as the route has them, else all.
   std::optional<std::pair<int, int>> horizon_rows;

@@ -15,10 +15,10 @@ MonteCarloLocaliser localiser_for(const MemoryFile& file, const VisualMemory& me
                                   const TrackerOptions& options) {
   const auto posed = std::ranges::count_if(
       memory.views(), [&](ViewId view) { return memory.info(view).pose.has_value(); });
-  if (posed < ObservationModel::least_views) {
+  if (posed < ObservationModel::min_views) {
     throw FileError(file.path().string(),
                     "holds " + std::to_string(posed) + " views with a position; allowed: " +
-                        std::to_string(ObservationModel::least_views) +
+                        std::to_string(ObservationModel::min_views) +
                         " or more; memorise a data set whose table has the columns "
                         "'x_m' and 'y_m'");
   }

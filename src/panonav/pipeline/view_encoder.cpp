@@ -17,7 +17,7 @@ namespace panonav {
 
 namespace {
 
-/// Lean of the camera that changes less than the spacing of rows does.
+/// Tilt of the camera that changes less than the spacing of rows does.
 constexpr double tolerated_tilt_rad = 0.5 * std::numbers::pi / 180.0;
 
 constexpr PanoramaShape default_shape{80, 512};  // [M04 section 2.1]
@@ -229,9 +229,9 @@ float largest_structure(const FourierSignature& signature) {
 }
 
 std::vector<std::uint8_t> thumbnail_png(const Panorama& panorama) {
-  constexpr int largest_columns = 256;
+  constexpr int max_columns = 256;
   const Image picture = to_picture(panorama);
-  const int step = (picture.width() + largest_columns - 1) / largest_columns;
+  const int step = (picture.width() + max_columns - 1) / max_columns;
   if (step == 1) return encode_png(picture.view());
   Image small(picture.width() / step, std::max(1, picture.height() / step));
   const int rows_averaged = std::min(step, picture.height());

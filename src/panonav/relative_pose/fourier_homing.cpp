@@ -83,7 +83,7 @@ class PairOfViews {
   void take_slopes();
   // Whether it is known how the image changes from row to row.
   [[nodiscard]] bool sees_rise() const noexcept {
-    return (options_.vertical_motion || options_.lean) && home_.elevations() && rows_ >= 3;
+    return (options_.vertical_motion || options_.tilt) && home_.elevations() && rows_ >= 3;
   }
   void sum_equations();
   [[nodiscard]] PairSolution solve_at(double turn_rad);
@@ -154,8 +154,8 @@ void PairOfViews::turn_home(double turn_rad) {
   });
 }
 
-// By coherence at the present turn: components by a bell as wide as there are coherent ones, over
-// their amplitude, rows by their coherence within it. The power of views falls with about the
+// By coherence at the present turn: components by a Gaussian as wide as there are coherent ones,
+// over their amplitude, rows by their coherence within it. The power of views falls with about the
 // square of the frequency [S06 section 4.5], so that without the amplitude the first few would
 // decide alone. What unequal distances leave unexplained is a share of the power, what pixels leave
 // is the same for all frequencies: the amplitude is half way between the two.
@@ -185,7 +185,7 @@ void PairOfViews::weigh() {
     powers[static_cast<std::size_t>(k)] = static_cast<double>(home + current);
     power += powers[static_cast<std::size_t>(k)] / highest_;
   }
-  component_weights_ = fitted_bell(coherences, highest_);
+  component_weights_ = fitted_gaussian(coherences, highest_);
   over_amplitude(component_weights_, powers, power, highest_);
   if (rows_ == 1) return;
 
@@ -252,18 +252,18 @@ void PairOfViews::sum_equations() {
     normal_.add(pair_equations(c_, k, rows_, terms),
                 component_weights_[static_cast<std::size_t>(k)]);
   }
-  if (options_.lean && sees_rise()) {
-    LeanEquations lean;
+  if (options_.tilt && sees_rise()) {
+    TiltEquations tilt;
     double equations = 0.0;
     for (int k = 1; k <= highest_; ++k) {
       const double weight = component_weights_[static_cast<std::size_t>(k)];
-      lean.add(lean_equations(c_, k, rows_, terms), weight);
+      tilt.add(tilt_equations(c_, k, rows_, terms), weight);
       equations += 2.0 * weight * static_cast<double>(rows_);
     }
-    // Robots lean by a degree or two: more must be shown by the views.
+    // Robots tilt by a degree or two: more must be shown by the views.
     constexpr double usual_rad = 0.035;
     const double certain = normal_.energy / std::max(1.0, equations) / (usual_rad * usual_rad);
-    normal_ = without_lean(normal_, lean, certain);
+    normal_ = without_tilt(normal_, tilt, certain);
   }
 }
 
@@ -300,10 +300,10 @@ void PairOfViews::move_current(double xi, double eta) {
 // decides. Directions are counted from where the first frequency of the current view has its
 // maximum, so that a turn of the robot changes nothing.
 PairOfViews::Start PairOfViews::search() const {
-  constexpr std::size_t most_bands = 8;
+  constexpr std::size_t max_bands = 8;
   // The current view is known to more frequencies than are compared.
   const int frequencies = std::min(known_, 2 * searched_frequencies);
-  const std::size_t bands = std::min(most_bands, rows_);
+  const std::size_t bands = std::min(max_bands, rows_);
   const auto stride = static_cast<std::size_t>(frequencies) + 1;
   std::vector<float> values(4 * bands * stride);
   const auto part = [&](std::size_t i) {
@@ -340,10 +340,10 @@ PairOfViews::Start PairOfViews::search() const {
 // The expected image at a displacement of any length.
 void PairOfViews::move_current(const Start& start) {
   const auto count = static_cast<std::size_t>(known_) + 1;
-  std::array<float, most_displaced_frequencies + 1> a{};
-  std::array<float, most_displaced_frequencies + 1> b{};
-  std::array<float, most_displaced_frequencies + 1> to_a{};
-  std::array<float, most_displaced_frequencies + 1> to_b{};
+  std::array<float, max_displaced_frequencies + 1> a{};
+  std::array<float, max_displaced_frequencies + 1> b{};
+  std::array<float, max_displaced_frequencies + 1> to_a{};
+  std::array<float, max_displaced_frequencies + 1> to_b{};
   for (std::size_t y = 0; y < rows_; ++y) {
     for (int k = 0; k <= known_; ++k) {
       a[static_cast<std::size_t>(k)] = c_.current_a(k)[y];
@@ -371,10 +371,10 @@ HomeVector PairOfViews::result() {
     vector.eta = found->displacement.length() * std::sin(direction);
   }
   const int last = options_.iterations;
-  const int most_frequencies = highest_;
+  const int max_frequencies = highest_;
   for (int iteration = 0;; ++iteration) {
     if (options_.rising) {
-      highest_ = std::max(1, most_frequencies * (iteration + 1) / (last + 1));
+      highest_ = std::max(1, max_frequencies * (iteration + 1) / (last + 1));
     }
     correlate();
     const double most = std::sqrt(home_energy_) * std::sqrt(current_energy_);
@@ -383,7 +383,7 @@ HomeVector PairOfViews::result() {
     constexpr double rounding = 1e-6;
     if (!(most > rounding * rounding * static_cast<double>(rows_))) return {};
 
-    std::array<float, most_starting_estimates> turns{};
+    std::array<float, max_starting_estimates> turns{};
     int starts = 1;
     if (found && found->displacement.ring > 0 && iteration == 0) {
       turns[0] = static_cast<float>(found->turn_rad);
@@ -446,7 +446,7 @@ double PairOfViews::difference() {
 
 int highest_used(const HomingView& home, const HomingView& current, int highest) {
   const int common = std::min(home.components(), current.components());
-  const int most = std::min(common - 2, TurnCorrelation::most_frequencies);
+  const int most = std::min(common - 2, TurnCorrelation::max_frequencies);
   return highest == 0 ? most : highest;
 }
 
@@ -455,7 +455,7 @@ void check_pair(const HomingView& home, const HomingView& current, int highest) 
           to_text(home.rows()) + ", as of the home view");
   const int common = std::min(home.components(), current.components());
   require(common >= 3, "components of the views", common, ">= 3");
-  const int most = std::min(common - 2, TurnCorrelation::most_frequencies);
+  const int most = std::min(common - 2, TurnCorrelation::max_frequencies);
   require(highest >= 0 && highest <= most, "highest frequency", highest,
           "0 (all) or 1 .. " + to_text(most));
 }
@@ -500,7 +500,7 @@ double image_difference(const HomingView& home, const HomingView& current, int h
   check_pair(home, current, highest);
   FourierHomingOptions options = published_homing(highest);
   options.gradient = HomingGradient::both;
-  options.lean = true;
+  options.tilt = true;
   return PairOfViews(home, current, options, highest_used(home, current, highest)).difference();
 }
 

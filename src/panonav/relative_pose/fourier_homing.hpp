@@ -50,7 +50,7 @@ enum class HomingWeights {
 };
 
 /// The largest number of headings that can be tried.
-inline constexpr int most_starting_estimates = 6;
+inline constexpr int max_starting_estimates = 6;
 
 /// The defaults are our own rule; `published_homing` is S06's.
 struct FourierHomingOptions {
@@ -73,7 +73,7 @@ struct FourierHomingOptions {
   bool vertical_motion = true;
   /// Two more unknowns: the robot's tilt against the home view, a degree or two on uneven ground.
   /// Used only where elevations are known.
-  bool lean = true;
+  bool tilt = true;
 };
 void visit_options(FourierHomingOptions& options, OptionVisitor& visitor);
 

@@ -13,10 +13,10 @@ void visit_options(FourierHomingOptions& options, OptionVisitor& visitor) {
       choice<&T::gradient>("views whose slopes count", "current", "both"),
       choice<&T::weights>("how much components and rows count", "equal", "coherence"),
       option<&T::starting_estimates>("headings tried", 1,
-                                     static_cast<double>(most_starting_estimates)),
+                                     static_cast<double>(max_starting_estimates)),
       option<&T::displacement_search>("try displacements up to two thirds of R before solving"),
       option<&T::vertical_motion>("rows off the horizon move up and down, too"),
-      option<&T::lean>("the robot may lean a little, as on uneven ground"),
+      option<&T::tilt>("the robot may tilt a little, as on uneven ground").formerly("lean"),
   };
   table.visit(options, visitor);
 }
@@ -30,7 +30,7 @@ FourierHomingOptions published_homing(int highest, int iterations) {
           .starting_estimates = 1,
           .displacement_search = false,
           .vertical_motion = false,
-          .lean = false};
+          .tilt = false};
 }
 
 }  // namespace panonav

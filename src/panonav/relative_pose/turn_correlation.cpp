@@ -12,7 +12,7 @@ namespace panonav {
 namespace {
 
 constexpr float pi = std::numbers::pi_v<float>;
-constexpr int most_points = 512;  // 8 for each of 62 frequencies, rounded up to a power of two
+constexpr int max_points = 512;  // 8 for each of 62 frequencies, rounded up to a power of two
 
 CorrelationPoint<float> evaluate(const TurnCorrelation& correlation, float turn_rad) noexcept {
   const std::size_t size = static_cast<std::size_t>(correlation.highest) + 1;
@@ -36,14 +36,14 @@ float refine(const TurnCorrelation& correlation, float turn_rad, float half_step
 }
 
 struct Circle {
-  std::array<float, most_points> cosine, sine;
+  std::array<float, max_points> cosine, sine;
 };
 
 const Circle& circle() {
   static const Circle made = [] {
     Circle table{};
-    for (int i = 0; i < most_points; ++i) {
-      const double angle = 2.0 * std::numbers::pi * i / most_points;
+    for (int i = 0; i < max_points; ++i) {
+      const double angle = 2.0 * std::numbers::pi * i / max_points;
       table.cosine[static_cast<std::size_t>(i)] = static_cast<float>(std::cos(angle));
       table.sine[static_cast<std::size_t>(i)] = static_cast<float>(std::sin(angle));
     }
@@ -59,8 +59,8 @@ float TurnCorrelation::at(float turn_rad) const noexcept {
 }
 
 float sequential_turn(const TurnCorrelation& correlation) noexcept {
-  std::array<float, TurnCorrelation::most_frequencies + 1> differences{};
-  std::array<float, TurnCorrelation::most_frequencies + 1> weights{};
+  std::array<float, TurnCorrelation::max_frequencies + 1> differences{};
+  std::array<float, TurnCorrelation::max_frequencies + 1> weights{};
   float all = 0.0F;
   for (int k = 1; k <= correlation.highest; ++k) {
     const auto i = static_cast<std::size_t>(k);
@@ -95,9 +95,9 @@ int highest_turns(const TurnCorrelation& correlation, std::span<float> turns,
                   const TurnWindow& window) noexcept {
   std::size_t count = 16;
   while (count < 8 * static_cast<std::size_t>(correlation.highest)) count *= 2;
-  const std::size_t stride = most_points / count;
+  const std::size_t stride = max_points / count;
   const Circle& table = circle();
-  std::array<float, most_points> cosine, sine, real, imaginary;
+  std::array<float, max_points> cosine, sine, real, imaginary;
   for (std::size_t i = 0; i < count; ++i) {
     cosine[i] = table.cosine[i * stride];
     sine[i] = table.sine[i * stride];

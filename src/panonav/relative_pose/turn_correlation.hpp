@@ -9,10 +9,10 @@ namespace panonav {
 /// C(sigma) = sum_{k=1..K} Re(real[k] + j imaginary[k]) exp(-j k sigma): the correlation of two
 /// views against the turn between them, all rows summed [S06 eq. 33]. Entry 0 is not used.
 struct TurnCorrelation {
-  static constexpr int most_frequencies = 62;
-  int highest = 0;  ///< K, 1 .. most_frequencies
-  std::array<float, most_frequencies + 1> real{};
-  std::array<float, most_frequencies + 1> imaginary{};
+  static constexpr int max_frequencies = 62;
+  int highest = 0;  ///< K, 1 .. max_frequencies
+  std::array<float, max_frequencies + 1> real{};
+  std::array<float, max_frequencies + 1> imaginary{};
 
   [[nodiscard]] float at(float turn_rad) const noexcept;
 };

@@ -11,7 +11,7 @@ namespace panonav {
 namespace {
 
 constexpr double pi = std::numbers::pi;
-constexpr int least_pictures = 5;
+constexpr int min_pictures = 5;
 constexpr double usual_deviations = 3.0;
 
 }  // namespace
@@ -39,7 +39,7 @@ std::vector<AzimuthRange> RouteChanges::add(const RouteFix& fix) {
                                         before[(s + 1) % sectors]})
                         : 0;
   }
-  const auto changed = [&](std::size_t s) { return pictures_[s % sectors] >= least_pictures; };
+  const auto changed = [&](std::size_t s) { return pictures_[s % sectors] >= min_pictures; };
   std::vector<AzimuthRange> ranges;
   for (std::size_t s = 0; s < sectors; ++s) {
     if (!changed(s) || changed(s + sectors - 1)) continue;

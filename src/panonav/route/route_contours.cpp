@@ -67,8 +67,8 @@ void visit_options(RouteContourOptions& options, OptionVisitor& visitor) {
       option<&T::pull>("w_pull", 0, 1000),
       option<&T::constant>("w_const", 0, 1000),
       option<&T::smoothing_deg>("of the lines before they are differentiated", 0, 45),
-      option<&T::most_points>("control points", 8, 10000),
-      option<&T::most_iterations>("until the contours stop", 1, 100000),
+      option<&T::max_points>("control points", 8, 10000).formerly("most_points"),
+      option<&T::max_iterations>("until the contours stop", 1, 100000).formerly("most_iterations"),
   };
   table.visit(options, visitor);
 }
@@ -278,7 +278,7 @@ std::optional<RouteContourFix> RouteContours::fit(std::span<const float> line,
   // Whether a control point and the one before lie on the same side of the path.
   std::vector<bool> joined;
   bool left = false;
-  for (const int column : edge_columns(edges, options_.most_points)) {
+  for (const int column : edge_columns(edges, options_.max_points)) {
     const double azimuth = column + turn;
     const auto c = static_cast<std::size_t>(((std::llround(azimuth) % size) + size) % size);
     const RouteCrossing& crossing = crossings[c];
@@ -300,7 +300,7 @@ std::optional<RouteContourFix> RouteContours::fit(std::span<const float> line,
   if (fix.columns.size() < 8) return std::nullopt;
   // Steps of a line and a column first, then of half, until nothing moves.
   double step = 1.0;
-  for (; fix.iterations < options_.most_iterations; ++fix.iterations) {
+  for (; fix.iterations < options_.max_iterations; ++fix.iterations) {
     const auto first = fix.first;
     const auto second = fix.second;
     move(fix.first, fix.second, fix.columns, edges, joined, step);

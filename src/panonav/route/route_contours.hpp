@@ -23,8 +23,8 @@ struct RouteContourOptions {
   double pull = 0.002;         ///< w_pull, eq. 10
   double constant = 0.5;       ///< w_const, eq. 11 squared
   double smoothing_deg = 1.0;  ///< of the lines before they are differentiated
-  int most_points = 120;       ///< control points, at the strongest edges of the line
-  int most_iterations = 200;
+  int max_points = 120;        ///< control points, at the strongest edges of the line
+  int max_iterations = 200;
   friend bool operator==(const RouteContourOptions&, const RouteContourOptions&) = default;
 };
 void visit_options(RouteContourOptions& options, OptionVisitor& visitor);

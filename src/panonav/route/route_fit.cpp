@@ -67,7 +67,7 @@ void visit_options(RouteFitOptions& options, OptionVisitor& visitor) {
   constexpr OptionTable table{
       option<&T::coarse_deg>("smoothing of the lines where a fit starts", 0, 45),
       option<&T::levels>("from coarse to fine", 1, 8),
-      option<&T::most_steps>("steps at each level", 1, 100),
+      option<&T::max_steps>("steps at each level", 1, 100).formerly("most_steps"),
       option<&T::reach_m>("lines farther from the prediction are not looked at", 0.1, 1000),
       option<&T::robust>("changed parts of the scene count less"),
   };
@@ -187,8 +187,8 @@ std::optional<RouteLines::Linearised> RouteLines::linearise(const std::vector<Te
     shown_square += y * y / n;
     product += x * y / n;
   }
-  constexpr double least_variance = 1e-8;
-  if (seen_square < least_variance || shown_square < least_variance) return std::nullopt;
+  constexpr double min_variance = 1e-8;
+  if (seen_square < min_variance || shown_square < min_variance) return std::nullopt;
   // Another light is a factor of a few at most, and never turns black into white.
   result.gain = std::clamp(product / seen_square, 0.2, 5.0);
   result.offset = shown - result.gain * seen;
@@ -200,9 +200,9 @@ std::optional<RouteLines::Linearised> RouteLines::linearise(const std::vector<Te
   scratch.clear();
   for (const Term& term : terms) scratch.push_back(std::abs(static_cast<float>(difference(term))));
   // A grey level at least: lines are bytes.
-  constexpr double least_noise = 1.0 / 255.0;
-  const double noise = std::max(
-      least_noise, 1.4826 * static_cast<double>(upper_median_in_place(std::span(scratch))));
+  constexpr double min_noise = 1.0 / 255.0;
+  const double noise =
+      std::max(min_noise, 1.4826 * static_cast<double>(upper_median_in_place(std::span(scratch))));
   result.noise = noise;
   std::array<double, 25> matrix{};  // lower half, row by row
   std::array<double, 5> right{};
@@ -246,7 +246,7 @@ std::optional<RouteLines::Linearised> RouteLines::linearise(const std::vector<Te
       result.matrix(row, column) = result.matrix(column, row) = matrix[5 * i + j];
     }
   }
-  result.variance = std::max(left / weights, least_noise * least_noise / 12.0);
+  result.variance = std::max(left / weights, min_noise * min_noise / 12.0);
   return result;
 }
 
@@ -292,7 +292,7 @@ bool RouteLines::descend(std::span<const Level> levels, std::span<const float> l
     const bool last = &level == &levels_.back();
     const double near_enough_m =
         last ? 3e-4 : 0.05 * usual_distance_m * level.sigma * 2.0 * pi / columns_;
-    for (int step = 0; step < options_.most_steps; ++step) {
+    for (int step = 0; step < options_.max_steps; ++step) {
       if (!collect(level, work.seen, pose, near, work.crossings, work.terms)) return false;
       const auto normal = linearise(work.terms, work.scratch);
       if (!normal) return false;

@@ -16,7 +16,7 @@ namespace panonav {
 struct RouteFitOptions {
   double coarse_deg = 8.0;  ///< standard deviation of the smoothing where a fit starts, in azimuth
   int levels = 3;           ///< from coarse to not smoothed at all
-  int most_steps = 8;       ///< Gauss-Newton steps at each level
+  int max_steps = 8;        ///< Gauss-Newton steps at each level
   double reach_m = 6.0;     ///< lines farther from the prediction are not looked at
   bool robust = true;       ///< changed parts of the scene count less
   friend bool operator==(const RouteFitOptions&, const RouteFitOptions&) = default;

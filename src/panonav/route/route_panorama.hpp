@@ -19,7 +19,7 @@ class RoutePanorama {
   /// Throws ContractError unless columns is 16 .. 16384.
   explicit RoutePanorama(int columns = 360);
 
-  /// `line` as from `horizon_line`, 0 .. 1, clamped and rounded to bytes. False, and nothing is
+  /// `line` as from `horizon_scanline`, 0 .. 1, clamped and rounded to bytes. False, and nothing is
   /// stored, where the robot has not moved by a millimetre since the last line. Throws
   /// ContractError on a wrong length or a value that is not finite.
   bool append(const Pose2& pose, std::span<const float> line);

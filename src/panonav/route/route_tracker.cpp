@@ -26,12 +26,12 @@ void visit_options(RouteTrackerOptions& options, OptionVisitor& visitor) {
       option<&T::search_lateral_m>("between the places beside the path that a search tries", 0.01,
                                    100),
       option<&T::search_sides>("places that a search tries to either side of the path", 0, 100),
-      option<&T::most_candidates>("places that a search fits", 1, 1000),
+      option<&T::max_candidates>("places that a search fits", 1, 1000).formerly("most_candidates"),
       option<&T::recovery_m>("by which a prediction may be off", 0, 100),
       option<&T::surprise_m>(
           "a place farther from where odometry expects it waits for the next line", 0, 100),
-      option<&T::least_correlation>("from which on a fit is believed; 0: learnt from the route", 0,
-                                    1),
+      option<&T::min_correlation>("from which on a fit is believed; 0: learnt from the route", 0, 1)
+          .formerly("least_correlation"),
   };
   table.visit(options, visitor);
 }
@@ -40,8 +40,8 @@ RouteTracker::RouteTracker(const RoutePanorama& route, const RouteTrackerOptions
                            const RouteFitOptions& fit)
     : options_(options), lines_(route, fit) {
   validate(options);
-  least_correlation_ = options.least_correlation;
-  if (least_correlation_ == 0.0) least_correlation_ = learnt_correlation(route, fit);
+  min_correlation_ = options.min_correlation;
+  if (min_correlation_ == 0.0) min_correlation_ = learnt_correlation(route, fit);
 }
 
 double RouteTracker::learnt_correlation(const RoutePanorama& route,
@@ -120,7 +120,7 @@ std::optional<RouteFix> RouteTracker::best_anywhere(std::span<const float> line)
   std::optional<RouteFix> best;
   std::vector<Point2> tried;
   for (const auto& candidate : found) {
-    if (tried.size() >= static_cast<std::size_t>(options_.most_candidates)) break;
+    if (tried.size() >= static_cast<std::size_t>(options_.max_candidates)) break;
     // A fit finds what is near by itself.
     const bool near = std::ranges::any_of(tried, [&](Point2 other) {
       return distance(other, candidate.pose.position()) < 1.5 * options_.search_lateral_m;
@@ -135,7 +135,7 @@ std::optional<RouteFix> RouteTracker::best_anywhere(std::span<const float> line)
 
 std::optional<TrackedRouteFix> RouteTracker::search(std::span<const float> line) const {
   auto best = best_anywhere(line);
-  if (!best || best->correlation < least_correlation_) return std::nullopt;
+  if (!best || best->correlation < min_correlation_) return std::nullopt;
   return placed(*std::move(best), RouteFixOrigin::search);
 }
 
@@ -151,7 +151,7 @@ std::optional<TrackedRouteFix> RouteTracker::track(std::span<const float> line, 
       return distance(fix.pose.position(), predicted.position());
     };
     const auto believed = [&](const std::optional<RouteFix>& fix) {
-      return fix && fix->correlation >= least_correlation_ &&
+      return fix && fix->correlation >= min_correlation_ &&
              off_m(*fix) <= 1.5 * options_.recovery_m;
     };
     auto fix = lines_.fit(line, predicted);
@@ -170,7 +170,7 @@ std::optional<TrackedRouteFix> RouteTracker::track(std::span<const float> line, 
   }
   if (!found) {
     auto anywhere = search(line);
-    // A robot that was followed until now is seldom carried away; a line is sooner mistaken.
+    // A robot that was followed until now is seldom kidnapped; a line is sooner mistaken.
     if (anywhere && (!pose_ || agrees(anywhere->fix, options_.recovery_m))) {
       found = std::move(anywhere);
     } else {

@@ -13,13 +13,13 @@ struct RouteTrackerOptions {
   double search_step_m = 0.2;      ///< between the places along the path that a search tries
   double search_lateral_m = 0.25;  ///< and to either side of it
   int search_sides = 2;            ///< so many times to either side
-  int most_candidates = 6;         ///< places that a search fits
+  int max_candidates = 6;          ///< places that a search fits
   double recovery_m = 0.5;         ///< by which a prediction may be off
   /// A robot that was followed until now and seems to be farther than this from where odometry puts
   /// it is believed to be there once the next line agrees.
   double surprise_m = 0.15;
   /// Correlation from which on a fit is believed; 0: learnt from the route itself.
-  double least_correlation = 0.0;
+  double min_correlation = 0.0;
   friend bool operator==(const RouteTrackerOptions&, const RouteTrackerOptions&) = default;
 };
 void visit_options(RouteTrackerOptions& options, OptionVisitor& visitor);
@@ -73,7 +73,7 @@ class RouteTracker {
     followed_ = false;
   }
   [[nodiscard]] const std::optional<Pose2>& pose() const noexcept { return pose_; }
-  [[nodiscard]] double least_correlation() const noexcept { return least_correlation_; }
+  [[nodiscard]] double min_correlation() const noexcept { return min_correlation_; }
   [[nodiscard]] const RouteLines& lines() const noexcept { return lines_; }
 
  private:
@@ -86,7 +86,7 @@ class RouteTracker {
 
   RouteTrackerOptions options_;
   RouteLines lines_;
-  double least_correlation_ = 0.0;
+  double min_correlation_ = 0.0;
   std::optional<Pose2> pose_;
   std::optional<Pose2> elsewhere_;  // where the last line would have put the robot
   bool followed_ = false;           // a line has told where the robot is

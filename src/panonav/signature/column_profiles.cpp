@@ -30,7 +30,7 @@ constexpr int fewest_for_shape = 4;
 using Rebuilt = std::array<std::array<float, columns>, bands>;
 
 // Finer components than this would need more columns.
-constexpr int most_components = columns / 2;
+constexpr int max_components = columns / 2;
 
 // The columns of a quarter turn, both ends included; the others follow by symmetry. Filled up to
 // whole vectors.
@@ -39,13 +39,13 @@ constexpr std::size_t quarter_filled = (quarter + 3) / 4 * 4;
 using Quarter = std::array<float, quarter_filled>;
 
 struct Waves {
-  std::array<Quarter, most_components> cosines, sines;
+  std::array<Quarter, max_components> cosines, sines;
 };
 
 const Waves& waves() {
   static const Waves made = [] {
     Waves waves{};
-    for (std::size_t k = 0; k < most_components; ++k) {
+    for (std::size_t k = 0; k < max_components; ++k) {
       for (std::size_t c = 0; c < quarter; ++c) {
         const double angle =
             2.0 * std::numbers::pi * static_cast<double>(k * c % columns) / columns;
@@ -179,7 +179,7 @@ ColumnProfiles::ColumnProfiles(const PackedSignature& signature, int components,
       allowed_rows.empty() || allowed_rows.size() == static_cast<std::size_t>(signature.shape.rows),
       "allowed rows", static_cast<double>(allowed_rows.size()), to_text(signature.shape.rows));
   if (components == 0) components = signature.shape.components;
-  components = std::min(components, most_components);
+  components = std::min(components, max_components);
 
   Rebuilt view;
   used_bands_ = rebuild(signature, components, allowed_rows, view);
@@ -233,12 +233,12 @@ ColumnMatches match_columns_twice(const ColumnProfiles& query, const ColumnProfi
   const std::size_t best = least % columns;
   std::array<std::uint16_t, 2 * columns> twice;
   std::ranges::copy(costs, std::ranges::copy(costs, twice.begin()).out);
-  std::uint32_t least_apart = ~0U;
+  std::uint32_t min_apart = ~0U;
   for (std::uint32_t turn = apart; turn <= columns - apart; ++turn) {
-    least_apart =
-        std::min(least_apart, static_cast<std::uint32_t>(twice[best + turn]) * columns + turn);
+    min_apart =
+        std::min(min_apart, static_cast<std::uint32_t>(twice[best + turn]) * columns + turn);
   }
-  const std::size_t other = (best + least_apart % columns) % columns;
+  const std::size_t other = (best + min_apart % columns) % columns;
   return {match_at(query, costs, best), match_at(query, costs, other)};
 }
 

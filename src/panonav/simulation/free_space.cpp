@@ -119,20 +119,20 @@ FreeSpace::FreeSpace(const Scene& scene, const FreeSpaceOptions& options,
                  (!has_floor || floor[inner(cell)] != 0) && drivable(scene, centre(cell));
     }
   }
-  keep_connected_part(seed);
+  keep_connected_component(seed);
 }
 
-void FreeSpace::keep_connected_part(std::optional<Point2> seed) {
-  std::vector<std::uint32_t> part(free_.size(), 0);
+void FreeSpace::keep_connected_component(std::optional<Point2> seed) {
+  std::vector<std::uint32_t> component(free_.size(), 0);
   std::vector<std::size_t> sizes{0};
   std::vector<Cell> open;
   for (int j = 0; j < rows_; ++j) {
     for (int i = 0; i < columns_; ++i) {
-      if (free_[index({i, j})] == 0 || part[index({i, j})] != 0) continue;
+      if (free_[index({i, j})] == 0 || component[index({i, j})] != 0) continue;
       const auto number = static_cast<std::uint32_t>(sizes.size());
       sizes.push_back(0);
       open.push_back({i, j});
-      part[index({i, j})] = number;
+      component[index({i, j})] = number;
       while (!open.empty()) {
         const Cell cell = open.back();
         open.pop_back();
@@ -141,8 +141,8 @@ void FreeSpace::keep_connected_part(std::optional<Point2> seed) {
         for (std::size_t n = 0; n < 4; ++n) {
           const Cell next{cell.i + neighbours[n].di, cell.j + neighbours[n].dj};
           if (next.i < 0 || next.j < 0 || next.i >= columns_ || next.j >= rows_) continue;
-          if (free_[index(next)] == 0 || part[index(next)] != 0) continue;
-          part[index(next)] = number;
+          if (free_[index(next)] == 0 || component[index(next)] != 0) continue;
+          component[index(next)] = number;
           open.push_back(next);
         }
       }
@@ -151,7 +151,7 @@ void FreeSpace::keep_connected_part(std::optional<Point2> seed) {
   std::uint32_t kept = 0;
   if (seed) {
     const auto cell = cell_at(*seed);
-    if (cell) kept = part[index(*cell)];
+    if (cell) kept = component[index(*cell)];
     if (kept == 0)
       throw ContractError("seed of the free space", text(*seed),
                           "a place where the robot can stand");
@@ -163,7 +163,7 @@ void FreeSpace::keep_connected_part(std::optional<Point2> seed) {
     }
   }
   for (std::size_t k = 0; k < free_.size(); ++k) {
-    free_[k] = part[k] == kept ? 1 : 0;
+    free_[k] = component[k] == kept ? 1 : 0;
     if (free_[k] != 0) free_cells_.push_back(static_cast<std::uint32_t>(k));
   }
 }
@@ -303,10 +303,10 @@ std::optional<std::vector<Point2>> FreeSpace::shortest_path(Point2 a, Point2 b) 
 std::vector<Point2> FreeSpace::pulled_tight(std::vector<Point2> path) const {
   // From each way point to the last one that is seen before the view is blocked; then the same from
   // the other end with new points between, until the path hardly becomes shorter.
-  constexpr int most_rounds = 20;
+  constexpr int max_rounds = 20;
   constexpr double worthwhile = 1e-3;
   double length = path_length_m(path);
-  for (int round = 0; round < most_rounds; ++round) {
+  for (int round = 0; round < max_rounds; ++round) {
     std::vector<Point2> tight{path.front()};
     for (std::size_t from = 0; from + 1 < path.size();) {
       std::size_t to = from + 1;
@@ -332,7 +332,7 @@ std::vector<Point2> FreeSpace::pulled_tight(std::vector<Point2> path) const {
     }
     std::reverse(path.begin(), path.end());
   }
-  if (most_rounds % 2 == 1) std::reverse(path.begin(), path.end());
+  if (max_rounds % 2 == 1) std::reverse(path.begin(), path.end());
   return path;
 }
 

@@ -81,7 +81,7 @@ class FreeSpace {
   }
   [[nodiscard]] Point2 centre(Cell cell) const noexcept;
   [[nodiscard]] std::vector<Point2> pulled_tight(std::vector<Point2> path) const;
-  void keep_connected_part(std::optional<Point2> seed);
+  void keep_connected_component(std::optional<Point2> seed);
 
   Point2 low_, high_;
   double cell_m_;

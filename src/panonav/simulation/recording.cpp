@@ -132,7 +132,7 @@ void visit_options(FrameOptions& options, OptionVisitor& visitor) {
   using T = FrameOptions;
   constexpr OptionTable table{
       option<&T::camera_height_m>("height of the camera above the floor", above(0), 100),
-      option<&T::tilt_rad>("how far the robot leans, in a random direction at each place", 0, 0.5),
+      option<&T::tilt_rad>("tilt of the robot, in a random direction at each place", 0, 0.5),
       option<&T::rays_per_axis>("rays per pixel and axis through a camera", 1, 8),
   };
   table.visit(options, visitor);

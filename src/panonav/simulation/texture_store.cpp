@@ -93,7 +93,7 @@ Image halve(const Image& image) {
 }  // namespace
 
 TextureStore::TextureStore(TextureOptions options) : options_(std::move(options)) {
-  require(options_.largest_side_px >= 1, "largest_side_px", options_.largest_side_px, ">= 1");
+  require(options_.max_side_px >= 1, "max_side_px", options_.max_side_px, ">= 1");
 }
 
 std::shared_ptr<const Image> TextureStore::find(std::string_view written,
@@ -112,7 +112,7 @@ std::shared_ptr<const Image> TextureStore::find(std::string_view written,
   if (is_new) {
     try {
       Image image = options_.read(*found);
-      while (std::max(image.width(), image.height()) > options_.largest_side_px) {
+      while (std::max(image.width(), image.height()) > options_.max_side_px) {
         image = halve(image);
       }
       entry->second = std::make_shared<const Image>(std::move(image));

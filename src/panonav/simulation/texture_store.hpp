@@ -18,8 +18,8 @@ using TextureReader = std::function<Image(const std::filesystem::path&)>;
 
 /// Where files of a scene look for their pictures and how large these may be.
 struct TextureOptions {
-  TextureReader read;          ///< empty: every surface gets its plain colour
-  int largest_side_px = 1024;  ///< larger pictures are halved until they fit; >= 1
+  TextureReader read;      ///< empty: every surface gets its plain colour
+  int max_side_px = 1024;  ///< larger pictures are halved until they fit; >= 1
 };
 
 /// The textures of one scene, each read once. What cannot be found or read is never an error: it

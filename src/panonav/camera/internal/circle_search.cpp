@@ -44,7 +44,7 @@ float sample(const std::vector<float>& plane, int width, int height, double u, d
 }
 
 double figure_of_merit(const CircleScore& found, const CircleRange& range) {
-  return found.visible < range.visible_part ? -1.0 : found.quality * std::sqrt(found.visible);
+  return found.visible < range.visible_fraction ? -1.0 : found.quality * std::sqrt(found.visible);
 }
 
 struct Direction {

@@ -37,7 +37,7 @@ struct CircleScore {
 struct CircleRange {
   double lowest_radius = 0.0;
   double highest_radius = 0.0;
-  double visible_part = 0.5;
+  double visible_fraction = 0.5;
   Evenness evenness = Evenness::even;
 };
 

@@ -154,8 +154,8 @@ Image decode_png(std::span<const std::uint8_t> bytes, std::string_view name) {
   const ImageSize size = open(reader, bytes, name);
   // Deflate packs at most 1032 to 1: a larger picture cannot be in this file, so take no memory for
   // it.
-  const auto least_bits = static_cast<std::int64_t>(size.width) * size.height;
-  if (least_bits / 8 / 1032 > static_cast<std::int64_t>(bytes.size())) {
+  const auto min_bits = static_cast<std::int64_t>(size.width) * size.height;
+  if (min_bits / 8 / 1032 > static_cast<std::int64_t>(bytes.size())) {
     throw FileError(name, "damaged PNG: the file ends too early");
   }
   int channels = 0;

@@ -54,7 +54,7 @@ uint32_t interleaved_bounds(const uint8_t* sketches, const int32_t* slacks, size
   const size_t groups = fixed_groups > 0 ? fixed_groups : query.groups;
   EightInts smallest = EightInts{} + 0x7FFFFFFF;
   const EightInts constant = EightInts{} + query.constant;
-  const EightInts largest_slack = EightInts{} + query.largest_slack;
+  const EightInts max_slack = EightInts{} + query.max_slack;
   for (size_t octet = 0; octet < octets; ++octet) {
     Register sums[registers] = {};
     for (size_t group = 0; group < groups; ++group) {
@@ -73,7 +73,7 @@ uint32_t interleaved_bounds(const uint8_t* sketches, const int32_t* slacks, size
     EightInts sum;
     Vector::narrow(sums, sum);
     const EightInts slack = *reinterpret_cast<const EightInts*>(slacks + octet * 8);
-    const EightInts taken = slack < largest_slack ? slack : largest_slack;
+    const EightInts taken = slack < max_slack ? slack : max_slack;
     const EightInts difference = sum + constant - taken;
     const EightInts bound = difference > 0 ? difference : EightInts{};
     *reinterpret_cast<EightInts*>(bounds + octet * 8) = bound;
@@ -140,7 +140,7 @@ void DistanceBody<set>::sketch_bounds_at(const uint8_t* sketches, const int32_t*
       sums = sums + Vector::product(sad, Vector::load(query.steps + group));
     }
     const int32_t slack = slacks[indices[i]];
-    const int32_t taken = slack < query.largest_slack ? slack : query.largest_slack;
+    const int32_t taken = slack < query.max_slack ? slack : query.max_slack;
     const int64_t bound = static_cast<int64_t>(Vector::total(sums)) + query.constant - taken;
     bounds[i] = bound < 0 ? 0U : static_cast<uint32_t>(bound);
   }

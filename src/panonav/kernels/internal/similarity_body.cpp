@@ -8,10 +8,10 @@ namespace {
 // Adding it rounds to whole numbers: 1.5 * 2^23.
 constexpr float rounder = 12582912.0F;
 
-// exp(x) for x < 80, 2^least_exponent for what is less; relative error below 4e-6.
-inline float exp_of(float x, float least_exponent) {
+// exp(x) for x < 80, 2^min_exponent for what is less; relative error below 4e-6.
+inline float exp_of(float x, float min_exponent) {
   const float product = x * 1.44269504088896F;
-  const float y = product > least_exponent ? product : least_exponent;
+  const float y = product > min_exponent ? product : min_exponent;
   const float whole = (y + rounder) - rounder;
   const float f = (y - whole) * 0.693147180559945F;
   const float series =

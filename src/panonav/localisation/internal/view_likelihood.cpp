@@ -18,9 +18,9 @@ constexpr double near_spacings = 2.0;  // beyond the border of the references to
 // Mean distance of a place in a square of a grid from the nearest corner.
 constexpr double nearest_spacings = 0.3826;
 
-constexpr std::size_t most_near = 12;  // a grid's square and the ring around it
+constexpr std::size_t max_near = 12;  // a grid's square and the ring around it
 constexpr auto lanes_of_all = static_cast<std::size_t>(kernels::similarity_lanes);
-static_assert(most_near <= lanes_of_all);
+static_assert(max_near <= lanes_of_all);
 
 }  // namespace
 
@@ -43,7 +43,7 @@ ViewLikelihood::ViewLikelihood(const ColumnRanking& ranking, const ObservationMo
   differences_.resize(sites_.size());
   require(!sites_.empty(), "views with a pose", 0.0, ">= 1");
   require(model.spacing_m > 0.0, "spacing of the references", model.spacing_m, "> 0 m");
-  require(model.range_m > 0.0, "range of likeness", model.range_m, "> 0 m");
+  require(model.range_m > 0.0, "range of similarity", model.range_m, "> 0 m");
   fall_.per_metre = static_cast<float>(1.0 / model.range_m);
   index_sites();
 }
@@ -74,7 +74,7 @@ void ViewLikelihood::index_sites() {
     for (; i < entries.size() && std::get<0>(entries[i]) == place.x &&
            std::get<1>(entries[i]) == place.y;
          ++i) {
-      if (taken++ < most_near) near_.push_back(std::get<3>(entries[i]));
+      if (taken++ < max_near) near_.push_back(std::get<3>(entries[i]));
     }
     cell.end = static_cast<std::uint32_t>(near_.size());
     table_.number_of(place);
@@ -101,7 +101,7 @@ void ViewLikelihood::begin(const PackedSignature& view) {
   }
   asked_.emplace(view, ranking_->components());
   compared_sites_.clear();
-  most_likeness_ = 0.0;
+  max_similarity_ = 0.0;
   fall_.blur_square_m2 = 0.0F;
   lanes_.clear();
   ++revision_;
@@ -115,16 +115,16 @@ double ViewLikelihood::compare(std::uint32_t site) {
   const ColumnMatch& match = matches.best;
   const double far = model_.far_difference;
   s.compared_at = number_;
-  const auto likeness_of = [far](const ColumnMatch& m) {
+  const auto similarity_of = [far](const ColumnMatch& m) {
     return static_cast<float>(std::max(0.0, far * far - m.difference * m.difference));
   };
-  s.likeness = likeness_of(match);
-  s.other_likeness = likeness_of(matches.other);
-  s.log_likeness = std::log(s.likeness);
-  s.other_log_likeness = std::log(s.other_likeness);
-  if (static_cast<double>(s.likeness) > most_likeness_) {
-    most_likeness_ = static_cast<double>(s.likeness);
-    const double apart_m = model_.range_m * std::log(far * far / most_likeness_);
+  s.similarity = similarity_of(match);
+  s.other_similarity = similarity_of(matches.other);
+  s.log_similarity = std::log(s.similarity);
+  s.other_log_similarity = std::log(s.other_similarity);
+  if (static_cast<double>(s.similarity) > max_similarity_) {
+    max_similarity_ = static_cast<double>(s.similarity);
+    const double apart_m = model_.range_m * std::log(far * far / max_similarity_);
     const double nearest_m = nearest_spacings * model_.spacing_m;
     fall_.blur_square_m2 =
         static_cast<float>(std::max(0.0, apart_m * apart_m - nearest_m * nearest_m));
@@ -139,7 +139,7 @@ double ViewLikelihood::compare(std::uint32_t site) {
   return match.difference;
 }
 
-std::optional<double> ViewLikelihood::least_difference(std::span<const std::uint32_t> sites) const {
+std::optional<double> ViewLikelihood::min_difference(std::span<const std::uint32_t> sites) const {
   std::optional<double> least;
   for (const std::uint32_t site : sites) {
     if (!compared(site)) continue;
@@ -170,11 +170,11 @@ const kernels::SimilarityLanes& ViewLikelihood::lanes_of(Cell& cell) {
     lanes.x_m[i] = static_cast<float>(s.position.x_m - centre.x_m);
     lanes.y_m[i] = static_cast<float>(s.position.y_m - centre.y_m);
     if (s.compared_at != number_) continue;
-    lanes.log_similarity[i] = s.log_likeness;
+    lanes.log_similarity[i] = s.log_similarity;
     if (!compass_ || std::isnan(s.heading_rad)) continue;
     lanes.heading_rad[i] = s.heading_rad;
     lanes.other_heading_rad[i] = s.other_heading_rad;
-    lanes.other_log_similarity[i] = s.other_log_likeness;
+    lanes.other_log_similarity[i] = s.other_log_similarity;
     lanes.per_square_turn[i] = per_square_turn;
   }
   return lanes;

@@ -16,11 +16,11 @@ namespace panonav {
 
 /// How well one view fits at any pose, also between references (`ObservationModel`).
 ///
-/// The likeness of the view to the references around a pose is correlated with what is expected
+/// The similarity of the view to the references around a pose is correlated with what is expected
 /// there, exp(-distance / range): with amplitude a free, least squares explain
-/// (sum likeness expected)^2 / sum expected^2 of the squared likeness. A heading that differs from
-/// what a reference tells takes that reference's likeness away. References that were not compared
-/// count as unlike.
+/// (sum similarity expected)^2 / sum expected^2 of the squared similarity. A heading that differs
+/// from what a reference tells takes that reference's similarity away. References that were not
+/// compared count as unlike.
 class ViewLikelihood {
  public:
   /// Over the posed views of the ranking's memory; the ranking must outlive *this. Cost: linear in
@@ -33,11 +33,11 @@ class ViewLikelihood {
     Point2 position;
     float reference_heading_rad;  ///< NaN: not known
     float heading_rad;  ///< absolute, of the robot that took the view compared; NaN: not known
-    float likeness;     ///< 0: unlike, or not compared
-    float log_likeness;
+    float similarity;   ///< 0: unlike, or not compared
+    float log_similarity;
     float other_heading_rad;  ///< the second heading that fits (`ColumnMatches`), and
-    float other_likeness;     ///< the likeness then
-    float other_log_likeness;
+    float other_similarity;   ///< the similarity then
+    float other_log_similarity;
     std::uint32_t compared_at;  ///< number of the view that it was compared with
   };
 
@@ -49,7 +49,7 @@ class ViewLikelihood {
   [[nodiscard]] bool compared(std::uint32_t site) const noexcept {
     return sites_[site].compared_at == number_;
   }
-  [[nodiscard]] std::optional<double> least_difference(std::span<const std::uint32_t> sites) const;
+  [[nodiscard]] std::optional<double> min_difference(std::span<const std::uint32_t> sites) const;
 
   /// Log-likelihood of the view at each pose, over that of a view which no reference there
   /// explains; >= 0. Cost: 15 ns a pose where those of one cell follow each other (`arrange`).
@@ -109,7 +109,7 @@ class ViewLikelihood {
   std::uint32_t revision_ = 1;
   std::vector<std::uint32_t> compared_sites_;
   std::optional<ColumnProfiles> asked_;
-  double most_likeness_ = 0.0;
+  double max_similarity_ = 0.0;
   kernels::SimilarityFall fall_{1.0F, 0.0F};
   std::uint32_t number_ = 0;
   double cell_m_ = 1.0;

@@ -15,7 +15,7 @@ namespace panonav {
 namespace {
 
 constexpr int columns = 64;
-constexpr int most_bands = 40;
+constexpr int max_bands = 40;
 constexpr int unknowns = 5;
 
 // A column and its harmonics.
@@ -123,7 +123,7 @@ double AzimuthFlow::turn_rad() const noexcept {
 
 AzimuthFlow refine_flow(const HomingView& before, const HomingView& after, const AzimuthFlow& start,
                         int iterations) {
-  const int bands = std::min(most_bands, after.rows());
+  const int bands = std::min(max_bands, after.rows());
   const int highest = std::min({before.components(), after.components(), columns / 2}) - 1;
   const Bands earlier = bands_of(before, bands, highest);
   const Bands later = bands_of(after, bands, highest);

@@ -20,7 +20,7 @@ constexpr double pi = std::numbers::pi;
 constexpr int columns = 64;
 constexpr int fine_columns = 256;  // of the view that is looked up between columns
 constexpr int iterations = 4;
-constexpr int least_bands = 4;
+constexpr int min_bands = 4;
 // Nearer to the horizon the ground is far and walls begin.
 constexpr double highest_elevation_rad = -10.0 * pi / 180.0;
 constexpr double band_height_rad = 1.75 * pi / 180.0;
@@ -43,7 +43,7 @@ std::optional<GroundBands> ground_bands(const HomingView& view) {
   made.begin = std::max(
       0, static_cast<int>(std::ceil((band.top_rad - highest_elevation_rad) / row_rad - 1e-9)));
   made.bands = (view.rows() - made.begin) / made.rows_per_band;
-  if (made.bands < least_bands) return std::nullopt;
+  if (made.bands < min_bands) return std::nullopt;
   made.step_rad = made.rows_per_band * row_rad;
   made.first_rad = band.top_rad - made.begin * row_rad - 0.5 * made.step_rad;
   return made;

@@ -15,7 +15,7 @@ namespace panonav {
 
 namespace {
 
-constexpr double kWidth = 3.0;            // in deviations: where a spring begins to be given up
+constexpr double kWidth = 3.0;            // in deviations: where a spring begins to be rejected
 constexpr int kIterationsPerWidth = 20;   // at most
 constexpr double kEnough = 1e-7;          // relative change of the energy
 constexpr double kEnoughOnTheWay = 1e-3;  // the same before the widths are narrow

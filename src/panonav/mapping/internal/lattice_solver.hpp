@@ -36,24 +36,24 @@ struct SpringTerm {
   std::optional<SpringDirection> direction;
   std::optional<SpringLength> along_direction;  ///< counts with a direction only
   std::optional<SpringTurn> turn;
-  bool certain = false;  ///< never given up, however far it is stretched
+  bool certain = false;  ///< never rejected, however far it is stretched
 };
 
 struct LatticeSolution {
   /// What is left of each spring, by its direction and turn where it has them, else by its length,
-  /// 1 .. 0: near 0 it was given up, as it contradicts the others.
+  /// 1 .. 0: near 0 it was rejected, as it contradicts the others.
   std::vector<double> weights;
   double energy = 0.0;  ///< sum over springs of weight times squared strain in deviations
   int iterations = 0;
 };
 
 /// Moves the poses to the least energy of the springs [M04 section 3.2], by sparse non-linear least
-/// squares with damping. What contradicts the rest is given up little by little: Geman-McClure loss
+/// squares with damping. What contradicts the rest is rejected little by little: Geman-McClure loss
 /// whose width shrinks from that of the worst spring to three deviations, or more where the median
 /// strain says that deviations were given too small (graduated non-convexity). So the result
-/// depends little on the start. Direction and turn are given up together, lengths each by itself:
+/// depends little on the start. Direction and turn are rejected together, lengths each by itself:
 /// far views tell direction well and distance badly. `moving`: one entry per pose, 0 keeps the
-/// pose; empty: all move. A part without a fixed pose stays about where it was. Throws
+/// pose; empty: all move. A component without a fixed pose stays about where it was. Throws
 /// ContractError on indices or numbers out of range. The same input gives the same bits. Cost per
 /// iteration: one sparse factorisation.
 LatticeSolution solve_lattice(std::span<const SpringTerm> springs, std::span<Pose2> poses,

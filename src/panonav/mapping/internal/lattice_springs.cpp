@@ -47,8 +47,8 @@ SpringViews::SpringViews(const VisualMemory& memory, const LatticeOptions& optio
   }
 }
 
-std::vector<NodePair> SpringViews::most_alike(const LatticeOptions& options,
-                                              Executor& executor) const {
+std::vector<NodePair> SpringViews::most_similar(const LatticeOptions& options,
+                                                Executor& executor) const {
   const auto views = memory_->views();
   std::vector<std::vector<NodePair>> found(views.size());
   executor.for_chunks(views.size(), 16, [&](std::size_t begin, std::size_t end, std::size_t) {

@@ -23,9 +23,9 @@ class SpringViews {
   SpringViews(const VisualMemory& memory, const LatticeOptions& options);
 
   [[nodiscard]] std::size_t size() const noexcept { return packed_.size(); }
-  /// The `neighbours` most alike views of each view. Ascending, each pair once.
-  [[nodiscard]] std::vector<NodePair> most_alike(const LatticeOptions& options,
-                                                 Executor& executor) const;
+  /// The `neighbours` most similar views of each view. Ascending, each pair once.
+  [[nodiscard]] std::vector<NodePair> most_similar(const LatticeOptions& options,
+                                                   Executor& executor) const;
   [[nodiscard]] double dissimilarity(NodePair pair) const;
   /// Dissimilarity and, where wanted, phases; no length yet. `hint`: turn from the first to the
   /// second node.

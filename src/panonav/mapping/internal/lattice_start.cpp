@@ -18,17 +18,17 @@ namespace panonav {
 
 namespace {
 
-std::vector<std::vector<std::size_t>> members_of(const std::vector<std::size_t>& parts) {
+std::vector<std::vector<std::size_t>> members_of(const std::vector<std::size_t>& components) {
   std::vector<std::vector<std::size_t>> members;
-  for (std::size_t node = 0; node < parts.size(); ++node) {
-    if (parts[node] >= members.size()) members.resize(parts[node] + 1);
-    members[parts[node]].push_back(node);
+  for (std::size_t node = 0; node < components.size(); ++node) {
+    if (components[node] >= members.size()) members.resize(components[node] + 1);
+    members[components[node]].push_back(node);
   }
   return members;
 }
 
 /// Headings from the springs whose views agree best: a spanning tree of least disagreement. The
-/// first view of each part has heading 0.
+/// first view of each component has heading 0.
 void set_headings(const LatticeGraph& graph, std::span<const LatticeSpring> springs,
                   std::vector<Pose2>& poses) {
   using Open = std::tuple<double, std::size_t, std::size_t>;  // disagreement, spring, node
@@ -77,16 +77,16 @@ std::vector<std::size_t> choose_landmarks(const LatticeGraph& graph, std::size_t
   return landmarks;
 }
 
-/// Turns, and mirrors if that fits better, the positions of one part until its springs point where
-/// the views say. False when no spring points anywhere.
+/// Turns, and mirrors if that fits better, the positions of one component until its springs point
+/// where the views say. False when no spring points anywhere.
 bool turn_to_directions(const std::vector<std::size_t>& members,
-                        const std::vector<std::size_t>& parts,
+                        const std::vector<std::size_t>& components,
                         std::span<const LatticeSpring> springs, std::vector<Pose2>& poses) {
   std::vector<Point2> laid_out;
   std::vector<Point2> seen;
-  const std::size_t part = parts[members.front()];
+  const std::size_t component = components[members.front()];
   for (const LatticeSpring& spring : springs) {
-    if (parts[spring.a] != part || !spring.phases || !spring.phases->points) continue;
+    if (components[spring.a] != component || !spring.phases || !spring.phases->points) continue;
     const Pose2& a = poses[spring.a];
     const Pose2& b = poses[spring.b];
     const double length = distance(a.position(), b.position());
@@ -124,14 +124,14 @@ LatticeStart lay_out_by_springs(std::size_t nodes, std::span<const LatticeSpring
   std::vector<GraphEdge> edges;
   for (const auto& spring : springs) edges.push_back({spring.a, spring.b, spring.length});
   const LatticeGraph graph(nodes, edges);
-  LatticeStart start{.poses = std::vector<Pose2>(nodes), .parts = graph.parts()};
+  LatticeStart start{.poses = std::vector<Pose2>(nodes), .components = graph.components()};
   set_headings(graph, springs, start.poses);
   std::vector<std::size_t> local(nodes);
-  for (const auto& members : members_of(start.parts)) {
+  for (const auto& members : members_of(start.components)) {
     for (std::size_t i = 0; i < members.size(); ++i) local[members[i]] = i;
     std::vector<GraphEdge> own;
     for (const GraphEdge& edge : edges) {
-      if (start.parts[edge.a] != start.parts[members.front()]) continue;
+      if (start.components[edge.a] != start.components[members.front()]) continue;
       own.push_back({local[edge.a], local[edge.b], edge.length});
     }
     std::vector<double> distances;
@@ -143,7 +143,7 @@ LatticeStart lay_out_by_springs(std::size_t nodes, std::span<const LatticeSpring
       start.poses[members[i]].y_m = points[i].y_m;
     }
     start.handedness_known.push_back(
-        turn_to_directions(members, start.parts, springs, start.poses) ? 1 : 0);
+        turn_to_directions(members, start.components, springs, start.poses) ? 1 : 0);
   }
   return start;
 }
@@ -168,9 +168,9 @@ LatticeStart lay_out_by_motion(std::size_t nodes, std::span<const NodeMotion> mo
   std::vector<GraphEdge> edges;
   for (const auto& motion : motions) edges.push_back({motion.a, motion.b, 1.0});
   const LatticeGraph graph(nodes, edges);
-  LatticeStart start{.poses = std::vector<Pose2>(nodes), .parts = graph.parts()};
+  LatticeStart start{.poses = std::vector<Pose2>(nodes), .components = graph.components()};
   std::vector<unsigned char> done(nodes);
-  start.handedness_known.assign(members_of(start.parts).size(), 0);
+  start.handedness_known.assign(members_of(start.components).size(), 0);
   for (std::size_t first = 0; first < nodes; ++first) {
     if (done[first] != 0) continue;
     // Breadth first: as few steps as can be add up their errors.
@@ -198,7 +198,7 @@ LatticeStart lay_out_by_motion(std::size_t nodes, std::span<const NodeMotion> mo
         }
         start.poses[neighbour.node] = start.poses[from] * (from == moved.a ? step : inverse(step));
         done[neighbour.node] = 1;
-        start.handedness_known[start.parts[from]] = 1;
+        start.handedness_known[start.components[from]] = 1;
         open.push(neighbour.node);
       }
     }

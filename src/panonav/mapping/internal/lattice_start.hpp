@@ -18,19 +18,20 @@ struct NodeMotion {
 /// Where relaxing starts.
 struct LatticeStart {
   std::vector<Pose2> poses;
-  std::vector<std::size_t> parts;               ///< number of each node's part
-  std::vector<unsigned char> handedness_known;  ///< of each part
+  std::vector<std::size_t> components;          ///< number of each node's component
+  std::vector<unsigned char> handedness_known;  ///< of each component
 };
 
 /// Lays out `nodes` views by the rest lengths of the springs: multidimensional scaling of the
-/// shortest ways, part by part; headings along the springs whose views agree best; the mirror image
-/// that fits the directions better. Cost: landmarks * (springs log n) + landmarks^3.
+/// shortest ways, component by component; headings along the springs whose views agree best; the
+/// mirror image that fits the directions better. Cost: landmarks * (springs log n) + landmarks^3.
 [[nodiscard]] LatticeStart lay_out_by_springs(std::size_t nodes,
                                               std::span<const LatticeSpring> springs,
                                               int landmarks);
 
-/// Follows the motions from node to node, part by part; where a spring of `springs` joins the same
-/// two nodes and what its phases say is compatible with the motion, it gives turn and direction.
+/// Follows the motions from node to node, component by component; where a spring of `springs` joins
+/// the same two nodes and what its phases say is compatible with the motion, it gives turn and
+/// direction.
 [[nodiscard]] LatticeStart lay_out_by_motion(std::size_t nodes, std::span<const NodeMotion> motions,
                                              std::span<const LatticeSpring> springs);
 

@@ -157,7 +157,7 @@ class Search {
     static_assert(SketchIndex::rows_per_segment % chunk == 0);
     // Now and then the fine bounds get a new chance: the limit sinks while the scan runs.
     constexpr std::size_t retry = 16;
-    constexpr std::size_t most_waiting = 2048;
+    constexpr std::size_t max_waiting = 2048;
     std::array<std::uint32_t, chunk + 16> found{};
     std::array<std::uint32_t, chunk> fine_bounds{};
     std::vector<Bounded> waiting;
@@ -176,7 +176,7 @@ class Search {
           }
         }
         benefit.count(passed, waiting.size() - before);
-        if (waiting.size() >= most_waiting || !benefit.pays()) compare(waiting, nearest);
+        if (waiting.size() >= max_waiting || !benefit.pays()) compare(waiting, nearest);
       } else {
         for (std::size_t i = 0; i < passed; ++i) {
           // The processor itself looks ahead from row to row.

@@ -71,7 +71,7 @@ void encode_query(const SketchScale& scale, bool covers, std::span<const std::in
                   std::span<const std::uint8_t> mask, std::size_t groups, std::uint8_t* values,
                   kernels::SketchQuery& encoded) {
   std::int32_t constant = 0;
-  std::int32_t largest_slack = 0;
+  std::int32_t max_slack = 0;
   groups = std::min(groups, scale.steps.size());
   for (std::size_t group = 0; group < groups; ++group) {
     std::array<std::int32_t, group_bytes> offsets{};
@@ -94,13 +94,13 @@ void encode_query(const SketchScale& scale, bool covers, std::span<const std::in
     constant -= encode_group(inside.data(), offsets.data(), step, scale.inverse_steps[group],
                              values + group * group_bytes);
     for (const std::int32_t count : counts) {
-      largest_slack += count * static_cast<std::int32_t>(step / 2 + 1);
+      max_slack += count * static_cast<std::int32_t>(step / 2 + 1);
     }
   }
   encoded.steps = scale.steps.data();
   encoded.groups = groups;
   encoded.constant = constant;
-  encoded.largest_slack = covers ? largest_slack : static_cast<std::int32_t>(SketchIndex::no_view);
+  encoded.max_slack = covers ? max_slack : static_cast<std::int32_t>(SketchIndex::no_view);
 }
 
 }  // namespace

@@ -87,7 +87,7 @@ struct Progress {
   int steps = 0;
   int attempts = 0;
   int ways_sought = 0;  ///< from places without one, in this attempt
-  double least_way = std::numeric_limits<double>::infinity();  ///< since the last plan
+  double min_way = std::numeric_limits<double>::infinity();  ///< since the last plan
   int steps_in_vain = 0;                   ///< since the way became shorter or an edge was closed
   std::map<std::size_t, EdgeTries> tries;  ///< by edge, since the way became shorter
   bool closed_here = false;                ///< an edge, and the robot was not far from there since

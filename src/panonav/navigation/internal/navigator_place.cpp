@@ -56,7 +56,7 @@ Navigator::Core::Located Navigator::Core::search_around(const SeenView& view) {
   located.around = nodes_around(graph(), {&*place.node, 1}, options.near_links);
   located.here = views.nearest(graph(), located.around, view);
   // Where references stand close together a step leads beyond those: from the outermost on the
-  // search goes on, if it finds more alike ones.
+  // search goes on, if it finds more similar ones.
   std::size_t centre = *place.node;
   for (int round = 0; round < rounds_farther && located.here; ++round) {
     const auto inner = nodes_around(graph(), {&centre, 1}, options.near_links - 1);
@@ -93,7 +93,7 @@ void Navigator::Core::accept(const Located& located, Step& step) {
     doubt.elsewhere_steps = 0;
     doubt.elsewhere.reset();
   }
-  const bool accepted = doubt.elsewhere_steps >= options.agreeing_looks;
+  const bool accepted = doubt.elsewhere_steps >= options.min_agreeing_steps;
   const auto& found = accepted ? located.anywhere : located.here;
   if (found) {
     step.decision.difference = found->difference;
@@ -108,7 +108,7 @@ void Navigator::Core::accept(const Located& located, Step& step) {
 }
 
 void Navigator::Core::locate(Step& step) {
-  const bool line_tells = pilot.drives() && pilot.unknown_looks() == 0;
+  const bool line_tells = pilot.drives() && pilot.unknown_steps() == 0;
   std::optional<ViewId> told = step.report.estimate;
   if (!told && line_tells) told = pilot.place();
   if (told) {
@@ -141,7 +141,7 @@ void Navigator::Core::locate(Step& step) {
   }
   step.note(NavigationEvent::unknown_place);
   ++unknown_steps;
-  if (unknown_steps % options.agreeing_looks == 0) relocalise(step);
+  if (unknown_steps % options.min_agreeing_steps == 0) relocalise(step);
   if (looks_right()) {
     unknown_steps = 0;
     place.known_node = place.node;

@@ -16,7 +16,7 @@ namespace panonav {
 namespace {
 
 // A vector of less confidence is as likely as not but the error of reading it.
-constexpr double least_confidence = 0.5;
+constexpr double min_confidence = 0.5;
 // How a robot that is obstructed tries to get past: so many times before the way counts as blocked.
 constexpr std::array<double, 5> detours_rad{0.0, 0.7, -0.7, 1.3, -1.3};
 // Edges that cross a bar lie within so many of its place.
@@ -82,10 +82,10 @@ void Navigator::Core::try_again(Step& step, NavigationState otherwise) {
   plan_anew();
 }
 
-// From a place without a way the robot goes on as if it were at the most alike one that has a way:
-// the memory does not hold every way between neighbours. Not for ever, as there may be none.
+// From a place without a way the robot goes on as if it were at the most similar one that has a
+// way: the memory does not hold every way between neighbours. Not for ever, as there may be none.
 bool Navigator::Core::find_way_from_here(Step& step) {
-  if (progress.ways_sought >= options.agreeing_looks) return false;
+  if (progress.ways_sought >= options.min_agreeing_steps) return false;
   ++progress.ways_sought;
   const SubAreas& areas = planner.areas();
   std::vector<std::uint8_t> has_way(graph().size());
@@ -118,13 +118,13 @@ void Navigator::Core::count_try() {
   const auto tried = last.aimed_for ? progress.tries.find(*last.aimed_for) : progress.tries.end();
   if (tried != progress.tries.end()) tried->second.obstructed += static_cast<int>(obstruction.now);
   ++progress.steps_in_vain;
-  if (way < progress.least_way) {
+  if (way < progress.min_way) {
     // The first observation of a plan is no progress.
-    if (std::isfinite(progress.least_way)) {
+    if (std::isfinite(progress.min_way)) {
       progress.tries.clear();
       progress.steps_in_vain = 0;
     }
-    progress.least_way = way;
+    progress.min_way = way;
   }
 }
 
@@ -133,7 +133,7 @@ void Navigator::Core::notice_obstacles(Step& step) {
   if (last.direction_rad && last.view) {
     const HomeVector back = home_vector_unchecked(*last.view, step.view.view, short_way);
     // The robot stood. Along a route steps may be short, and lines tell the place.
-    obstruction.now |= !pilot.drives() && back.confidence < least_confidence &&
+    obstruction.now |= !pilot.drives() && back.confidence < min_confidence &&
                        image_difference(*last.view, step.view.view) <
                            0.5 * std::min(scales.place.neighbours, scales.coarse.neighbours);
     step.heading_for_rad = wrap_angle(*last.direction_rad + back.heading_rad);
@@ -182,7 +182,7 @@ int Navigator::Core::patience() const {
   if (*place.node != goal->node) {
     length = relative_length(plan.under_way ? plan.under_way->guide : guide());
   }
-  return static_cast<int>(std::ceil(options.passage_patience * std::max(1.0, length)));
+  return static_cast<int>(std::ceil(options.edge_patience * std::max(1.0, length)));
 }
 
 // By how much the direction is turned: to get past what is in the way, or, where a direction turned

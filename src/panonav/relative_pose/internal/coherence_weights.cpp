@@ -6,11 +6,11 @@
 
 namespace panonav {
 
-PerFrequency fitted_bell(const PerFrequency& coherences, int highest) {
+PerFrequency fitted_gaussian(const PerFrequency& coherences, int highest) {
   PerFrequency best{};
   double most = -std::numeric_limits<double>::infinity();
   for (double width = 1.5; width < 3.0 * highest; width *= 1.19) {
-    PerFrequency bell{};
+    PerFrequency gaussian{};
     const double step = std::exp(-0.5 / (width * width));
     double value = step;
     double ratio = step * step * step;  // step^(2 k + 1)
@@ -18,7 +18,7 @@ PerFrequency fitted_bell(const PerFrequency& coherences, int highest) {
     double square = 0.0;
     for (int k = 1; k <= highest; ++k) {
       const auto i = static_cast<std::size_t>(k);
-      bell[i] = value;
+      gaussian[i] = value;
       common += value * coherences[i];
       square += value * value;
       value *= ratio;
@@ -27,7 +27,7 @@ PerFrequency fitted_bell(const PerFrequency& coherences, int highest) {
     const double gain = common / std::sqrt(square);
     if (gain > most) {
       most = gain;
-      best = bell;
+      best = gaussian;
     }
   }
   return best;

@@ -9,12 +9,12 @@
 namespace panonav {
 
 /// A number for each frequency; 0 counts for nothing.
-using PerFrequency = std::array<double, TurnCorrelation::most_frequencies + 1>;
+using PerFrequency = std::array<double, TurnCorrelation::max_frequencies + 1>;
 
-/// The bell exp(-k^2 / (2 width^2)) that is nearest to the coherences in least squares, up to its
-/// height: noise lowers all coherences, distance the high ones first. One row gives little more
+/// The Gaussian exp(-k^2 / (2 width^2)) that is nearest to the coherences in least squares, up to
+/// its height: noise lowers all coherences, distance the high ones first. One row gives little more
 /// than a sign for each frequency, so only one number is asked of all of them.
-[[nodiscard]] PerFrequency fitted_bell(const PerFrequency& coherences, int highest);
+[[nodiscard]] PerFrequency fitted_gaussian(const PerFrequency& coherences, int highest);
 
 /// Weights over amplitudes; their sum stays. `power`: the mean of the powers.
 void over_amplitude(PerFrequency& weights, const PerFrequency& powers, double power, int highest);

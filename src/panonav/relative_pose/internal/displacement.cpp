@@ -14,7 +14,7 @@ namespace panonav {
 namespace {
 
 constexpr double pi = std::numbers::pi;
-constexpr std::size_t size = most_displaced_frequencies + 1;
+constexpr std::size_t size = max_displaced_frequencies + 1;
 
 // Displacements by n rings must leave n^2 % less than none.
 // Chosen between 0, 1 and 3 % on the arena (seed 501), the lab and the office (seed 901).

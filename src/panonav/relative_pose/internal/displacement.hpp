@@ -26,7 +26,7 @@ struct Displacement {
 inline constexpr int searched_frequencies = 8;
 
 /// The highest frequency that `displace` can take or give.
-inline constexpr int most_displaced_frequencies = 63;
+inline constexpr int max_displaced_frequencies = 63;
 
 /// The coefficients of the expected image [S06 eq. 3, no turn] for one row: what a robot sees there
 /// when all things are at distance R. `from_a`, `from_b`: frequencies 0 .. from_a.size() - 1 of the

@@ -79,7 +79,7 @@ void PairEquations::add(const PairEquations& other, double weight) noexcept {
   energy_of_views += weight * other.energy_of_views;
 }
 
-void LeanEquations::add(const LeanEquations& other, double weight) noexcept {
+void TiltEquations::add(const TiltEquations& other, double weight) noexcept {
   for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += weight * other.sums[i];
 }
 
@@ -110,7 +110,7 @@ PairEquations pair_equations(PairCoefficients& coefficients, int k, std::size_t 
   return {{m00, m01, m02, m11, m12, m22}, {v0, v1, v2}, energy, both};
 }
 
-LeanEquations lean_equations(PairCoefficients& coefficients, int k, std::size_t rows,
+TiltEquations tilt_equations(PairCoefficients& coefficients, int k, std::size_t rows,
                              const RowTerms& terms) {
   const ComponentRows at(coefficients, k);
   std::array<float, 11> sums{};
@@ -138,14 +138,14 @@ LeanEquations lean_equations(PairCoefficients& coefficients, int k, std::size_t 
     sums[9] += weight * (pa * ea + pb * eb);
     sums[10] += weight * (qa * ea + qb * eb);
   }
-  LeanEquations equations;
+  TiltEquations equations;
   std::copy(sums.begin(), sums.end(), equations.sums.begin());
   return equations;
 }
 
-PairEquations without_lean(PairEquations equations, const LeanEquations& lean,
+PairEquations without_tilt(PairEquations equations, const TiltEquations& tilt,
                            double certain) noexcept {
-  const auto& s = lean.sums;
+  const auto& s = tilt.sums;
   const double pp = s[6] + certain;
   const double qq = s[8] + certain;
   const double determinant = pp * qq - s[7] * s[7];

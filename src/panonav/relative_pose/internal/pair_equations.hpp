@@ -35,7 +35,7 @@ class PairCoefficients {
 
  private:
   static constexpr std::size_t arrays = 8;
-  static constexpr std::size_t stacked = TurnCorrelation::most_frequencies + 2;
+  static constexpr std::size_t stacked = TurnCorrelation::max_frequencies + 2;
   [[nodiscard]] float* at(std::size_t array, int k) noexcept {
     float* const first = on_heap_.empty() ? on_stack_.data() : on_heap_.data();
     return first + array * size_ + static_cast<std::size_t>(k) * rows_;
@@ -50,7 +50,7 @@ class PairCoefficients {
 struct RowTerms {
   std::span<const float> weights;   ///< empty: all alike
   std::span<const float> approach;  ///< how fast things rise as the robot comes nearer; empty: not
-  std::span<const float> tangent;   ///< of the elevation; for `lean_equations` only
+  std::span<const float> tangent;   ///< of the elevation; for `tilt_equations` only
 };
 
 /// Normal equations of the correction of the heading, xi and eta, in this order [S06 eq. 30].
@@ -63,25 +63,25 @@ struct PairEquations {
   void add(const PairEquations& other, double weight) noexcept;
 };
 
-/// What a lean in two directions, P and Q, adds to them: PD Px Pe, QD Qx Qe, PP PQ QQ, right sides
+/// What a tilt in two directions, P and Q, adds to them: PD Px Pe, QD Qx Qe, PP PQ QQ, right sides
 /// P Q.
-struct LeanEquations {
+struct TiltEquations {
   std::array<double, 11> sums{};
 
-  void add(const LeanEquations& other, double weight) noexcept;
+  void add(const TiltEquations& other, double weight) noexcept;
 };
 
 /// What component k of all rows contributes.
 [[nodiscard]] PairEquations pair_equations(PairCoefficients& coefficients, int k, std::size_t rows,
                                            const RowTerms& terms);
-/// The same of a lean of the robot, which moves things up and down by P cos phi + Q sin phi, and
+/// The same of a tilt of the robot, which moves things up and down by P cos phi + Q sin phi, and
 /// those off the horizon to the side by tan(elevation) (P sin phi - Q cos phi).
-[[nodiscard]] LeanEquations lean_equations(PairCoefficients& coefficients, int k, std::size_t rows,
+[[nodiscard]] TiltEquations tilt_equations(PairCoefficients& coefficients, int k, std::size_t rows,
                                            const RowTerms& terms);
 
-/// The normal equations once the lean that fits best is taken out. `certain`: the inverse variance
-/// of the lean, in units of that of an equation.
-[[nodiscard]] PairEquations without_lean(PairEquations equations, const LeanEquations& lean,
+/// The normal equations once the tilt that fits best is taken out. `certain`: the inverse variance
+/// of the tilt, in units of that of an equation.
+[[nodiscard]] PairEquations without_tilt(PairEquations equations, const TiltEquations& tilt,
                                          double certain) noexcept;
 
 struct PairSolution {

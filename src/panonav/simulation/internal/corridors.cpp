@@ -26,14 +26,14 @@ void add_ceiling_lamp(SceneBuilder& builder, int shine, Point2 at, double height
   builder.box("lamp", shine, shine, {at, 0.0}, {0.0, 0.0, height_m - 0.07}, {0.6, 0.2, 0.05});
 }
 
-struct CorridorLook {
+struct CorridorStyle {
   int plaster, rail, door;
   double height_m;
 };
 
 // A closed run of walls parallel to the axes, seen from the left, with a rail all along. A door
 // stands at every even coordinate where there is room for it.
-void add_wall_with_doors(SceneBuilder& builder, const std::string& name, const CorridorLook& look,
+void add_wall_with_doors(SceneBuilder& builder, const std::string& name, const CorridorStyle& look,
                          std::span<const Point2> corners) {
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const Point2 from = corners[i];
@@ -54,7 +54,7 @@ void add_wall_with_doors(SceneBuilder& builder, const std::string& name, const C
 }
 
 // The wall above an opening.
-void add_lintel(SceneBuilder& builder, const CorridorLook& look, Point2 from, Point2 to) {
+void add_lintel(SceneBuilder& builder, const CorridorStyle& look, Point2 from, Point2 to) {
   builder.wall("lintel", look.plaster, from, to, look.height_m, 2.0, 2.3);
 }
 
@@ -191,7 +191,7 @@ Scene make_corridor(const SceneVariation& variation) {
       builder.textured(noise_texture(random, 128, tint(random, 0.15, 0.5, 0.2), 0.08));
   builder.floor(carpet, low, high, 1.0);
   builder.ceiling(builder.plain({0.85F, 0.85F, 0.84F}), low, high, kHeight, 1.0);
-  const CorridorLook look{
+  const CorridorStyle look{
       builder.textured(noise_texture(random, 128, tint(random, 0.5, 0.75, 0.1), 0.04)),
       builder.plain(tint(random, 0.1, 0.4, 0.2)),
       builder.textured(door_texture(random, 128, tint(random, 0.1, 0.45, 0.3))), kHeight};

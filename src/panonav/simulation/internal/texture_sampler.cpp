@@ -39,7 +39,7 @@ MaterialSampler::MaterialSampler(const Material& material, int channels)
           static_cast<std::uint8_t>(std::clamp(grey(colour) / grey_scale + 0.5F, 0.0F, 255.0F));
     }
   }
-  largest_side_ = static_cast<float>(std::max(base.width, base.height));
+  max_side_ = static_cast<float>(std::max(base.width, base.height));
   levels_.push_back(std::move(base));
   while (levels_.back().width > 1 || levels_.back().height > 1) {
     const Level& fine = levels_.back();
@@ -106,7 +106,7 @@ void MaterialSampler::sample(float u, float v, float footprint, float* values) c
   std::fill_n(values, channels_, 0.0F);
   u -= std::floor(u);
   v = std::ceil(v) - v;  // texture coordinates run upwards, rows downwards
-  const float level = std::log2(std::max(1.0F, footprint * largest_side_));
+  const float level = std::log2(std::max(1.0F, footprint * max_side_));
   const auto last = static_cast<float>(levels_.size() - 1);
   if (level <= 0.0F) {
     bilinear(levels_.front(), u, v, 1.0F, values);

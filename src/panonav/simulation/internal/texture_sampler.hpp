@@ -31,7 +31,7 @@ class MaterialSampler {
   int channels_;
   float emission_;
   std::array<float, 3> scale_{};  // value = scale * texel, or the value itself without a texture
-  float largest_side_ = 1.0F;
+  float max_side_ = 1.0F;
   std::vector<Level> levels_;
 };
 

@@ -12,7 +12,7 @@ namespace panonav {
 
 namespace {
 
-// Records of little-endian numbers: view, part, x, y, heading; and a, b, kind, x, y, heading,
+// Records of little-endian numbers: view, component, x, y, heading; and a, b, kind, x, y, heading,
 // weight.
 constexpr std::size_t node_bytes = 2 * 4 + 3 * 8;
 constexpr std::size_t edge_bytes = 3 * 4 + 4 * 8;
@@ -79,7 +79,7 @@ void write_map(Database& database, std::string_view name, const TopologicalMap& 
   std::vector<std::uint8_t> nodes;
   for (const MapNode& node : map.nodes) {
     append_word(nodes, node.view.value);
-    append_word(nodes, static_cast<std::uint32_t>(node.part));
+    append_word(nodes, static_cast<std::uint32_t>(node.component));
     append_pose(nodes, node.pose);
   }
   std::vector<std::uint8_t> edges;
@@ -115,7 +115,7 @@ std::optional<TopologicalMap> read_map(Database& database, std::string_view name
   for (std::size_t i = 0; i < nodes.size() / node_bytes; ++i) {
     MapNode node;
     node.view.value = node_reader.number();
-    node.part = node_reader.number();
+    node.component = node_reader.number();
     node.pose = node_reader.pose();
     map.nodes.push_back(node);
   }

@@ -52,9 +52,9 @@ std::int64_t block_checksum(std::string_view name, std::int64_t number,
 std::optional<RouteRow> read_row(Database& database, std::string_view name) {
   Statement row(database, "SELECT columns, lines, checksum FROM routes WHERE name = ?");
   if (!row.bind(1, name).step()) return std::nullopt;
-  constexpr std::int64_t most_columns = 16384;
+  constexpr std::int64_t max_columns = 16384;
   const std::int64_t columns = row.integer(0);
-  if (columns < 16 || columns > most_columns) {
+  if (columns < 16 || columns > max_columns) {
     fail_route(database, name, "columns are " + std::to_string(columns) + "; allowed: 16 to 16384");
   }
   const RouteRow route{static_cast<int>(columns), row.integer(1)};

@@ -1,4 +1,4 @@
-#include "panonav/route/horizon_line.hpp"
+#include "panonav/route/horizon_scanline.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -46,8 +46,8 @@ std::vector<float> mean_row(const Panorama& panorama, double half_band_rad) {
 
 }  // namespace
 
-void visit_options(HorizonLineOptions& options, OptionVisitor& visitor) {
-  using T = HorizonLineOptions;
+void visit_options(HorizonScanlineOptions& options, OptionVisitor& visitor) {
+  using T = HorizonScanlineOptions;
   constexpr OptionTable table{
       option<&T::columns>("values of a line", 16, 16384),
       option<&T::half_band_rad>("rows so near to the horizon are averaged", 0, 0.5),
@@ -55,7 +55,8 @@ void visit_options(HorizonLineOptions& options, OptionVisitor& visitor) {
   table.visit(options, visitor);
 }
 
-std::vector<float> horizon_line(const Panorama& panorama, const HorizonLineOptions& options) {
+std::vector<float> horizon_scanline(const Panorama& panorama,
+                                    const HorizonScanlineOptions& options) {
   validate(options);
   const auto row = mean_row(panorama, options.half_band_rad);
   const auto from = static_cast<double>(row.size());

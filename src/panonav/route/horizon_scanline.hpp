@@ -7,14 +7,14 @@
 
 namespace panonav {
 
-struct HorizonLineOptions {
+struct HorizonScanlineOptions {
   int columns = 360;  ///< of the line: a byte a degree, as [Y03 section 2.2]
   /// Rows whose middle lies so near to the horizon are averaged. Light in the plane of the horizon
   /// goes straight from place to place, light above and below does not: keep it narrow.
   double half_band_rad = 0.0131;
-  friend bool operator==(const HorizonLineOptions&, const HorizonLineOptions&) = default;
+  friend bool operator==(const HorizonScanlineOptions&, const HorizonScanlineOptions&) = default;
 };
-void visit_options(HorizonLineOptions& options, OptionVisitor& visitor);
+void visit_options(HorizonScanlineOptions& options, OptionVisitor& visitor);
 
 /// The horizon scanline: the view in the plane of the camera [Y03 section 2.2]: `columns` values
 /// from column 0, straight ahead, counter-clockwise. Rows within the band are averaged, or the two
@@ -22,7 +22,7 @@ void visit_options(HorizonLineOptions& options, OptionVisitor& visitor);
 /// taken as on the horizon. Columns are averaged where the panorama has more than asked for,
 /// interpolated where it has fewer. Throws OptionError, and ContractError when the horizon lies
 /// outside the panorama.
-[[nodiscard]] std::vector<float> horizon_line(const Panorama& panorama,
-                                              const HorizonLineOptions& options = {});
+[[nodiscard]] std::vector<float> horizon_scanline(const Panorama& panorama,
+                                                  const HorizonScanlineOptions& options = {});
 
 }  // namespace panonav
