@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "reporting/picture_plot.hpp"
 
 extern char** environ;
@@ -25,14 +26,34 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Text for a gnuplot string in double quotes, shown as it is (no markup).
-std::string quoted(const std::string& text) {
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') result += '\\';
-    result += c == '\n' ? ' ' : c;
+// Text for gnuplot, shown as it is. gnuplot runs what stands between backquotes in a string of
+// double quotes; a string of single quotes holds no command, no escape and no macro, and a quote is
+// written twice. Terminals are `noenhanced`: there is no markup either.
+std::string gnuplot_text(const std::string& text) {
+  constexpr std::size_t max_characters = 160;  // more than a picture is wide
+  std::string result = "'";
+  for (const char c : shortened(readable_line(text), max_characters)) {
+    if (c == '\'') result += '\'';
+    result += c;
   }
-  return result + "\"";
+  return result + "'";
+}
+
+// A label at a tick, which gnuplot reads as a format for the number there and of which it draws
+// nothing when it is long.
+std::string gnuplot_tick(const std::string& text) {
+  constexpr std::size_t max_bytes = 48;
+  std::string format;
+  for (std::size_t characters = max_bytes; format.empty() || format.size() > max_bytes;
+       --characters) {
+    format.clear();
+    for (const char c : shortened(readable_line(text), characters)) {
+      if (c == '%') format += '%';
+      format += c;
+    }
+    if (format.empty()) break;
+  }
+  return gnuplot_text(format);
 }
 
 std::string number(double value) {
@@ -56,16 +77,18 @@ struct TemporaryFile {
   TemporaryFile& operator=(const TemporaryFile&) = delete;
 };
 
-int run_gnuplot(const fs::path& script, const fs::path& log) {
+// Commands come from standard input and the picture goes to standard output: a path that gnuplot
+// reads can be an option or, after "set output", a command to pipe to.
+int run_gnuplot(const fs::path& script, const fs::path& picture, const fs::path& log) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, log.c_str(),
-                                   O_WRONLY | O_CREAT | O_TRUNC, 0600);
+  constexpr int written = O_WRONLY | O_CREAT | O_TRUNC;
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, script.c_str(), O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, picture.c_str(), written, 0666);
+  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, log.c_str(), written, 0600);
   std::string program = "gnuplot";
-  std::string file = script.string();
-  const std::array<char*, 3> arguments{program.data(), file.data(), nullptr};
+  std::string standard_input = "-";
+  const std::array<char*, 3> arguments{program.data(), standard_input.data(), nullptr};
   pid_t child = 0;
   const int error =
       posix_spawnp(&child, program.c_str(), &actions, nullptr, arguments.data(), environ);
@@ -95,9 +118,8 @@ void draw(const fs::path& path, PictureSize size, const std::string& body) {
   text << "set encoding utf8\nset terminal " << (vector_picture ? "svg" : "pngcairo")
        << " noenhanced size " << size.width << "," << size.height
        << " background rgb \"white\" font \"DejaVu Sans," << (vector_picture ? 12 : 11) << "\"\n"
-       << "set output " << quoted(picture.path.string()) << "\n"
        << "set border lc rgb \"#444444\"\nset grid lc rgb \"#dddddd\" lw 1\n"
-       << body << "\nunset output\n";
+       << body << "\n";
   {
     std::ofstream out(script.path);
     out << text.str();
@@ -105,7 +127,7 @@ void draw(const fs::path& path, PictureSize size, const std::string& body) {
     if (!out)
       throw FileError(path.string(), "cannot be written; is the folder there and writable?");
   }
-  const int result = run_gnuplot(script.path, log.path);
+  const int result = run_gnuplot(script.path, picture.path, log.path);
   if (result != 0) {
     std::ifstream in(log.path);
     std::string line;
@@ -154,12 +176,12 @@ std::string map_text(const MapPlot& map, const std::string& prefix) {
     if (rows.empty()) return;
     write_block(blocks, name, rows);
     items << (items.tellp() > 0 ? ", \\\n  " : "") << "$" << name << " using 1:2 " << style
-          << (label.empty() ? std::string(" notitle") : " title " + quoted(label));
+          << (label.empty() ? std::string(" notitle") : " title " + gnuplot_text(label));
   };
   for (std::size_t i = 0; i < map.layers.size(); ++i) {
     const MapLayer& layer = map.layers[i];
     const std::string name = prefix + "layer" + std::to_string(i);
-    const std::string colour = " lc rgb " + quoted(layer.colour);
+    const std::string colour = " lc rgb " + gnuplot_text(layer.colour);
     // Only the first kind of mark in a layer carries its label.
     std::string label = layer.label;
     const auto take_label = [&label](bool used) {
@@ -180,7 +202,7 @@ std::string map_text(const MapPlot& map, const std::string& prefix) {
         take_label(!layer.squares.empty()));
   }
   std::ostringstream text;
-  text << blocks.str() << "set title " << quoted(map.title) << "\n"
+  text << blocks.str() << "set title " << gnuplot_text(map.title) << "\n"
        << "set size ratio -1\nset key outside bottom center horizontal samplen 1.5 width -1\n";
   if (items.tellp() > 0) {
     text << "plot " << items.str() << "\n";
@@ -247,8 +269,8 @@ void write_plot(const std::filesystem::path& path, const LinePlot& plot) {
     }
     write_block(body, "series" + std::to_string(i), rows.empty() ? "NaN NaN\n" : rows);
   }
-  body << "set title " << quoted(plot.title) << "\nset xlabel " << quoted(plot.x_label)
-       << "\nset ylabel " << quoted(plot.y_label) << "\n";
+  body << "set title " << gnuplot_text(plot.title) << "\nset xlabel " << gnuplot_text(plot.x_label)
+       << "\nset ylabel " << gnuplot_text(plot.y_label) << "\n";
   if (plot.log_x) body << "set logscale x\n";
   if (plot.log_y) body << "set logscale y\n";
   body << "set xrange " << range_text(plot.x_range) << "\nset yrange " << range_text(plot.y_range)
@@ -257,7 +279,7 @@ void write_plot(const std::filesystem::path& path, const LinePlot& plot) {
   if (!plot.x_tick_labels.empty() && !plot.series.empty()) {
     body << "set xtics rotate by -20 (";
     for (std::size_t i = 0; i < plot.x_tick_labels.size() && i < plot.series[0].x.size(); ++i) {
-      body << (i > 0 ? ", " : "") << quoted(plot.x_tick_labels[i]) << " "
+      body << (i > 0 ? ", " : "") << gnuplot_tick(plot.x_tick_labels[i]) << " "
            << number(plot.series[0].x[i]);
     }
     body << ")\n";
@@ -286,7 +308,7 @@ void write_plot(const std::filesystem::path& path, const LinePlot& plot) {
     const bool below = series.style == SeriesStyle::bars;
     const std::string marks =
         data + " using 1:2 " + style + colour +
-        (series.label.empty() ? std::string(" notitle") : " title " + quoted(series.label));
+        (series.label.empty() ? std::string(" notitle") : " title " + gnuplot_text(series.label));
     const std::string error_bars = data + " using 1:2:3:4 with yerrorbars pt 0 lw 1.5" +
                                    (below ? std::string(" lc rgb \"#333333\"") : colour) +
                                    " notitle";
@@ -317,8 +339,9 @@ void write_plot(const std::filesystem::path& path, const HeatMap& plot) {
     }
   }
   write_block(body, "cells", rows);
-  body << "set title " << quoted(plot.title) << "\nset xlabel " << quoted(plot.x_label)
-       << "\nset ylabel " << quoted(plot.y_label) << "\nset cblabel " << quoted(plot.value_label)
+  body << "set title " << gnuplot_text(plot.title) << "\nset xlabel " << gnuplot_text(plot.x_label)
+       << "\nset ylabel " << gnuplot_text(plot.y_label) << "\nset cblabel "
+       << gnuplot_text(plot.value_label)
        << "\nset size ratio -1\nset palette defined (0 \"#440154\", 0.25 \"#3b528b\", 0.5 "
           "\"#21918c\", 0.75 \"#5ec962\", 1 \"#fde725\")\nset datafile missing \"NaN\"\n"
        << "set xrange [" << number(plot.first_cell.x_m - 0.5 * plot.spacing_m) << ":"
@@ -362,8 +385,8 @@ void write_plot(const std::filesystem::path& path, const PicturePlot& plot) {
   }
   std::ostringstream body;
   write_block(body, "pixels", rows);
-  body << "set title " << quoted(plot.title) << "\nset xlabel " << quoted(plot.x_label)
-       << "\nset ylabel " << quoted(plot.y_label) << "\nset tics out nomirror\nset xrange ["
+  body << "set title " << gnuplot_text(plot.title) << "\nset xlabel " << gnuplot_text(plot.x_label)
+       << "\nset ylabel " << gnuplot_text(plot.y_label) << "\nset tics out nomirror\nset xrange ["
        << number(plot.x_range.first) << ":" << number(plot.x_range.second) << "]\nset yrange ["
        << number(plot.y_range.first) << ":" << number(plot.y_range.second) << "]\n";
   if (plot.x_tick != 0.0) body << "set xtics " << number(plot.x_tick) << "\n";

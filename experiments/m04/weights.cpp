@@ -7,9 +7,9 @@
 #include <string>
 
 #include "experiments/m04/experiment.hpp"
+#include "experiments/m04/learn_weights.hpp"
 #include "experiments/m04/support.hpp"
 #include "panonav/core/error.hpp"
-#include "panonav/localisation/learn_weights.hpp"
 #include "panonav/signature/dissimilarity.hpp"
 #include "reporting/plot.hpp"
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "panonav/core/error.hpp"
@@ -32,6 +33,22 @@ double free_way_m(const FreeSpace& space, Point2 from, Point2 to) {
 }
 
 }  // namespace
+
+double distance_from_route_m(Point2 place, std::span<const Pose2> route) {
+  double nearest_m = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < route.size(); ++i) {
+    const Point2 a = route[i > 0 ? i - 1 : 0].position();
+    const Point2 b = route[i].position();
+    const double dx = b.x_m - a.x_m;
+    const double dy = b.y_m - a.y_m;
+    const double square = dx * dx + dy * dy;
+    const double along =
+        square > 0.0 ? ((place.x_m - a.x_m) * dx + (place.y_m - a.y_m) * dy) / square : 0.0;
+    const double t = std::clamp(along, 0.0, 1.0);
+    nearest_m = std::min(nearest_m, distance(place, {a.x_m + t * dx, a.y_m + t * dy}));
+  }
+  return nearest_m;
+}
 
 bool has_room_between(const FreeSpace& space, double robot_radius_m, Point2 from, Point2 to,
                       double spacing_m) {

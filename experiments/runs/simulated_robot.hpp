@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
 
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/pose2.hpp"
@@ -15,6 +16,9 @@ namespace panonav {
 /// Scenes name areas to drive in, too, whose borders are nothing to touch.
 [[nodiscard]] bool has_room_between(const FreeSpace& space, double robot_radius_m, Point2 from,
                                     Point2 to, double spacing_m);
+
+/// Distance from a place to the nearest one of the polyline through the poses; infinity for none.
+[[nodiscard]] double distance_from_route_m(Point2 place, std::span<const Pose2> route);
 
 /// A direction beside the wanted one, on the left (1) or the right (-1) of it.
 struct AsideDirection {

@@ -8,7 +8,6 @@
 #include <span>
 #include <utility>
 
-#include "experiments/runs/chain_run.hpp"
 #include "experiments/runs/simulated_robot.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"

@@ -6,6 +6,7 @@
 
 #include "support/command_runner.hpp"
 #include "support/landmark_pictures.hpp"
+#include "support/memory_samples.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -285,6 +286,17 @@ TEST_F(BadInput, KilledMemoriseResumes) {
   const auto b = run_panonav({"localise", killed_memory, data(), "--json", "--turn-randomly", "1"});
   EXPECT_EQ(a.exit_code, 0);
   EXPECT_EQ(a.out, b.out);
+}
+
+TEST_F(Memorise, InfoCountsTheChainsOfAnOlderVersion) {
+  run_well({"memorise", data(), memory()});
+  EXPECT_EQ(info_of(memory())["unused_chains"], 0);
+  EXPECT_EQ(run_panonav({"info", memory()}).out.find("chains"), std::string::npos);
+  add_old_chain(memory());
+  EXPECT_EQ(info_of(memory())["unused_chains"], 1);
+  EXPECT_EQ(views_in(memory()), 16);
+  EXPECT_NE(run_panonav({"info", memory()}).out.find("does not use them"), std::string::npos);
+  run_well({"verify", memory()});
 }
 
 }  // namespace

@@ -79,66 +79,6 @@ TEST(Path, ResamplingKeepsShapeAndSpacing) {
   EXPECT_EQ(resample(waiting, 0.25).size(), 5U);
 }
 
-TEST(Path, SmoothPathPassesThroughItsWayPointsAtEqualSpacing) {
-  Random random(1);
-  for (int run = 0; run < 20; ++run) {
-    std::vector<Point2> way_points;
-    for (int i = 0; i < 6; ++i) way_points.push_back({1.0 * i, random.uniform(-1.0, 1.0)});
-    const auto path = smooth_path(way_points, {.spacing_m = 0.02});
-    ASSERT_GT(path.size(), 200U);
-    for (const Point2 point : way_points) {
-      double nearest = 1e9;
-      for (const Pose2& pose : path) nearest = std::min(nearest, distance(pose.position(), point));
-      EXPECT_LE(nearest, 0.02);
-    }
-    for (std::size_t i = 1; i < path.size(); ++i) {
-      const double chord = distance(path[i - 1].position(), path[i].position());
-      EXPECT_LE(chord, 0.02 + 1e-9);
-      EXPECT_GE(chord, 0.02 * 0.98);
-      // Heading along the tangent: between neighbours the chord lies between the two headings.
-      const double direction =
-          std::atan2(path[i].y_m - path[i - 1].y_m, path[i].x_m - path[i - 1].x_m);
-      const double turn = std::abs(angle_difference(path[i].heading_rad, path[i - 1].heading_rad));
-      EXPECT_LE(
-          std::abs(angle_difference(direction, interpolate(path[i - 1], path[i], 0.5).heading_rad)),
-          0.5 * turn + 0.01);
-    }
-  }
-}
-
-TEST(Path, SmoothPathThroughAStraightLineIsThatLine) {
-  const std::vector<Point2> way_points{{0.0, 0.0}, {1.0, 1.0}, {1.0, 1.0}, {2.5, 2.5}, {4.0, 4.0}};
-  const auto path = smooth_path(way_points, {.spacing_m = 0.1});
-  ASSERT_EQ(path.size(), 57U);  // 4 sqrt(2) m
-  for (const Pose2& pose : path) {
-    EXPECT_NEAR(pose.x_m, pose.y_m, 1e-9);
-    EXPECT_NEAR(pose.heading_rad, std::numbers::pi / 4.0, 1e-6);
-  }
-}
-
-TEST(Path, ClosedPathReturnsToItsStartWithoutAKink) {
-  std::vector<Point2> circle;
-  for (int i = 0; i < 16; ++i) {
-    circle.push_back(
-        {2.0 * std::cos(i * std::numbers::pi / 8.0), 2.0 * std::sin(i * std::numbers::pi / 8.0)});
-  }
-  const auto path = smooth_path(circle, {.spacing_m = 0.05, .closed = true});
-  EXPECT_NEAR(path_length_m(path), 4.0 * std::numbers::pi, 0.06);
-  EXPECT_LE(distance(path.back().position(), path.front().position()), 0.05 + 1e-9);
-  for (std::size_t i = 0; i < path.size(); ++i) {
-    EXPECT_NEAR(std::hypot(path[i].x_m, path[i].y_m), 2.0, 0.005);
-    const double turn =
-        angle_difference(path[i].heading_rad, path[i == 0 ? path.size() - 1 : i - 1].heading_rad);
-    EXPECT_NEAR(turn, 0.025, 0.03);
-  }
-  EXPECT_THROW((void)smooth_path(std::vector<Point2>{{0.0, 0.0}, {1.0, 0.0}}, {.closed = true}),
-               ContractError);
-  EXPECT_THROW((void)smooth_path(std::vector<Point2>{{0.0, 0.0}, {0.0, 0.0}}), ContractError);
-  EXPECT_THROW((void)smooth_path(std::vector<Point2>{{0.0, 0.0}, {std::nan(""), 0.0}}),
-               ContractError);
-  EXPECT_THROW((void)smooth_path(circle, {.spacing_m = -1.0}), ContractError);
-}
-
 TEST(Path, GridIsCentredRegularAndComplete) {
   // [M04]: 10 x 8 places at 30 cm in 270 x 210 cm.
   const auto grid = grid_positions({0.0, 0.0}, {2.7, 2.1}, 0.3);

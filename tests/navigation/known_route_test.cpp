@@ -12,8 +12,9 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/motion/path.hpp"
+#include "support/smooth_path.hpp"
 
-namespace panonav {
+namespace panonav::testing {
 namespace {
 
 // What the lines show does not matter here.
@@ -26,8 +27,7 @@ RoutePanorama blank_route(const std::vector<Pose2>& path) {
 }
 
 std::vector<Pose2> curve() {
-  return smooth_path(std::vector<Point2>{{-3, -0.8}, {-1.2, 0.5}, {0.6, -0.3}, {2.8, 0.6}},
-                     {.spacing_m = 0.1});
+  return smooth_path(std::vector<Point2>{{-3, -0.8}, {-1.2, 0.5}, {0.6, -0.3}, {2.8, 0.6}}, 0.1);
 }
 
 ViewId id(std::size_t value) {
@@ -153,4 +153,4 @@ TEST(KnownRoute, RefusesWhatMakesNoSense) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::testing

@@ -13,6 +13,7 @@
 #include "panonav/navigation/navigator.hpp"
 #include "panonav/route/route_place.hpp"
 #include "support/remembered_worlds.hpp"
+#include "support/smooth_path.hpp"
 #include "support/text.hpp"
 
 namespace panonav::testing {
@@ -28,7 +29,7 @@ struct World {
   MemoryViewSource source{remembered.memory};
   std::vector<Pose2> path = smooth_path(
       std::vector<Point2>{{0.8, 0.8}, {2.6, 1.0}, {3.4, 2.6}, {4.6, 2.8}, {5.4, 1.9}, {7.2, 1.2}},
-      {.spacing_m = 0.1});
+      0.1);
   std::vector<KnownRoute> routes;
 
   World() {
@@ -43,7 +44,7 @@ struct World {
   }
   [[nodiscard]] Navigator navigator() const {
     Executor executor(1);
-    return {source, AreaPlanner(graph_of_memory(remembered.memory, executor))};
+    return {source, AreaPlanner(graph_of_links(source, remembered.memory.links(), executor))};
   }
   [[nodiscard]] ViewId view_at(Point2 place) const {
     const auto& poses = remembered.poses;

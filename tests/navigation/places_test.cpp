@@ -24,6 +24,10 @@
 namespace panonav::testing {
 namespace {
 
+NavigationGraph graph_of_memory(const VisualMemory& memory, Executor& executor) {
+  return graph_of_links(MemoryViewSource(memory), memory.links(), executor);
+}
+
 constexpr double pi = std::numbers::pi;
 
 // A grid in a round room of 3 m, 0.5 m apart, headings at random.

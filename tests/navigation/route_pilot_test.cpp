@@ -11,6 +11,7 @@
 #include "panonav/motion/odometry.hpp"
 #include "panonav/motion/path.hpp"
 #include "panonav/route/route_place.hpp"
+#include "support/smooth_path.hpp"
 #include "support/toy_world.hpp"
 
 namespace panonav::testing {
@@ -27,8 +28,7 @@ struct RecordedRoute {
   std::vector<KnownRoute> known;
 
   RecordedRoute() {
-    path = smooth_path(std::vector<Point2>{{-3, -0.8}, {-1.2, 0.5}, {0.6, -0.3}, {2.8, 0.6}},
-                       {.spacing_m = 0.1});
+    path = smooth_path(std::vector<Point2>{{-3, -0.8}, {-1.2, 0.5}, {0.6, -0.3}, {2.8, 0.6}}, 0.1);
     RoutePanorama route;
     std::vector<RouteView> placed;
     for (std::size_t i = 0; i < path.size(); ++i) {

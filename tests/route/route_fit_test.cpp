@@ -11,6 +11,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/motion/path.hpp"
+#include "support/smooth_path.hpp"
 #include "support/toy_world.hpp"
 
 namespace panonav::testing {
@@ -39,7 +40,7 @@ TEST(RouteCrossing, IsTheNearestOfAllStretches) {
     for (int i = 0; i < 5; ++i) {
       way_points.push_back({random.uniform(-3.0, 3.0), random.uniform(-3.0, 3.0)});
     }
-    const auto path = smooth_path(way_points, {.spacing_m = 0.13});
+    const auto path = smooth_path(way_points, 0.13);
     const Point2 viewpoint{random.uniform(-3.0, 3.0), random.uniform(-3.0, 3.0)};
     const auto directions = equal_directions(90);
     std::vector<RouteCrossing> crossings(90);
@@ -73,8 +74,7 @@ TEST(RouteCrossing, IsTheNearestOfAllStretches) {
 }
 
 TEST(RouteCrossing, ChangesWithTheViewpointAsItSays) {
-  const auto path =
-      smooth_path(std::vector<Point2>{{-3, 0}, {-1, 0.4}, {1, -0.3}, {3, 0.2}}, {.spacing_m = 0.1});
+  const auto path = smooth_path(std::vector<Point2>{{-3, 0}, {-1, 0.4}, {1, -0.3}, {3, 0.2}}, 0.1);
   const auto directions = equal_directions(72);
   const auto at = [&](Point2 viewpoint) {
     std::vector<RouteCrossing> crossings(72);
@@ -126,8 +126,8 @@ TEST(RouteFit, FindsPosesBesideAStraightPath) {
 
 TEST(RouteFit, CurvedPathsAndHeadingsOfTheirOwn) {
   const ToyWorld room = pillared_room(8);
-  auto path = smooth_path(std::vector<Point2>{{-2.5, -0.8}, {-1, 0.3}, {0.5, -0.2}, {2.3, 0.9}},
-                          {.spacing_m = 0.05});
+  auto path =
+      smooth_path(std::vector<Point2>{{-2.5, -0.8}, {-1, 0.3}, {0.5, -0.2}, {2.3, 0.9}}, 0.05);
   Random random(4);
   for (Pose2& pose : path) pose.heading_rad = random.uniform(-pi, pi);
   const RouteLines lines(record(room, path));

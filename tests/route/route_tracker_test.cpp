@@ -9,6 +9,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/motion/path.hpp"
+#include "support/smooth_path.hpp"
 #include "support/toy_world.hpp"
 
 namespace panonav::testing {
@@ -19,8 +20,7 @@ constexpr double pi = std::numbers::pi;
 class RouteTracking : public ::testing::Test {
  protected:
   RouteTracking() {
-    path = smooth_path(std::vector<Point2>{{-3, -0.8}, {-1.2, 0.5}, {0.6, -0.3}, {2.8, 0.6}},
-                       {.spacing_m = 0.1});
+    path = smooth_path(std::vector<Point2>{{-3, -0.8}, {-1.2, 0.5}, {0.6, -0.3}, {2.8, 0.6}}, 0.1);
     for (const Pose2& pose : path) route.append(pose, room.line(pose));
   }
 

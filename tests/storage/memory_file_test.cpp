@@ -305,5 +305,67 @@ TEST_F(MemoryFileContent, ALargeMemoryComesBackWhole) {
   EXPECT_TRUE(file.verify().empty());
 }
 
+// All values of the two tables of chains, as older programs would read them.
+std::string chains_in(const std::filesystem::path& path) {
+  sqlite3* database = nullptr;
+  EXPECT_EQ(sqlite3_open(path.c_str(), &database), SQLITE_OK);
+  std::string values;
+  const auto append = [](void* to, int columns, char** row, char**) {
+    for (int i = 0; i < columns; ++i) {
+      *static_cast<std::string*>(to) += std::string(row[i] ? row[i] : "null") + " ";
+    }
+    return 0;
+  };
+  EXPECT_EQ(sqlite3_exec(database,
+                         "SELECT * FROM chains; SELECT chain, number, travelled_m, x_m, y_m, "
+                         "heading_rad, hex(coefficients), checksum FROM chain_snapshots",
+                         append, &values, nullptr),
+            SQLITE_OK)
+      << sqlite3_errmsg(database);
+  sqlite3_close(database);
+  return values;
+}
+
+TEST_F(MemoryFileContent, ChainsOfAnOlderVersionAreCountedAndStayAsTheyAre) {
+  Random random(8);
+  const SignatureShape shape = small_header().shape;
+  (void)MemoryFile::create(path, small_header()).append(random_view(random, shape, 1));
+  EXPECT_EQ(MemoryFile::open(path, Access::read_only).info().unused_chains, 0U);
+  add_old_chain(path);
+  const std::string before = chains_in(path);
+  ASSERT_NE(before.find("0B0A0908"), std::string::npos);
+  {
+    MemoryFile file = MemoryFile::open(path, Access::read_write);
+    EXPECT_EQ(file.info().format_version, 2);
+    EXPECT_EQ(file.info().unused_chains, 1U);
+    EXPECT_TRUE(file.verify().empty());
+    const ViewId view = file.append(random_view(random, shape, 2));
+    TopologicalMap map;
+    map.nodes.push_back({view, {}, 0});
+    file.save_map("map", map);
+    file.remove(file.views());
+  }
+  const MemoryFile file = MemoryFile::open(path, Access::read_only);
+  EXPECT_EQ(file.info().format_version, 3);
+  EXPECT_EQ(file.info().unused_chains, 1U);
+  EXPECT_TRUE(file.verify().empty());
+  EXPECT_EQ(chains_in(path), before);
+}
+
+// Programs that knew chains want their tables in every file of version 2 and more.
+TEST_F(MemoryFileContent, NewFilesWithAMapHaveTheEmptyTablesOfChains) {
+  MemoryFile::create(path, small_header()).save_map("map", {});
+  EXPECT_EQ(chains_in(path), "");
+  EXPECT_EQ(MemoryFile::open(path, Access::read_only).info().unused_chains, 0U);
+}
+
+TEST_F(MemoryFileContent, AFileThatClaimsChainsWithoutTheirTablesIsRefused) {
+  { (void)MemoryFile::create(path, small_header()); }
+  run_sql(path, "PRAGMA journal_mode=DELETE; PRAGMA user_version=2");
+  EXPECT_TRUE(
+      contains(message_of<FileError>([&] { (void)MemoryFile::open(path, Access::read_only); }),
+               "table chain_snapshots is missing"));
+}
+
 }  // namespace
 }  // namespace panonav::testing

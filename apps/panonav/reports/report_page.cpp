@@ -5,15 +5,17 @@
 #include "assets.hpp"
 #include "cli/session.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/io/atomic_file.hpp"
 
 namespace panonav::command {
 
 namespace {
 
+// Text as HTML shows it, in elements and between the quotes of attributes.
 std::string escaped(std::string_view text) {
   std::string result;
-  for (const char c : text) {
+  for (const char c : readable_line(text)) {
     switch (c) {
       case '&':
         result += "&amp;";
@@ -26,6 +28,9 @@ std::string escaped(std::string_view text) {
         break;
       case '"':
         result += "&quot;";
+        break;
+      case '\'':
+        result += "&#39;";
         break;
       default:
         result += c;
@@ -120,9 +125,9 @@ void ReportPage::link(std::string_view file, std::string_view text) {
 }
 
 void ReportPage::commands(const std::vector<std::string>& command_lines) {
-  std::string all;
-  for (const auto& line : command_lines) all += line + "\n";
-  body_ += element("pre", all) + "\n";
+  body_ += "<pre>";
+  for (const auto& line : command_lines) body_ += escaped(line) + "\n";
+  body_ += "</pre>\n";
 }
 
 void ReportPage::write(const std::filesystem::path& folder) const {

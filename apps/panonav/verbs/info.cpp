@@ -24,19 +24,6 @@ std::string_view kind_name(PictureKind kind) {
   return "panorama";
 }
 
-struct NamedChain {
-  std::string name;
-  SnapshotChain chain;
-};
-
-std::vector<NamedChain> chains_of(const MemoryFile& memory) {
-  std::vector<NamedChain> chains;
-  for (auto& name : memory.chain_names()) {
-    if (auto chain = memory.chain(name)) chains.push_back({std::move(name), std::move(*chain)});
-  }
-  return chains;
-}
-
 struct NamedRoute {
   std::string name;
   std::size_t lines = 0;
@@ -79,14 +66,7 @@ ordered_json as_json(const MemoryFile& memory, const MemoryFileInfo& info) {
                       {"edge_channel", steps.edge_channel},
                       {"remove_mean", steps.remove_mean},
                       {"normalise_gain", steps.normalise_gain}}}};
-  auto chains = ordered_json::array();
-  for (const auto& [name, chain] : chains_of(memory)) {
-    chains.push_back({{"name", name},
-                      {"snapshots", chain.snapshots.size()},
-                      {"length_m", chain_length_m(chain)},
-                      {"bytes", chain_bytes(chain)}});
-  }
-  json["chains"] = std::move(chains);
+  json["unused_chains"] = info.unused_chains;
   auto routes = ordered_json::array();
   for (const auto& [name, lines, length_m, bytes] : routes_of(memory)) {
     routes.push_back({{"name", name}, {"lines", lines}, {"length_m", length_m}, {"bytes", bytes}});
@@ -122,10 +102,9 @@ ExitCode show(const std::string& path, Session& session) {
   session.print("  file        " + std::to_string(info.file_bytes) + " bytes, format " +
                 std::to_string(info.format_version) + ", " + std::to_string(info.thumbnails) +
                 " thumbnails");
-  for (const auto& [name, chain] : chains_of(memory)) {
-    session.print("  chain       " + name + ": " + std::to_string(chain.snapshots.size()) +
-                  " snapshots over " + fixed(chain_length_m(chain), 1) + " m, " +
-                  fixed(bytes_per_metre(chain), 0) + " bytes a metre");
+  if (info.unused_chains > 0) {
+    session.print("  chains      " + std::to_string(info.unused_chains) +
+                  " of snapshots, saved by an earlier version; this version does not use them");
   }
   for (const auto& [name, lines, length_m, bytes] : routes_of(memory)) {
     session.print("  route       " + name + ": " + std::to_string(lines) + " lines over " +

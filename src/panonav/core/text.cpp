@@ -1,9 +1,43 @@
 #include "panonav/core/text.hpp"
 
+#include <algorithm>
+#include <array>
 #include <iomanip>
 #include <sstream>
 
 namespace panonav {
+
+namespace {
+
+bool continues(char c) {
+  return (static_cast<unsigned char>(c) & 0xC0U) == 0x80U;
+}
+
+// Bytes of the UTF-8 character at the beginning of the text; 0 where there is none.
+std::size_t character_size(std::string_view text) {
+  const auto first = static_cast<unsigned char>(text.front());
+  if (first < 0x80U) return 1;
+  struct Form {
+    unsigned char low, high;  // of the first byte
+    std::size_t size;
+    char32_t smallest;  // longer forms of smaller numbers are not UTF-8
+  };
+  constexpr std::array<Form, 3> forms{
+      Form{0xC2, 0xDF, 2, 0x80}, {0xE0, 0xEF, 3, 0x800}, {0xF0, 0xF4, 4, 0x10000}};
+  for (const Form& form : forms) {
+    if (first < form.low || first > form.high || text.size() < form.size) continue;
+    char32_t number = first & (0x7FU >> form.size);
+    for (std::size_t i = 1; i < form.size; ++i) {
+      if (!continues(text[i])) return 0;
+      number = number << 6U | (static_cast<unsigned char>(text[i]) & 0x3FU);
+    }
+    const bool surrogate = number >= 0xD800 && number <= 0xDFFF;
+    return number < form.smallest || number > 0x10FFFF || surrogate ? 0 : form.size;
+  }
+  return 0;
+}
+
+}  // namespace
 
 std::string fixed(double value, int digits) {
   std::ostringstream text;
@@ -18,6 +52,45 @@ std::string short_number(double value) {
   std::ostringstream text;
   text << std::setprecision(6) << value;
   return text.str();
+}
+
+std::string readable_line(std::string_view text) {
+  std::string line;
+  line.reserve(text.size());
+  while (!text.empty()) {
+    const std::size_t size = character_size(text);
+    const std::string_view character = text.substr(0, size);
+    text.remove_prefix(std::max<std::size_t>(size, 1));
+    const auto first = static_cast<unsigned char>(size == 0 ? '?' : character.front());
+    if (size == 0) {
+      line += "\xEF\xBF\xBD";
+    } else if (first < 0x20U || first == 0x7FU ||
+               (character >= "\xC2\x80" && character < "\xC2\xA0")) {
+      line += ' ';
+    } else {
+      line += character;
+    }
+  }
+  return line;
+}
+
+std::string shortened(std::string_view text, std::size_t max_characters) {
+  const auto characters =
+      static_cast<std::size_t>(std::ranges::count_if(text, [](char c) { return !continues(c); }));
+  if (characters <= max_characters) return std::string(text);
+  // What stands at its end, such as a file's name in a path, tells most.
+  const std::size_t kept = (max_characters - 3) / 2;
+  std::size_t begin = 0;
+  for (std::size_t left = kept; left > 0; --left) {
+    do ++begin;
+    while (continues(text[begin]));
+  }
+  std::size_t end = text.size();
+  for (std::size_t left = kept; left > 0; --left) {
+    do --end;
+    while (continues(text[end]));
+  }
+  return std::string(text.substr(0, begin)) + "..." + std::string(text.substr(end));
 }
 
 }  // namespace panonav

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
+#include <string_view>
 
 namespace panonav {
 
@@ -9,5 +11,12 @@ namespace panonav {
 
 /// A number with up to six significant digits, for people: 30, not 29.999999999999996.
 [[nodiscard]] std::string short_number(double value);
+
+/// Text of any origin, such as a file's name, for people: one line of valid UTF-8. Control
+/// characters become spaces, bytes that are not UTF-8 the replacement character U+FFFD.
+[[nodiscard]] std::string readable_line(std::string_view text);
+
+/// Valid UTF-8 with its middle left out ("...") where it has more than `max_characters` (>= 8).
+[[nodiscard]] std::string shortened(std::string_view text, std::size_t max_characters);
 
 }  // namespace panonav

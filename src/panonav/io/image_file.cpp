@@ -42,13 +42,6 @@ Image read_image(const std::filesystem::path& path) {
   return decode_image(bytes, path.string());
 }
 
-ImageSize read_image_size(const std::filesystem::path& path) {
-  const auto bytes = read_file(path, file_limit_bytes);
-  const std::string name = path.string();
-  return format_of(bytes, name) == Format::png ? detail::png_size(bytes, name)
-                                               : detail::jpeg_size(bytes, name);
-}
-
 std::vector<std::uint8_t> encode_png(ImageView image) {
   return detail::encode_png(image);
 }

@@ -21,9 +21,6 @@ inline constexpr std::int64_t image_area_limit_px = 134217728;
 /// cut short or too large; never crashes, whatever the bytes.
 [[nodiscard]] Image read_image(const std::filesystem::path& path);
 
-/// Width and height from the head of the file, without decoding the pixels. Throws FileError.
-[[nodiscard]] ImageSize read_image_size(const std::filesystem::path& path);
-
 /// The same from bytes in memory; `name` stands in error messages.
 [[nodiscard]] Image decode_image(std::span<const std::uint8_t> bytes, std::string_view name);
 

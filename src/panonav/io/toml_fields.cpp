@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/io/atomic_file.hpp"
 
 namespace panonav {
@@ -19,11 +20,6 @@ namespace panonav {
 namespace {
 
 constexpr std::size_t file_limit_bytes = 1U << 20U;
-
-std::string one_line(std::string text) {
-  for (auto& c : text) c = static_cast<unsigned char>(c) < ' ' ? ' ' : c;
-  return text;
-}
 
 TomlTable copy_of(const toml::table& table);
 
@@ -51,9 +47,7 @@ TomlValue copy_of(const toml::node& node) {
       shown << value;
     }
   });
-  result.shown = one_line(shown.str());
-  constexpr std::size_t longest = 60;
-  if (result.shown.size() > longest) result.shown = result.shown.substr(0, longest - 3) + "...";
+  result.shown = shortened(readable_line(shown.str()), 60);
   return result;
 }
 
@@ -107,9 +101,8 @@ TomlTable read_toml(const std::filesystem::path& path) {
   try {
     return copy_of(toml::parse(text));
   } catch (const toml::parse_error& error) {
-    throw FileError(path.string(),
-                    "line " + std::to_string(error.source().begin.line) +
-                        " is not TOML: " + one_line(std::string(error.description())));
+    throw FileError(path.string(), "line " + std::to_string(error.source().begin.line) +
+                                       " is not TOML: " + readable_line(error.description()));
   }
 }
 
@@ -218,7 +211,7 @@ std::optional<std::size_t> TomlFields::choice(std::string_view field,
     if (*value == choices[i]) return i;
     allowed += (i > 0 ? ", \"" : "\"") + std::string(choices[i]) + "\"";
   }
-  fail(field, one_line("\"" + *value + "\""), allowed);
+  fail(field, readable_line("\"" + *value + "\""), allowed);
 }
 
 void TomlFields::fail(std::string_view field, std::string_view found,
@@ -234,7 +227,7 @@ void TomlFields::finish() const {
     std::string known;
     for (const auto& name : asked_) known += (known.empty() ? "" : ", ") + name;
     throw FileError(path_.string(), (section_.empty() ? "" : "[" + section_ + "] ") +
-                                        one_line(field.name) +
+                                        readable_line(field.name) +
                                         " is not a known field; known: " + known);
   }
 }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 namespace panonav {
@@ -32,7 +31,6 @@ ReferenceAreas::ReferenceAreas(const VisualMemory& memory)
   for (std::size_t site = 0; site < cells_.sites().size(); ++site) {
     areas_m2_.push_back(cells_.area_m2(site));
   }
-  total_area_m2_ = std::accumulate(areas_m2_.begin(), areas_m2_.end(), 0.0);
 }
 
 std::optional<std::size_t> ReferenceAreas::site(ViewId view) const {

@@ -20,8 +20,6 @@ class ReferenceAreas {
   explicit ReferenceAreas(const VisualMemory& memory);
 
   [[nodiscard]] double spacing_m() const noexcept { return cells_.spacing_m(); }
-  /// All posed views together.
-  [[nodiscard]] double total_area_m2() const noexcept { return total_area_m2_; }
   /// The cell of a view, corners counter-clockwise; empty when the view had no pose.
   [[nodiscard]] std::vector<Point2> cell(ViewId view) const;
   /// Area of the union of the views' cells; empty when one of them has no pose.
@@ -36,7 +34,6 @@ class ReferenceAreas {
   std::vector<ViewId> views_;  // posed ones, ascending; order of the positions given to `cells_`
   VoronoiCells cells_;
   std::vector<double> areas_m2_;  // by site
-  double total_area_m2_ = 0.0;
 };
 
 /// Where to stop.

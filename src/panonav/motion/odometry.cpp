@@ -13,13 +13,6 @@ std::vector<Pose2> steps_between(std::span<const Pose2> world_from_robot) {
   return steps;
 }
 
-std::vector<Pose2> accumulate_steps(const Pose2& start, std::span<const Pose2> steps) {
-  std::vector<Pose2> poses{start};
-  poses.reserve(steps.size() + 1);
-  for (const Pose2& step : steps) poses.push_back(poses.back() * step);
-  return poses;
-}
-
 void visit_options(OdometryNoise& options, OptionVisitor& visitor) {
   using T = OdometryNoise;
   constexpr OptionTable table{

@@ -15,9 +15,6 @@ namespace panonav {
 /// The steps between consecutive poses; one fewer than poses, none for fewer than two.
 [[nodiscard]] std::vector<Pose2> steps_between(std::span<const Pose2> world_from_robot);
 
-/// The poses reached from `start` after each step; the first is `start` itself.
-[[nodiscard]] std::vector<Pose2> accumulate_steps(const Pose2& start, std::span<const Pose2> steps);
-
 /// How a robot moves, and so which errors its odometry can make.
 enum class DriveKind {
   differential,  ///< cannot move sideways: travel errors lie along the heading at the middle of the

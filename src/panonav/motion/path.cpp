@@ -1,11 +1,9 @@
 #include "panonav/motion/path.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>
-#include <string>
 
 #include "panonav/core/error.hpp"
 #include "panonav/motion/trajectory.hpp"
@@ -25,44 +23,6 @@ double length_of(const Path& path, Position position) {
     length += distance(position(path[i - 1]), position(path[i]));
   }
   return length;
-}
-
-Point2 mix(Point2 a, Point2 b, double fraction) {
-  return {a.x_m + fraction * (b.x_m - a.x_m), a.y_m + fraction * (b.y_m - a.y_m)};
-}
-
-// One span of a Catmull-Rom spline between p[1] and p[2] (Barry and Goldman's pyramid).
-class SplineSpan {
- public:
-  explicit SplineSpan(const std::array<Point2, 4>& points) : points_(points) {
-    for (std::size_t i = 1; i < 4; ++i) {
-      // The square root of the distance makes the parametrisation centripetal.
-      knots_[i] = knots_[i - 1] + std::sqrt(distance(points[i - 1], points[i]));
-    }
-  }
-
-  // fraction 0 .. 1 between p[1] and p[2]
-  [[nodiscard]] Point2 at(double fraction) const {
-    const double t = knots_[1] + fraction * (knots_[2] - knots_[1]);
-    std::array<Point2, 4> level = points_;
-    for (std::size_t depth = 1; depth < 4; ++depth) {
-      for (std::size_t i = 0; i + depth < 4; ++i) {
-        // The last two levels interpolate over the inner knots only.
-        const std::size_t low = depth == 3 ? 1 : i;
-        const std::size_t high = depth == 3 ? 2 : i + depth;
-        level[i] = mix(level[i], level[i + 1], (t - knots_[low]) / (knots_[high] - knots_[low]));
-      }
-    }
-    return level[0];
-  }
-
- private:
-  std::array<Point2, 4> points_;
-  std::array<double, 4> knots_{};
-};
-
-Point2 mirrored(Point2 end, Point2 inner) {
-  return {2.0 * end.x_m - inner.x_m, 2.0 * end.y_m - inner.y_m};
 }
 
 }  // namespace
@@ -92,54 +52,6 @@ std::vector<Pose2> resample(std::span<const Pose2> path, double spacing_m) {
     walked += segment;
   }
   return poses;
-}
-
-std::vector<Pose2> smooth_path(std::span<const Point2> way_points,
-                               const SmoothPathOptions& options) {
-  require(options.spacing_m > 0.0 && std::isfinite(options.spacing_m), "spacing_m",
-          options.spacing_m, "> 0");
-  std::vector<Point2> points;
-  for (const Point2 point : way_points) {
-    require(std::isfinite(point.x_m), "x_m of a way point", point.x_m, "a finite number");
-    require(std::isfinite(point.y_m), "y_m of a way point", point.y_m, "a finite number");
-    if (points.empty() || point != points.back()) points.push_back(point);
-  }
-  if (options.closed && points.size() > 1 && points.front() == points.back()) points.pop_back();
-  const std::size_t least = options.closed ? 3 : 2;
-  require(points.size() >= least, "number of different way points",
-          static_cast<double>(points.size()), ">= " + std::to_string(least));
-
-  const std::size_t count = points.size();
-  const auto neighbour = [&](std::size_t i, int offset) {
-    const auto index = static_cast<std::ptrdiff_t>(i) + offset;
-    if (options.closed)
-      return points[static_cast<std::size_t>(index + static_cast<std::ptrdiff_t>(count)) % count];
-    if (index < 0) return mirrored(points[0], points[1]);
-    if (index >= static_cast<std::ptrdiff_t>(count))
-      return mirrored(points[count - 1], points[count - 2]);
-    return points[static_cast<std::size_t>(index)];
-  };
-
-  // A polyline so fine that its chords and the curve differ by far less than the spacing.
-  std::vector<Pose2> fine;
-  const std::size_t spans = options.closed ? count : count - 1;
-  for (std::size_t i = 0; i < spans; ++i) {
-    const SplineSpan span({neighbour(i, -1), neighbour(i, 0), neighbour(i, 1), neighbour(i, 2)});
-    const double chord = distance(neighbour(i, 0), neighbour(i, 1));
-    const int pieces =
-        std::max(16, static_cast<int>(std::ceil(std::min(20.0 * chord / options.spacing_m, 1e6))));
-    const double h = 1e-3 / pieces;
-    for (int piece = 0; piece <= pieces; ++piece) {
-      if (piece == 0 && i > 0) continue;
-      const double fraction = static_cast<double>(piece) / pieces;
-      const Point2 position = span.at(fraction);
-      const Point2 before = span.at(std::max(0.0, fraction - h));
-      const Point2 after = span.at(std::min(1.0, fraction + h));
-      const double heading = std::atan2(after.y_m - before.y_m, after.x_m - before.x_m);
-      fine.push_back({position.x_m, position.y_m, wrap_angle(heading)});
-    }
-  }
-  return resample(fine, options.spacing_m);
 }
 
 std::vector<GridPosition> grid_positions(Point2 low, Point2 high, double spacing_m,

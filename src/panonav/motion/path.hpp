@@ -18,20 +18,6 @@ namespace panonav {
 /// empty path. Throws ContractError unless spacing_m > 0.
 [[nodiscard]] std::vector<Pose2> resample(std::span<const Pose2> path, double spacing_m);
 
-struct SmoothPathOptions {
-  double spacing_m = 0.1;  ///< > 0, between poses along the curve
-  bool closed = false;     ///< the curve returns to the first way point
-};
-
-/// A smooth curve through way points as poses at equal spacing, heading along the tangent: a
-/// centripetal Catmull-Rom spline, which has neither cusps nor loops between way points (Yuksel et
-/// al. 2011). Way points that coincide with the one before are left out; the last pose lies on
-/// the last way point only where the length is a multiple of the spacing. Throws ContractError for
-/// fewer than two different way points (three when closed), a number that is not finite, or a
-/// spacing not above 0.
-[[nodiscard]] std::vector<Pose2> smooth_path(std::span<const Point2> way_points,
-                                             const SmoothPathOptions& options = {});
-
 /// A place of a regular grid: column i along x, row j along y.
 struct GridPosition {
   int i = 0;

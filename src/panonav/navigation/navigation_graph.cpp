@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <numbers>
 #include <numeric>
 #include <set>
@@ -134,38 +133,6 @@ std::vector<NavigationEdge> read_edges(const ViewSource& source, std::span<const
   return edges;
 }
 
-// For each link the motion of the robot between its views, if it is known, in the unit of `read`.
-std::vector<NavigationEdge> driven_edges(std::span<const Link> links,
-                                         std::span<const CoarseMotion> motion,
-                                         std::span<const NavigationEdge> read) {
-  std::map<std::pair<ViewId, ViewId>, Pose2> ways;
-  for (const CoarseMotion& way : motion) {
-    if (!is_finite(way.step)) throw ContractError("motion of the robot", "not finite", "finite");
-    ways[{way.from, way.to}] = way.step;
-    ways[{way.to, way.from}] = inverse(way.step);
-  }
-  std::vector<NavigationEdge> driven;
-  std::vector<double> units;
-  for (std::size_t i = 0; i < links.size(); ++i) {
-    driven.push_back({links[i].a, links[i].b, 0.0, std::nullopt});
-    const auto way = ways.find({links[i].a, links[i].b});
-    if (way == ways.end()) continue;
-    driven[i].a_from_b = way->second;
-    driven[i].length = length_of(way->second);
-    const bool both = driven[i].length > 0.0 && read[i].length > 0.0;
-    if (both && agree(way->second, *read[i].a_from_b)) {
-      units.push_back(read[i].length / driven[i].length);
-    }
-  }
-  const double unit = units.empty() ? 1.0 : upper_median(units);
-  for (NavigationEdge& edge : driven) {
-    if (!edge.a_from_b) continue;
-    scale_way(*edge.a_from_b, unit);
-    edge.length *= unit;
-  }
-  return driven;
-}
-
 }  // namespace
 
 NavigationGraph::NavigationGraph(std::vector<ViewId> views, std::vector<NavigationEdge> edges)
@@ -234,28 +201,19 @@ std::vector<std::size_t> nodes_around(const NavigationGraph& graph,
 }
 
 NavigationGraph graph_of_links(const ViewSource& source, std::span<const Link> links,
-                               std::span<const CoarseMotion> motion, Executor& executor) {
+                               Executor& executor) {
   const std::span<const ViewId> views = source.views();
   std::vector<NavigationEdge> edges = read_edges(source, links, executor);
-  const std::vector<NavigationEdge> driven = driven_edges(links, motion, edges);
   std::vector<NavigationEdge> read = edges;
   complete_lengths(read);
   const NavigationGraph graph({views.begin(), views.end()}, std::move(read));
-  for (std::size_t i = 0; i < edges.size(); ++i) {
-    NavigationEdge& edge = edges[i];
-    if (driven[i].a_from_b) {
-      edge = driven[i];
-    } else if (edge.a_from_b && !is_supported(graph, edge)) {
+  for (NavigationEdge& edge : edges) {
+    if (edge.a_from_b && !is_supported(graph, edge)) {
       edge = {edge.a, edge.b, 0.0, std::nullopt};
     }
   }
   complete_lengths(edges);
   return {{views.begin(), views.end()}, std::move(edges)};
-}
-
-NavigationGraph graph_of_memory(const VisualMemory& memory, Executor& executor,
-                                std::span<const CoarseMotion> motion) {
-  return graph_of_links(MemoryViewSource(memory), memory.links(), motion, executor);
 }
 
 NavigationGraph graph_of_map(const TopologicalMap& map, double min_weight) {

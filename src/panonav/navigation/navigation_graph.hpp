@@ -72,18 +72,11 @@ inline constexpr double max_disagreement_rad = 0.78539816339744831;
 /// section 3.5]: no position is looked at. Lengths are in units of R, the typical distance of the
 /// things around, and at least a tenth of their median. Where the answers of both views differ by
 /// more than 45 degrees, or not more than half of the triangles with third views close to that, as
-/// `arrange` asks, nothing is told: the edge counts as three times the median length. `motion`:
-/// ways of the robot between linked views, in either direction; they tell more than phases and
-/// count instead, in units of the latter as edges that have both tell these (none does: of
-/// metres). Motions of views without a link do not count. No more than some thousand views are held
-/// at once. Throws ContractError on a link of a view that the source has not and on a motion that
-/// is not finite. Cost: two home vectors a link, about a millisecond.
+/// `arrange` asks, nothing is told: the edge counts as three times the median length. No more than
+/// some thousand views are held at once. Throws ContractError on a link of a view that the source
+/// has not. Cost: two home vectors a link, about a millisecond.
 [[nodiscard]] NavigationGraph graph_of_links(const ViewSource& source, std::span<const Link> links,
-                                             std::span<const CoarseMotion> motion,
                                              Executor& executor);
-/// The same of a memory that is held whole, and its links.
-[[nodiscard]] NavigationGraph graph_of_memory(const VisualMemory& memory, Executor& executor,
-                                              std::span<const CoarseMotion> motion = {});
 
 /// An edge for each edge of a map within one component whose weight is at least `min_weight`: what
 /// lies below contradicts the rest of the map. Motions and lengths follow from the poses. Throws

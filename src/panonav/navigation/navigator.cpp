@@ -384,12 +384,6 @@ NavigationDecision Navigator::observe(const FourierSignature& view, const RobotR
 const AreaPlanner& Navigator::planner() const noexcept {
   return core_->planner;
 }
-const PlaceScale& Navigator::place_scale() const noexcept {
-  return core_->scales.place;
-}
-ArrivalScale Navigator::arrival_scale() const noexcept {
-  return core_->goal ? core_->goal->arrival : ArrivalScale{};
-}
 std::size_t Navigator::loaded_views() const noexcept {
   return core_->views.size();
 }

@@ -146,9 +146,6 @@ class Navigator {
                                            const RobotReport& report = {});
 
   [[nodiscard]] const AreaPlanner& planner() const noexcept;
-  [[nodiscard]] const PlaceScale& place_scale() const noexcept;
-  /// Of the goal; as without anything learnt before there is one.
-  [[nodiscard]] ArrivalScale arrival_scale() const noexcept;
   /// Views in memory now: of an area and its surroundings, and what is loaded ahead of the next.
   [[nodiscard]] std::size_t loaded_views() const noexcept;
 

@@ -38,7 +38,7 @@ std::optional<NavigationGraph> graph_from(GraphOrigin origin, const MemoryFileVi
     case GraphOrigin::links: {
       const std::vector<Link> links = file.links();
       if (links.empty()) return std::nullopt;
-      return graph_of_links(source, links, {}, executor);
+      return graph_of_links(source, links, executor);
     }
     case GraphOrigin::arrangement:
       return graph_of_lattice(arrange(file.load(), {}, {}, executor));

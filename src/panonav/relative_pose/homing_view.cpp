@@ -149,9 +149,4 @@ HomingView turn(const HomingView& view, double turn_rad) {
   return {view.rows(), view.components(), std::move(cosines), std::move(sines), view.elevations()};
 }
 
-std::size_t snapshot_bytes(const HomingView& view) noexcept {
-  return 2 * sizeof(float) * static_cast<std::size_t>(view.rows()) *
-         static_cast<std::size_t>(view.components() - 1);
-}
-
 }  // namespace panonav

@@ -73,8 +73,4 @@ class HomingView {
 /// The view after the robot turned by `turn_rad` counter-clockwise.
 [[nodiscard]] HomingView turn(const HomingView& view, double turn_rad);
 
-/// Two floats for each row and frequency, without the mean: K = 3 and one row are 24 bytes [S06
-/// section 4.4].
-[[nodiscard]] std::size_t snapshot_bytes(const HomingView& view) noexcept;
-
 }  // namespace panonav

@@ -12,6 +12,7 @@
 #endif
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/simulation/internal/gazebo_files.hpp"
 #include "panonav/simulation/internal/material_script.hpp"
 #include "panonav/simulation/internal/mesh_library.hpp"
@@ -60,13 +61,6 @@ class ConsoleCapture {
   std::ostream* stream_;
 };
 
-std::string one_line(std::string text) {
-  for (char& c : text) {
-    if (static_cast<unsigned char>(c) < 0x20) c = ' ';
-  }
-  return text;
-}
-
 // What is wrong with masses, joints and sensors cannot be seen.
 bool can_be_seen(const sdf::Error& error) {
   switch (error.Code()) {
@@ -96,8 +90,8 @@ void throw_first(const sdf::Errors& errors, const fs::path& world, const std::st
   if (first == nullptr) return;
   std::string where = first->FilePath().value_or(world.string());
   if (first->LineNumber()) where += ":" + std::to_string(*first->LineNumber());
-  throw FileError(where, "not a readable Gazebo world: " + one_line(first->Message()) +
-                             (detail.empty() ? "" : "; ") + one_line(detail));
+  throw FileError(where, "not a readable Gazebo world: " + readable_line(first->Message()) +
+                             (detail.empty() ? "" : "; ") + readable_line(detail));
 }
 
 // The types of the mathematics library differ in name between versions of the parser.

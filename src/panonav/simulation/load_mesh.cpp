@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/simulation/internal/mesh_library.hpp"
 
 namespace panonav {
@@ -118,13 +119,6 @@ struct Collector {
   }
 };
 
-std::string one_line(std::string text) {
-  for (char& c : text) {
-    if (static_cast<unsigned char>(c) < 0x20) c = ' ';
-  }
-  return text;
-}
-
 }  // namespace
 
 const std::vector<FileMesh>& MeshLibrary::read(const fs::path& path, UpAxis up) {
@@ -145,7 +139,7 @@ const std::vector<FileMesh>& MeshLibrary::read(const fs::path& path, UpAxis up) 
                          aiProcess_JoinIdenticalVertices | aiProcess_ValidateDataStructure);
   if (source == nullptr || source->mRootNode == nullptr) {
     throw FileError(path.string(),
-                    "not a readable mesh file: " + one_line(importer.GetErrorString()));
+                    "not a readable mesh file: " + readable_line(importer.GetErrorString()));
   }
   Collector collector{*source, path, {}, {}};
   for (unsigned i = 0; i < source->mNumMaterials; ++i) {

@@ -10,7 +10,6 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/storage/checksum.hpp"
-#include "panonav/storage/internal/chain_tables.hpp"
 #include "panonav/storage/internal/map_tables.hpp"
 #include "panonav/storage/internal/memory_file_access.hpp"
 #include "panonav/storage/internal/memory_file_implementation.hpp"
@@ -516,10 +515,6 @@ std::vector<MemoryFault> MemoryFile::verify() const {
     }
   });
   check(std::nullopt, [&] {
-    if (!has_chain_tables(database)) return;
-    verify_chains(database, [&](const std::function<void()>& part) { check(std::nullopt, part); });
-  });
-  check(std::nullopt, [&] {
     if (!has_map_table(database)) return;
     verify_maps(
         database, [&](ViewId view) { return views.contains(view); },
@@ -544,7 +539,9 @@ MemoryFileInfo MemoryFile::info() const {
   info.views_with_heading = count("SELECT count(heading_rad) FROM views");
   info.links = count("SELECT count(*) FROM links");
   info.thumbnails = count("SELECT count(*) FROM thumbnails");
-  if (has_chain_tables(database)) info.chains = count("SELECT count(*) FROM chains");
+  if (has_chain_tables(database)) {
+    info.unused_chains = count("SELECT count(*) FROM (SELECT 1 FROM chains LIMIT 1000000)");
+  }
   if (has_map_table(database)) info.maps = count("SELECT count(*) FROM maps");
   if (has_route_tables(database)) info.routes = count("SELECT count(*) FROM routes");
   info.format_version = static_cast<int>(database.integer("PRAGMA user_version"));

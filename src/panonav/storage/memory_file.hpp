@@ -9,7 +9,6 @@
 #include <string_view>
 #include <vector>
 
-#include "panonav/homing/snapshot_chain.hpp"
 #include "panonav/mapping/topological_map.hpp"
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav/panorama/picture.hpp"
@@ -58,7 +57,9 @@ struct MemoryFileInfo {
   std::uint64_t views_with_heading = 0;
   std::uint64_t links = 0;
   std::uint64_t thumbnails = 0;
-  std::uint64_t chains = 0;
+  /// Chains of snapshots that an earlier version saved. They are kept, and nothing reads them.
+  /// Counted up to a million.
+  std::uint64_t unused_chains = 0;
   std::uint64_t maps = 0;
   std::uint64_t routes = 0;
   std::uint64_t file_bytes = 0;  ///< with what is still in the write-ahead log
@@ -110,17 +111,6 @@ class MemoryFile {
   /// What was learnt from the views (a model of unknown places, weights), by name, as text.
   void set_parameter(std::string_view name, std::string_view value);
   [[nodiscard]] std::optional<std::string> parameter(std::string_view name) const;
-
-  /// Keeps a chain of snapshots under a name, instead of the one that had it. The first chain gives
-  /// the file format version 2, which versions of panonav without chains refuse. Throws
-  /// ContractError on an empty name and as `validate`.
-  void save_chain(std::string_view name, const SnapshotChain& chain);
-  /// The same snapshots, bit for bit; empty when there is no such chain.
-  [[nodiscard]] std::optional<SnapshotChain> chain(std::string_view name) const;
-  /// Throws ContractError when there is no such chain.
-  void remove_chain(std::string_view name);
-  /// Ascending.
-  [[nodiscard]] std::vector<std::string> chain_names() const;
 
   /// Keeps a map under a name, instead of the one that had it. The first map gives the file format
   /// version 3. Throws ContractError on an empty name, a view that is not in the file, and as

@@ -1,44 +1,12 @@
-// Chains, maps and routes of a memory file, each under a name.
+// Maps and routes of a memory file, each under a name.
 
 #include "panonav/core/error.hpp"
-#include "panonav/storage/internal/chain_tables.hpp"
 #include "panonav/storage/internal/map_tables.hpp"
 #include "panonav/storage/internal/memory_file_implementation.hpp"
 #include "panonav/storage/internal/memory_schema.hpp"
 #include "panonav/storage/internal/route_tables.hpp"
 
 namespace panonav {
-
-void MemoryFile::save_chain(std::string_view name, const SnapshotChain& chain) {
-  Database& database = implementation_->database;
-  Transaction transaction(database, Transaction::Kind::writing);
-  add_chain_tables(database);
-  write_chain(database, name, chain);
-  transaction.commit();
-}
-
-std::optional<SnapshotChain> MemoryFile::chain(std::string_view name) const {
-  Database& database = implementation_->database;
-  const Transaction reading(database, Transaction::Kind::reading);
-  if (!has_chain_tables(database)) return std::nullopt;
-  return read_chain(database, name);
-}
-
-void MemoryFile::remove_chain(std::string_view name) {
-  Database& database = implementation_->database;
-  Transaction transaction(database, Transaction::Kind::writing);
-  if (!has_chain_tables(database) || !erase_chain(database, name)) {
-    throw ContractError("chain", std::string(name), "a chain of the memory file");
-  }
-  transaction.commit();
-}
-
-std::vector<std::string> MemoryFile::chain_names() const {
-  Database& database = implementation_->database;
-  const Transaction reading(database, Transaction::Kind::reading);
-  if (!has_chain_tables(database)) return {};
-  return panonav::chain_names(database);
-}
 
 void MemoryFile::save_map(std::string_view name, const TopologicalMap& map) {
   Database& database = implementation_->database;

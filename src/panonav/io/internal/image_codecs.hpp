@@ -14,10 +14,8 @@ namespace panonav::detail {
 void check_image_size(std::int64_t width, std::int64_t height, std::string_view name);
 
 [[nodiscard]] Image decode_png(std::span<const std::uint8_t> bytes, std::string_view name);
-[[nodiscard]] ImageSize png_size(std::span<const std::uint8_t> bytes, std::string_view name);
 [[nodiscard]] std::vector<std::uint8_t> encode_png(ImageView image);
 
 [[nodiscard]] Image decode_jpeg(std::span<const std::uint8_t> bytes, std::string_view name);
-[[nodiscard]] ImageSize jpeg_size(std::span<const std::uint8_t> bytes, std::string_view name);
 
 }  // namespace panonav::detail

@@ -114,11 +114,6 @@ ImageSize open(Reader& reader, std::span<const std::uint8_t> bytes, std::string_
 
 }  // namespace
 
-ImageSize jpeg_size(std::span<const std::uint8_t> bytes, std::string_view name) {
-  Reader reader;
-  return open(reader, bytes, name);
-}
-
 Image decode_jpeg(std::span<const std::uint8_t> bytes, std::string_view name) {
   Reader reader;
   const ImageSize size = open(reader, bytes, name);

@@ -144,11 +144,6 @@ bool write_steps(Writer& writer, const ImageView& image) {
 
 }  // namespace
 
-ImageSize png_size(std::span<const std::uint8_t> bytes, std::string_view name) {
-  Reader reader;
-  return open(reader, bytes, name);
-}
-
 Image decode_png(std::span<const std::uint8_t> bytes, std::string_view name) {
   Reader reader;
   const ImageSize size = open(reader, bytes, name);

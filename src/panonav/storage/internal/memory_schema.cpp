@@ -41,7 +41,7 @@ constexpr std::array<std::pair<const char*, const char*>, 4> tables{{
      "STRICT"},
 }};
 
-// Of version 2; sorted by name they come before the others.
+// Of version 2; sorted by name they come before the others. Nothing but older programs writes them.
 constexpr std::array<std::pair<const char*, const char*>, 2> chain_tables{{
     {"chain_snapshots",
      "CREATE TABLE chain_snapshots(chain TEXT NOT NULL, number INTEGER NOT NULL, travelled_m REAL "
@@ -176,19 +176,15 @@ bool has_chain_tables(Database& database) {
   return database.integer("PRAGMA user_version") >= version_with_chains;
 }
 
-void add_chain_tables(Database& database) {
-  if (has_chain_tables(database)) return;
-  for (const auto& [name, text] : chain_tables) database.execute(text);
-  database.execute(("PRAGMA user_version=" + std::to_string(version_with_chains)).c_str());
-}
-
 bool has_map_table(Database& database) {
   return database.integer("PRAGMA user_version") >= version_with_maps;
 }
 
 void add_map_table(Database& database) {
   if (has_map_table(database)) return;
-  add_chain_tables(database);
+  if (!has_chain_tables(database)) {
+    for (const auto& [name, text] : chain_tables) database.execute(text);
+  }
   database.execute(map_table);
   database.execute(("PRAGMA user_version=" + std::to_string(version_with_maps)).c_str());
 }

@@ -1,4 +1,7 @@
-// Recording a chain and following it in a round room, without a simulator.
+// Recording a chain of snapshots and following it: in a round room without a simulator, and in a
+// simulated scene.
+
+#include "experiments/s06/snapshot_chain.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,11 +10,13 @@
 #include <numbers>
 #include <vector>
 
+#include "experiments/runs/simulated_robot.hpp"
+#include "experiments/s06/chains.hpp"
 #include "panonav/core/error.hpp"
-#include "panonav/homing/chain_follower.hpp"
-#include "panonav/homing/chain_recorder.hpp"
-#include "panonav/motion/odometry.hpp"
+#include "panonav/motion/path.hpp"
+#include "panonav/simulation/scenes.hpp"
 #include "support/remembered_worlds.hpp"
+#include "support/skips.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -31,9 +36,8 @@ std::vector<Pose2> bend() {
   return poses;
 }
 
-SnapshotChain record(const ToyWorld& world, const std::vector<Pose2>& route,
-                     const ChainRecorderOptions& options) {
-  ChainRecorder recorder(options);
+SnapshotChain record(const ToyWorld& world, const std::vector<Pose2>& route, double max_spacing_m) {
+  ChainRecorder recorder(max_spacing_m);
   std::size_t snapshots = 0;
   for (std::size_t i = 0; i < route.size(); ++i) {
     const Pose2 moved = i == 0 ? Pose2{} : inverse(route[i - 1]) * route[i];
@@ -48,21 +52,20 @@ SnapshotChain record(const ToyWorld& world, const std::vector<Pose2>& route,
 TEST(ChainRecorder, SnapshotsLieOnTheRouteAndItsEndIsTheLast) {
   const ToyWorld world = striped_round_room(6.0, 3);
   const auto route = bend();
-  const SnapshotChain chain = record(world, route, {.longest_spacing_m = 1.0});
-  ASSERT_NO_THROW(validate(chain));
-  ASSERT_GE(chain.snapshots.size(), 5U);
-  EXPECT_EQ(chain.snapshots.front().view, seen_from(world, route.front()));
-  EXPECT_EQ(chain.snapshots.back().view, seen_from(world, route.back()));
+  const SnapshotChain chain = record(world, route, 1.0);
+  ASSERT_GE(chain.size(), 5U);
+  EXPECT_EQ(chain.front().view, seen_from(world, route.front()));
+  EXPECT_EQ(chain.back().view, seen_from(world, route.back()));
   EXPECT_NEAR(chain_length_m(chain), 4.2, 0.01);
   Pose2 pose = route.front();
-  for (std::size_t i = 1; i < chain.snapshots.size(); ++i) {
-    pose = pose * chain.snapshots[i].previous_from_this;
-    const double way_m = chain.snapshots[i].travelled_m - chain.snapshots[i - 1].travelled_m;
+  for (std::size_t i = 1; i < chain.size(); ++i) {
+    pose = pose * chain[i].previous_from_this;
+    const double way_m = chain[i].travelled_m - chain[i - 1].travelled_m;
     EXPECT_LE(way_m, 1.0 + 1e-9);
-    const auto number = static_cast<std::size_t>(std::lround(chain.snapshots[i].travelled_m / 0.1));
+    const auto number = static_cast<std::size_t>(std::lround(chain[i].travelled_m / 0.1));
     ASSERT_LT(number, route.size());
     EXPECT_LT(distance(pose.position(), route[number].position()), 1e-6) << "snapshot " << i;
-    EXPECT_EQ(chain.snapshots[i].view, seen_from(world, route[number]));
+    EXPECT_EQ(chain[i].view, seen_from(world, route[number]));
   }
 }
 
@@ -73,23 +76,28 @@ TEST(ChainRecorder, TakesMoreSnapshotsWhereViewsChangeFaster) {
   std::size_t small = 0;
   std::size_t large = 0;
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-    small += record(striped_round_room(1.8, seed), straight, {}).snapshots.size();
-    large += record(striped_round_room(18.0, seed), straight, {}).snapshots.size();
+    small += record(striped_round_room(1.8, seed), straight, 5.0).size();
+    large += record(striped_round_room(18.0, seed), straight, 5.0).size();
   }
   EXPECT_GT(small, large);
 }
 
-TEST(ChainRecorder, ChecksItsInputs) {
-  EXPECT_THROW(ChainRecorder({.margin = 0.0}), OptionError);
-  EXPECT_THROW(ChainRecorder({.longest_spacing_m = -1.0}), OptionError);
+TEST(ChainRecorder, AViewIsAChain) {
   const ToyWorld world = striped_round_room(3.0, 1);
   ChainRecorder recorder;
-  EXPECT_TRUE(recorder.finish().snapshots.empty());
+  EXPECT_TRUE(recorder.finish().empty());
   recorder.add(seen_from(world, {}), {});
-  EXPECT_EQ(recorder.finish().snapshots.size(), 1U);
-  EXPECT_THROW(recorder.add(seen_from(world, {}, 9), {}), ContractError) << "components";
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THROW(recorder.add(seen_from(world, {}), {nan, 0.0, 0.0}), ContractError);
+  EXPECT_EQ(recorder.finish().size(), 1U);
+}
+
+TEST(SnapshotChain, CountsItsBytesPerMetre) {
+  // One row, frequencies 1 .. 3, two floats each [S06 section 4.4]; and four floats for the way.
+  const HomingView view(1, 4, std::vector<float>(4), std::vector<float>(4));
+  const SnapshotChain chain{{view, 1.0, {}}, {view, 3.0, {}}, {view, 5.0, {}}};
+  EXPECT_EQ(chain_length_m(chain), 4.0);
+  EXPECT_EQ(bytes_per_metre(chain), 3.0 * (24 + 16) / 4.0);
+  EXPECT_EQ(bytes_per_metre({chain.front()}), 0.0);
+  EXPECT_EQ(chain_length_m({}), 0.0);
 }
 
 TEST(ChainFollower, DrivesTheRouteAgainInBothDirectionsWhateverTheHeading) {
@@ -99,19 +107,19 @@ TEST(ChainFollower, DrivesTheRouteAgainInBothDirectionsWhateverTheHeading) {
   double worst_m = 0.0;
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     const ToyWorld world = striped_round_room(6.0, seed);
-    const SnapshotChain chain = record(world, route, {.longest_spacing_m = 1.0});
+    const SnapshotChain chain = record(world, route, 1.0);
     for (const ChainDirection direction : {ChainDirection::forward, ChainDirection::back}) {
       const bool forward = direction == ChainDirection::forward;
       const Pose2& end = forward ? route.back() : route.front();
       Pose2 pose = forward ? route.front() : route.back();
       pose.heading_rad = wrap_angle(static_cast<double>(seed) * 1.3);
-      ChainFollower follower(chain, direction, {}, {.typical_distance_m = 6.0});
+      ChainFollower follower(chain, direction, {.typical_distance_m = 6.0});
       Pose2 moved;
       ++runs;
       for (int step = 0; step < 120; ++step) {
         const ChainDecision decision = follower.decide(seen_from(world, pose), moved);
         if (decision.state == ChainState::finished) {
-          EXPECT_EQ(decision.target, forward ? chain.snapshots.size() - 1 : 0U);
+          EXPECT_EQ(decision.target, forward ? chain.size() - 1 : 0U);
           EXPECT_LT(distance(pose.position(), end.position()), 0.1);
           ++finished;
         }
@@ -133,8 +141,8 @@ TEST(ChainFollower, DrivesTheRouteAgainInBothDirectionsWhateverTheHeading) {
 TEST(ChainFollower, SaysThatItIsLostInAnotherPlace) {
   const ToyWorld world = striped_round_room(6.0, 1);
   const ToyWorld other = striped_round_room(6.0, 50);
-  const SnapshotChain chain = record(world, bend(), {.longest_spacing_m = 1.0});
-  ChainFollower follower(chain, ChainDirection::forward, {}, {.arrived_difference = 0.02});
+  const SnapshotChain chain = record(world, bend(), 1.0);
+  ChainFollower follower(chain, ChainDirection::forward, {.arrived_difference = 0.02});
   Pose2 pose{0.0, 0.0, 0.0};
   Pose2 moved;
   ChainState state = ChainState::following;
@@ -152,10 +160,43 @@ TEST(ChainFollower, SaysThatItIsLostInAnotherPlace) {
 TEST(ChainFollower, ChecksItsInputs) {
   EXPECT_THROW(ChainFollower({}, ChainDirection::forward), ContractError) << "an empty chain";
   const ToyWorld world = striped_round_room(3.0, 1);
-  const SnapshotChain one{{{seen_from(world, {}), 0.0, {}}}};
-  EXPECT_THROW(ChainFollower(one, ChainDirection::forward, {.switch_length = -1.0}), OptionError);
-  ChainFollower follower(one, ChainDirection::back);
+  ChainFollower follower({{seen_from(world, {}), 0.0, {}}}, ChainDirection::back);
   EXPECT_EQ(follower.decide(seen_from(world, {}), {}).state, ChainState::finished);
+}
+
+TEST(ChainRun, DistanceFromARouteIsThatFromItsNearestPiece) {
+  const std::vector<Pose2> route{{0.0, 0.0, 0.0}, {2.0, 0.0, 0.0}, {2.0, 2.0, 0.0}};
+  EXPECT_DOUBLE_EQ(distance_from_route_m({1.0, 0.5}, route), 0.5);
+  EXPECT_DOUBLE_EQ(distance_from_route_m({-3.0, 4.0}, route), 5.0);
+  EXPECT_DOUBLE_EQ(distance_from_route_m({2.25, 1.0}, route), 0.25);
+  EXPECT_EQ(distance_from_route_m({}, {}), std::numeric_limits<double>::infinity());
+}
+
+TEST(ChainRun, ARouteOfTwentyMetresIsDrivenAgainInBothDirections) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  Executor executor(2);
+  const HomingPlace place = make_homing_place(make_scene("loop"), chain_camera(), executor);
+  const FreeSpace& space = *place.free_space;
+  EXPECT_THROW((void)random_routes(space, 1, 0.0, 0.1, 1), ContractError);
+  EXPECT_THROW((void)random_routes(space, 1, 5.0, 0.0, 1), ContractError);
+  const auto routes = random_routes(space, 3, 20.0, 0.1, 5);
+  ASSERT_EQ(routes.size(), 3U);
+  int completed = 0;
+  for (std::size_t r = 0; r < routes.size(); ++r) {
+    for (const Pose2& pose : routes[r]) ASSERT_TRUE(space.is_free(pose.position()));
+    EXPECT_GE(path_length_m(routes[r]), 19.0);
+    const SnapshotChain chain = record_chain(place, routes[r], r);
+    EXPECT_LT(chain.size(), routes[r].size() / 2);
+    for (const auto direction : {ChainDirection::forward, ChainDirection::back}) {
+      const ChainRun run = follow_chain(place, chain, routes[r], direction, r);
+      completed += run.completes(0.2);
+      ASSERT_EQ(run.path.size(), run.lateral_m.size());
+      for (const Pose2& pose : run.path) EXPECT_TRUE(space.is_free(pose.position()));
+      EXPECT_EQ(run.path, follow_chain(place, chain, routes[r], direction, r).path)
+          << "the same seed";
+    }
+  }
+  EXPECT_GE(completed, 5);
 }
 
 }  // namespace

@@ -1,18 +1,12 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <vector>
 
-#include "panonav/core/options.hpp"
 #include "panonav/memory/visual_memory.hpp"
 
 namespace panonav {
-
-struct WeightLearningOptions {
-  int sampled_views = 300;  ///< of larger memories only so many views are used for learning
-  int seed = 1;             ///< of the draw
-};
-void visit_options(WeightLearningOptions& options, OptionVisitor& visitor);
 
 /// Weights alpha_k of the dissimilarity [M04 eq. 6], for `dissimilarity_weighted`.
 struct ComponentWeights {
@@ -33,9 +27,11 @@ struct ComponentWeights {
 /// equal weights by a penalty; how strongly is chosen by leaving out a quarter of the views at a
 /// time, and equal weights are among the choices.
 ///
-/// Empty when fewer than 16 posed views have both near and far views. Throws OptionError. Cost:
-/// `sampled_views` searches and 16 comparisons of signatures for each.
-[[nodiscard]] std::optional<ComponentWeights> learn_component_weights(
-    const VisualMemory& memory, const WeightLearningOptions& options = {});
+/// Of larger memories only `sampled_views`, drawn by `seed`, are used for learning. Empty when
+/// fewer than 16 posed views have both near and far views. Throws ContractError on fewer than 16
+/// `sampled_views`. Cost: `sampled_views` searches and 16 comparisons of signatures for each.
+[[nodiscard]] std::optional<ComponentWeights> learn_component_weights(const VisualMemory& memory,
+                                                                      int sampled_views = 300,
+                                                                      std::uint64_t seed = 1);
 
 }  // namespace panonav

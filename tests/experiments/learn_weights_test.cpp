@@ -1,4 +1,4 @@
-#include "panonav/localisation/learn_weights.hpp"
+#include "experiments/m04/learn_weights.hpp"
 
 #include <gtest/gtest.h>
 
@@ -104,9 +104,8 @@ TEST(ComponentWeights, LearntInSomeRoomsSeparateBetterInOthers) {
 
 TEST(ComponentWeights, SameSeedSameBits) {
   const RememberedRoom place(31, {}, 0.4);
-  const WeightLearningOptions options{.sampled_views = 40, .seed = 3};
-  const auto a = learn_component_weights(place.memory, options);
-  const auto b = learn_component_weights(place.memory, options);
+  const auto a = learn_component_weights(place.memory, 40, 3);
+  const auto b = learn_component_weights(place.memory, 40, 3);
   ASSERT_TRUE(a && b);
   EXPECT_EQ(a->weights, b->weights);
 }
@@ -125,7 +124,7 @@ TEST(ComponentWeights, NoAnswerWithoutEnoughPosedViews) {
   // All at one place: there is no spacing.
   for (const ViewId view : memory.views()) memory.set_pose(view, ReferencePose{1.0, 2.0, {}});
   EXPECT_FALSE(learn_component_weights(memory));
-  EXPECT_THROW((void)learn_component_weights(memory, {.sampled_views = 3}), OptionError);
+  EXPECT_THROW((void)learn_component_weights(memory, 3), ContractError);
 }
 
 }  // namespace

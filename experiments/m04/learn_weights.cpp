@@ -1,4 +1,4 @@
-#include "panonav/localisation/learn_weights.hpp"
+#include "experiments/m04/learn_weights.hpp"
 
 #include <algorithm>
 #include <array>
@@ -6,7 +6,9 @@
 #include <limits>
 #include <numeric>
 #include <span>
+#include <string>
 
+#include "panonav/core/error.hpp"
 #include "panonav/geometry/voronoi.hpp"
 #include "panonav/localisation/sample.hpp"
 
@@ -164,18 +166,10 @@ bool add_margins(const VisualMemory& memory, std::span<const PosedView> posed, d
 
 }  // namespace
 
-void visit_options(WeightLearningOptions& options, OptionVisitor& visitor) {
-  using T = WeightLearningOptions;
-  constexpr OptionTable table{
-      option<&T::sampled_views>("views used for learning", min_anchors),
-      option<&T::seed>("seed of the draw of views", 0),
-  };
-  table.visit(options, visitor);
-}
-
 std::optional<ComponentWeights> learn_component_weights(const VisualMemory& memory,
-                                                        const WeightLearningOptions& options) {
-  validate(options);
+                                                        int sampled_views, std::uint64_t seed) {
+  require(sampled_views >= static_cast<int>(min_anchors), "sampled views", sampled_views,
+          ">= " + std::to_string(min_anchors));
   std::vector<PosedView> posed;
   std::vector<ViewId> ids;
   std::vector<Point2> positions;
@@ -190,8 +184,7 @@ std::optional<ComponentWeights> learn_component_weights(const VisualMemory& memo
   if (!(spacing_m > 0.0)) return std::nullopt;
 
   const auto components = static_cast<std::size_t>(memory.shape().components);
-  const auto anchors =
-      sample_views(ids, options.sampled_views, static_cast<std::uint64_t>(options.seed));
+  const auto anchors = sample_views(ids, sampled_views, seed);
   // Views that follow each other are neighbours, so a fold is one run of them.
   std::vector<Moments> fold(folds, Moments(components));
   std::size_t used = 0;

@@ -1,0 +1,34 @@
+#include "panonav/core/text.hpp"
+
+#include <gtest/gtest.h>
+
+namespace panonav::testing {
+namespace {
+
+TEST(ReadableLine, KeepsUtf8AndReplacesTheRest) {
+  const std::string fine = "a \"quote\" \xC3\xA4 \xE2\x82\xAC \xF0\x9F\xA4\x96 \xF4\x8F\xBF\xBF";
+  EXPECT_EQ(readable_line(fine), fine);
+  EXPECT_EQ(readable_line(""), "");
+  EXPECT_EQ(readable_line("a\nb\tc\r\x7F" + std::string(1, '\0') + "\xC2\x85."), "a b c    .");
+  const std::string replaced = "\xEF\xBF\xBD";
+  EXPECT_EQ(readable_line("a\xFFz"), "a" + replaced + "z");
+  EXPECT_EQ(readable_line("\x80"), replaced);
+  EXPECT_EQ(readable_line("\xC3"), replaced) << "cut short";
+  EXPECT_EQ(readable_line("\xE2\x82z"), replaced + replaced + "z");
+  EXPECT_EQ(readable_line("\xC0\xAF"), replaced + replaced) << "a longer form of '/'";
+  EXPECT_EQ(readable_line("\xE0\x80\xAF"), replaced + replaced + replaced);
+  EXPECT_EQ(readable_line("\xED\xA0\x80"), replaced + replaced + replaced) << "half of a pair";
+  EXPECT_EQ(readable_line("\xF4\x90\x80\x80"), replaced + replaced + replaced + replaced);
+}
+
+TEST(Shortened, LeavesOutTheMiddleAndCutsNoCharacter) {
+  EXPECT_EQ(shortened("12345678", 8), "12345678");
+  EXPECT_EQ(shortened("123456789", 8), "12...89");
+  EXPECT_EQ(shortened("\xC3\xA4\xC3\xA4xxxxxxxx\xE2\x82\xAC\xE2\x82\xAC", 8),
+            "\xC3\xA4\xC3\xA4...\xE2\x82\xAC\xE2\x82\xAC");
+  EXPECT_EQ(shortened("\xC3\xA4\xC3\xA4\xC3\xA4\xC3\xA4\xC3\xA4\xC3\xA4\xC3\xA4\xC3\xA4", 8),
+            "\xC3\xA4\xC3\xA4\xC3\xA4\xC3\xA4\xC3\xA4\xC3\xA4\xC3\xA4\xC3\xA4");
+}
+
+}  // namespace
+}  // namespace panonav::testing
