@@ -107,13 +107,230 @@ TEST_F(MemoryFileCrash, EveryAcknowledgedViewSurvivesAKill) {
   EXPECT_GT(acknowledged.size(), 50U);
 }
 
+// Appends views from the number on in a process that ends without closing the file.
+void append_and_die(const std::filesystem::path& path, int first, int count) {
+  ASSERT_EQ(exit_code_of(start_child([&] {
+              MemoryFile file = MemoryFile::open(path, Access::read_write);
+              for (int number = first; number < first + count; ++number) {
+                file.append(numbered_view(file.header().shape, number));
+              }
+              std::_Exit(0);
+              return 0;
+            })),
+            0);
+  ASSERT_GT(std::filesystem::file_size(path.string() + "-wal"), 0U);
+}
+
+void append_and_close(const std::filesystem::path& path, int first, int count) {
+  MemoryFile file = MemoryFile::open(path, Access::read_write);
+  for (int number = first; number < first + count; ++number) {
+    file.append(numbered_view(file.header().shape, number));
+  }
+}
+
+class LogBesideAFile : public MemoryFileTest {
+ protected:
+  void SetUp() override {
+    { (void)MemoryFile::create(path, small_header()); }
+    append_and_close(path, 0, 3);
+    backup = bytes_of(path);
+  }
+  [[nodiscard]] std::filesystem::path beside(const char* suffix) const {
+    return path.string() + suffix;
+  }
+  // Neither a reader nor a writer takes the log, and the file stays as it is.
+  void expect_refused(const std::string& content, const char* suffix) const {
+    for (const Access access : {Access::read_only, Access::read_write, Access::read_only}) {
+      const auto message = message_of<FileError>([&] { (void)MemoryFile::open(path, access); });
+      EXPECT_TRUE(contains(message, "has a log beside it that is not its own"));
+      EXPECT_TRUE(contains(message, beside(suffix).string()));
+      EXPECT_EQ(message.find('\n'), std::string::npos);
+      ASSERT_TRUE(bytes_of(path) == content) << "a foreign log was applied";
+    }
+  }
+  std::string backup;
+};
+
+TEST_F(LogBesideAFile, IsNotAppliedToABackup) {
+  append_and_close(path, 3, 40);
+  append_and_die(path, 43, 4);
+  folder.write("m.panonav", backup);  // the same inode
+  expect_refused(backup, "-wal");
+  folder.write("other", backup);
+  std::filesystem::rename(folder / "other", path);  // another one
+  expect_refused(backup, "-wal");
+  for (const char* suffix : {"-wal", "-shm"}) std::filesystem::remove(beside(suffix));
+  MemoryFile file = MemoryFile::open(path, Access::read_write);
+  EXPECT_TRUE(file.verify().empty());
+  EXPECT_EQ(file.load().size(), 3U);
+}
+
+TEST_F(LogBesideAFile, IsNotAppliedToAnotherFile) {
+  const auto other = folder / "other.panonav";
+  { (void)MemoryFile::create(other, small_header()); }
+  append_and_close(other, 0, 3);
+  append_and_die(other, 3, 4);
+  std::filesystem::rename(other.string() + "-wal", beside("-wal"));
+  expect_refused(backup, "-wal");
+}
+
+// SQLite's other kind of log holds what is to be written back.
+TEST_F(LogBesideAFile, OfTheOtherKindIsNotApplied) {
+  const auto other = folder / "other.panonav";
+  { (void)MemoryFile::create(other, small_header()); }
+  append_and_close(other, 0, 200);
+  ASSERT_EQ(exit_code_of(start_child([&] {
+              sqlite3* database = nullptr;
+              sqlite3_open(other.c_str(), &database);
+              sqlite3_exec(database,
+                           "PRAGMA journal_mode=DELETE; PRAGMA cache_size=1; BEGIN; UPDATE views "
+                           "SET signature = zeroblob(3000)",
+                           nullptr, nullptr, nullptr);
+              std::_Exit(0);
+              return 0;
+            })),
+            0);
+  ASSERT_GT(std::filesystem::file_size(other.string() + "-journal"), 512U);
+  std::filesystem::rename(other.string() + "-journal", beside("-journal"));
+  expect_refused(backup, "-journal");
+}
+
+TEST_F(LogBesideAFile, OfAKilledWriterIsItsOwn) {
+  append_and_die(path, 3, 4);
+  EXPECT_EQ(MemoryFile::open(path, Access::read_only).load().size(), 7U);
+  append_and_die(path, 7, 4);
+  // The file as it was when the log began is the file that the log belongs to, on another inode
+  // too.
+  const std::string now = bytes_of(path);
+  std::filesystem::remove(path);
+  folder.write("m.panonav", now);
+  const MemoryFile file = MemoryFile::open(path, Access::read_write);
+  EXPECT_EQ(file.load().size(), 11U);
+  EXPECT_TRUE(file.verify().empty());
+}
+
+// A writer may be killed while its log goes into the file, page by page.
+TEST_F(LogBesideAFile, IsItsOwnWhileItGoesIntoTheFile) {
+  append_and_die(path, 3, 200);
+  const std::string log = bytes_of(beside("-wal"));
+  const std::string before = bytes_of(path);
+  { ASSERT_EQ(MemoryFile::open(path, Access::read_only).load().size(), 203U); }
+  const std::string after = bytes_of(path);
+  constexpr std::size_t page_bytes = 8192;
+  ASSERT_GT(after.size(), before.size() + page_bytes);
+  ASSERT_FALSE(std::filesystem::exists(beside("-wal")));
+  for (std::size_t written = 0; written <= after.size(); written += page_bytes) {
+    std::string torn = after.substr(0, written);
+    if (torn.size() < before.size()) torn += before.substr(torn.size());
+    folder.write("m.panonav", torn);
+    folder.write("m.panonav-wal", log);
+    std::filesystem::remove(beside("-shm"));
+    const MemoryFile file = MemoryFile::open(path, Access::read_only);
+    ASSERT_EQ(file.load().size(), 203U) << written;
+    ASSERT_TRUE(file.verify().empty());
+  }
+}
+
+// A reader that opens the file in this process must not take this process's locks away, or another
+// process that closes the file takes itself for the last one and removes the log.
+TEST_F(LogBesideAFile, IsNotRemovedWhileItIsInUse) {
+  MemoryFile writer = MemoryFile::open(path, Access::read_write);
+  writer.append(numbered_view(small_header().shape, 3));
+  { (void)MemoryFile::open(path, Access::read_only); }
+  // As another process would: SQLite removes the log when no lock keeps it from it.
+  EXPECT_EQ(exit_code_of(start_child([&] {
+              sqlite3* database = nullptr;
+              sqlite3_open(path.c_str(), &database);
+              sqlite3_exec(database, "SELECT * FROM views", nullptr, nullptr, nullptr);
+              return sqlite3_close(database);
+            })),
+            0);
+  EXPECT_TRUE(std::filesystem::exists(beside("-wal")));
+}
+
+TEST_F(MemoryFileCrash, AFileThatIsTakenAwayIsNoticed) {
+  const SignatureShape shape = small_header().shape;
+  const auto refused = [&](const std::function<void()>& take_away) {
+    std::filesystem::remove(path);
+    MemoryFile file = MemoryFile::create(path, small_header());
+    file.append(numbered_view(shape, 0));
+    take_away();
+    for (int number = 1; number < 3; ++number) {
+      const auto message =
+          message_of<FileError>([&] { file.append(numbered_view(shape, number)); });
+      EXPECT_TRUE(contains(message, path.string() + ": was deleted, moved or replaced"));
+    }
+  };
+  refused([&] { std::filesystem::remove(path); });
+  for (const char* suffix : {"-wal", "-shm"}) std::filesystem::remove(path.string() + suffix);
+  refused([&] {
+    { (void)MemoryFile::create(folder / "other.panonav", small_header()); }
+    std::filesystem::rename(folder / "other.panonav", path);
+  });
+  // The new file is what it was, and the log of the old one is not applied to it.
+  for (const char* suffix : {"-wal", "-shm"}) std::filesystem::remove(path.string() + suffix);
+  EXPECT_TRUE(MemoryFile::open(path, Access::read_only).load().empty());
+}
+
+TEST_F(MemoryFileCrash, ALeftTemporaryFileIsInNobodysWay) {
+  { (void)MemoryFile::create(folder / "left", small_header()); }
+  std::filesystem::rename(folder / "left", folder / ".m.panonav.tmp");
+  folder.write(".m.panonav.tmp-journal", "left, too");
+  { (void)MemoryFile::create(path, small_header()); }
+  EXPECT_TRUE(MemoryFile::open(path, Access::read_only).verify().empty());
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
+}
+
+// Without `change` the links are lost when the process is killed between the two.
+TEST_F(MemoryFileCrash, ChangesInOneAreAllOrNothing) {
+  const SignatureShape shape = small_header().shape;
+  std::vector<ViewId> ids;
+  {
+    MemoryFile file = MemoryFile::create(path, small_header());
+    for (int number = 0; number < 4; ++number)
+      ids.push_back(file.append(numbered_view(shape, number)));
+    file.link(std::vector<Link>{{ids[0], ids[1], LinkKind::sequence},
+                                {ids[1], ids[2], LinkKind::sequence}});
+  }
+  const auto prune = [&](MemoryFile& file, const std::function<void()>& between) {
+    file.change([&] {
+      file.remove(std::vector<ViewId>{ids[1]});
+      between();
+      file.link(std::vector<Link>{{ids[0], ids[2], LinkKind::sequence}});
+    });
+  };
+  const VisualMemory before = MemoryFile::open(path, Access::read_only).load();
+  EXPECT_EQ(exit_code_of(start_child([&] {
+              MemoryFile file = MemoryFile::open(path, Access::read_write);
+              prune(file, [] { std::_Exit(7); });
+              return 0;
+            })),
+            7);
+  EXPECT_TRUE(same_content(MemoryFile::open(path, Access::read_only).load(), before));
+  MemoryFile file = MemoryFile::open(path, Access::read_write);
+  EXPECT_THROW(prune(file, [] { throw ContractError("something", "wrong", "right"); }),
+               ContractError);
+  EXPECT_TRUE(same_content(file.load(), before));
+  // A part that fails is taken back alone when the caller goes on.
+  file.change([&] {
+    EXPECT_THROW(file.remove(std::vector<ViewId>{ids[3], ViewId{99}}), ContractError);
+    file.set_parameter("note", "kept");
+  });
+  EXPECT_TRUE(same_content(file.load(), before));
+  EXPECT_EQ(file.parameter("note"), "kept");
+  prune(file, [] {});
+  EXPECT_EQ(file.load().size(), 3U);
+  EXPECT_EQ(file.links(), (std::vector<Link>{{ids[0], ids[2], LinkKind::sequence}}));
+  EXPECT_TRUE(file.verify().empty());
+}
+
 // A write beyond the limit fails as on a full disk.
 TEST_F(MemoryFileCrash, AFullDiskLosesNothing) {
   MemoryHeader header = small_header();
   header.shape = {80, 15};
   header.panorama_columns = 512;
   { (void)MemoryFile::create(path, header); }
-  constexpr rlim_t limit_bytes = 400000;
+  constexpr rlim_t limit_bytes = 450000;
   const int appended = exit_code_of(start_child([&] {
     ::signal(SIGXFSZ, SIG_IGN);
     const rlimit limit{limit_bytes, limit_bytes};

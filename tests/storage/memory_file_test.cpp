@@ -96,7 +96,7 @@ TEST_F(MemoryFileContent, ContentComesBack) {
   EXPECT_EQ(info.links, 1U);
   EXPECT_EQ(info.thumbnails, 13U);
   EXPECT_GT(info.file_bytes, 8192U);
-  EXPECT_EQ(info.format_version, 1);
+  EXPECT_EQ(info.format_version, 5);
   std::uint64_t positions = 0;
   std::uint64_t headings = 0;
   for (const ViewId view : expected.views()) {
@@ -336,7 +336,6 @@ TEST_F(MemoryFileContent, ChainsOfAnOlderVersionAreCountedAndStayAsTheyAre) {
   ASSERT_NE(before.find("0B0A0908"), std::string::npos);
   {
     MemoryFile file = MemoryFile::open(path, Access::read_write);
-    EXPECT_EQ(file.info().format_version, 2);
     EXPECT_EQ(file.info().unused_chains, 1U);
     EXPECT_TRUE(file.verify().empty());
     const ViewId view = file.append(random_view(random, shape, 2));
@@ -346,22 +345,40 @@ TEST_F(MemoryFileContent, ChainsOfAnOlderVersionAreCountedAndStayAsTheyAre) {
     file.remove(file.views());
   }
   const MemoryFile file = MemoryFile::open(path, Access::read_only);
-  EXPECT_EQ(file.info().format_version, 3);
+  EXPECT_EQ(file.info().format_version, 5);
   EXPECT_EQ(file.info().unused_chains, 1U);
   EXPECT_TRUE(file.verify().empty());
   EXPECT_EQ(chains_in(path), before);
 }
 
-// Programs that knew chains want their tables in every file of version 2 and more.
-TEST_F(MemoryFileContent, NewFilesWithAMapHaveTheEmptyTablesOfChains) {
-  MemoryFile::create(path, small_header()).save_map("map", {});
-  EXPECT_EQ(chains_in(path), "");
-  EXPECT_EQ(MemoryFile::open(path, Access::read_only).info().unused_chains, 0U);
+TEST_F(MemoryFileContent, AnOlderFileIsReadAsItIsAndGrowsWithItsFirstChange) {
+  Random random(9);
+  const SignatureShape shape = small_header().shape;
+  (void)MemoryFile::create(path, small_header()).append(random_view(random, shape, 1));
+  make_version_1(path);
+  const std::string before = bytes_of(path);
+  {
+    const MemoryFile file = MemoryFile::open(path, Access::read_only);
+    EXPECT_EQ(file.info().format_version, 1);
+    EXPECT_EQ(file.load().size(), 1U);
+    EXPECT_FALSE(file.map("map"));
+    EXPECT_FALSE(file.route("route"));
+    EXPECT_FALSE(file.undoable());
+    EXPECT_TRUE(file.verify().empty());
+  }
+  EXPECT_EQ(bytes_of(path), before);
+  MemoryFile file = MemoryFile::open(path, Access::read_write);
+  file.append(random_view(random, shape, 2));
+  file.save_map("map", {});
+  EXPECT_EQ(file.info().format_version, 5);
+  EXPECT_EQ(file.load().size(), 2U);
+  EXPECT_TRUE(file.verify().empty());
 }
 
 TEST_F(MemoryFileContent, AFileThatClaimsChainsWithoutTheirTablesIsRefused) {
   { (void)MemoryFile::create(path, small_header()); }
-  run_sql(path, "PRAGMA journal_mode=DELETE; PRAGMA user_version=2");
+  make_version_1(path);
+  run_sql(path, "PRAGMA user_version=2");
   EXPECT_TRUE(
       contains(message_of<FileError>([&] { (void)MemoryFile::open(path, Access::read_only); }),
                "table chain_snapshots is missing"));

@@ -100,7 +100,7 @@ TEST_F(ViewsOfAMemoryFile, DamageIsAFaultOfTheFile) {
   Random random(3);
   int views_refused = 0;
   int views_read = 0;
-  for (int trial = 0; trial < 200; ++trial) {
+  for (int trial = 0; trial < 400; ++trial) {
     SCOPED_TRACE(trial);
     const auto copy = folder.write("damaged.panonav", damaged_bytes(good, random, trial));
     try {

@@ -5,13 +5,13 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <string>
 #include <system_error>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/temporary_file.hpp"
 
 namespace panonav {
 
@@ -33,29 +33,9 @@ class Descriptor {
   Descriptor(const Descriptor&) = delete;
   Descriptor& operator=(const Descriptor&) = delete;
   [[nodiscard]] int number() const noexcept { return number_; }
-  [[nodiscard]] bool close() {
-    const int number = number_;
-    number_ = -1;
-    return ::close(number) == 0;
-  }
 
  private:
   int number_;
-};
-
-// Removes the temporary file unless it has got its name.
-class TemporaryFile {
- public:
-  explicit TemporaryFile(fs::path path) : path_(std::move(path)) {}
-  ~TemporaryFile() {
-    if (!path_.empty()) ::unlink(path_.c_str());
-  }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-  void keep() { path_.clear(); }
-
- private:
-  fs::path path_;
 };
 
 void write_all(int descriptor, std::span<const std::uint8_t> bytes, const fs::path& path) {
@@ -78,14 +58,6 @@ fs::path behind_links(const fs::path& path) {
   return target;
 }
 
-fs::path temporary_name(const fs::path& path) {
-  static std::atomic<unsigned> counter{0};
-  std::string name(1, '.');
-  name += path.filename().string() + "." + std::to_string(::getpid()) + "." +
-          std::to_string(counter++) + ".tmp";
-  return path.parent_path() / name;
-}
-
 }  // namespace
 
 void write_file(const fs::path& path, std::span<const std::uint8_t> bytes) {
@@ -102,19 +74,15 @@ void write_file(const fs::path& path, std::span<const std::uint8_t> bytes) {
   }
 
   const fs::path target = behind_links(path);
-  const fs::path temporary = temporary_name(target);
-  Descriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
-  if (file.number() < 0) throw FileError(path.string(), "cannot be written: " + cause());
-  TemporaryFile guard(temporary);
-  if (exists && ::fchmod(file.number(), status.st_mode & 07777) != 0) {
+  TemporaryFile file(target);
+  if (exists && ::fchmod(file.descriptor(), status.st_mode & 07777) != 0) {
     throw FileError(path.string(), "cannot be written: " + cause());
   }
-  write_all(file.number(), bytes, path);
-  if (::fsync(file.number()) != 0 || !file.close() ||
-      ::rename(temporary.c_str(), target.c_str()) != 0) {
+  write_all(file.descriptor(), bytes, path);
+  if (::fsync(file.descriptor()) != 0 || ::rename(file.path().c_str(), target.c_str()) != 0) {
     throw FileError(path.string(), "cannot be written: " + cause());
   }
-  guard.keep();
+  file.keep();
 }
 
 void write_file(const fs::path& path, std::string_view text) {

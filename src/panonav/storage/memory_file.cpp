@@ -237,6 +237,7 @@ MemoryFile MemoryFile::open(const std::filesystem::path& path, Access access) {
     database.leave_log_on_close();
     database.fail_damaged(error.what());
   }
+  if (access == Access::read_write) prepare_for_changes(database);
   // Members hold the database's address, so it must have its last one before they are made.
   return MemoryFile(
       std::make_unique<Implementation>(path, std::move(database), std::move(*header)));
@@ -524,6 +525,7 @@ std::vector<MemoryFault> MemoryFile::verify() const {
     if (!has_route_tables(database)) return;
     verify_routes(database, [&](const std::function<void()>& part) { check(std::nullopt, part); });
   });
+  check(std::nullopt, [&] { static_cast<void>(undoable()); });
   return faults;
 }
 

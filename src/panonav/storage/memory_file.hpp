@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -87,6 +88,19 @@ class MemoryFile {
 
   [[nodiscard]] const MemoryHeader& header() const noexcept;
   [[nodiscard]] const std::filesystem::path& path() const noexcept;
+
+  /// All that `changes` changes by the member functions below, in one transaction: all of it is on
+  /// the disk when this returns, nothing of it when `changes` throws or the process ends before.
+  /// With `undo`, a description for people, what it replaced or dropped is kept in the file,
+  /// instead of what was kept before, so that `undo` brings it back. Throws FileError when that is
+  /// more than 200 MiB.
+  void change(const std::function<void()>& changes,
+              const std::optional<std::string>& undo = std::nullopt);
+  /// The description of the change that `undo` takes back; empty: there is none.
+  [[nodiscard]] std::optional<std::string> undoable() const;
+  /// Takes back the last change that was kept for this, in one transaction; what was added since
+  /// stays. Throws ContractError when there is none, FileError when later changes are in the way.
+  void undo();
 
   /// Adds a view and returns once it is on the disk. Throws ContractError on another shape, an
   /// empty or known name, or values that are not finite. Ids grow and are never used twice, even

@@ -14,7 +14,6 @@ void MemoryFile::save_map(std::string_view name, const TopologicalMap& map) {
   for (const MapNode& node : map.nodes) {
     if (!implementation_->contains(node.view)) refuse_view(node.view);
   }
-  add_map_table(database);
   write_map(database, name, map);
   transaction.commit();
 }
@@ -45,7 +44,6 @@ std::vector<std::string> MemoryFile::map_names() const {
 std::size_t MemoryFile::append_route(std::string_view name, const RoutePanorama& more) {
   Database& database = implementation_->database;
   Transaction transaction(database, Transaction::Kind::writing);
-  add_route_tables(database);
   const std::size_t appended = append_to_route(database, name, more);
   transaction.commit();
   return appended;

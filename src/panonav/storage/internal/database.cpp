@@ -30,6 +30,8 @@ std::string uri_of(const std::filesystem::path& path) {
   return uri + "?immutable=1";
 }
 
+constexpr int steps_between_looks = 20000;  // some 0.2 ms
+
 std::string one_line(std::string text) {
   std::ranges::replace(text, '\n', ' ');
   return text;
@@ -64,9 +66,19 @@ Database::Database(std::filesystem::path path, DatabaseMode mode) : path_(std::m
   const int code = sqlite3_open_v2(name.c_str(), &handle, flags, nullptr);
   handle_.reset(handle);
   if (code != SQLITE_OK) fail(code);
-  // A foreign or damaged file must not make SQLite run code or take much memory.
+  // A foreign or damaged file must not make SQLite run code, take much memory or never end.
   constexpr int busy_milliseconds = 10000;
   constexpr int longest_field = 1 << 28;
+  steps_left_ = std::make_unique<std::int64_t>(0);
+  allow_steps();
+  sqlite3_progress_handler(
+      handle, steps_between_looks,
+      [](void* left) {
+        auto& steps = *static_cast<std::int64_t*>(left);
+        steps -= steps_between_looks;
+        return steps < 0 ? 1 : 0;
+      },
+      steps_left_.get());
   sqlite3_db_config(handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
   sqlite3_db_config(handle, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
   sqlite3_limit(handle, SQLITE_LIMIT_LENGTH, longest_field);
@@ -74,7 +86,38 @@ Database::Database(std::filesystem::path path, DatabaseMode mode) : path_(std::m
   execute("PRAGMA cell_size_check=ON");
 }
 
+void Database::allow_steps() noexcept {
+  // A page has room for fewer than 2000 rows, and a row takes fewer than 25 steps.
+  constexpr std::int64_t at_least = 50'000'000;  // some 0.5 s
+  constexpr std::int64_t for_each_byte = 2000 * 25 / 8192;
+  std::int64_t bytes = 0;
+  for (const char* suffix : {"", "-wal"}) {
+    std::filesystem::path file = path_;
+    file += suffix;
+    std::error_code missing;
+    const auto size = std::filesystem::file_size(file, missing);
+    if (!missing) bytes += static_cast<std::int64_t>(size);
+  }
+  steps_allowed_ = at_least + for_each_byte * bytes;
+  refill_steps();
+}
+
+void Database::refill_steps() const noexcept {
+  *steps_left_ = steps_allowed_;
+}
+
+void Database::require_name() const {
+  if (!watches_name_) return;
+  int moved = 0;
+  sqlite3_file_control(handle_.get(), "main", SQLITE_FCNTL_HAS_MOVED, &moved);
+  if (moved == 0) return;
+  throw FileError(path_.string(),
+                  "was deleted, moved or replaced while it was being written; what was being "
+                  "written is not in the file of that name");
+}
+
 void Database::execute(const char* sql) {
+  refill_steps();
   const int code = sqlite3_exec(handle_.get(), sql, nullptr, nullptr, nullptr);
   if (code != SQLITE_OK) fail(code);
 }
@@ -113,6 +156,8 @@ void Database::fail(int code) const {
     case SQLITE_TOOBIG:
     case SQLITE_SCHEMA:
       fail_damaged(text);
+    case SQLITE_INTERRUPT:
+      fail_damaged("its tables are read without end");
     case SQLITE_FULL:
       throw FileError(name, "cannot be written: the disk is full");
     case SQLITE_BUSY:
@@ -136,6 +181,7 @@ void Statement::Finalise::operator()(sqlite3_stmt* statement) const noexcept {
 }
 
 Statement::Statement(Database& database, const char* sql) : database_(&database) {
+  database.refill_steps();
   sqlite3_stmt* statement = nullptr;
   const int code = sqlite3_prepare_v3(database.handle(), sql, -1, SQLITE_PREPARE_PERSISTENT,
                                       &statement, nullptr);
@@ -205,6 +251,7 @@ int Statement::run() {
 
 void Statement::reset() noexcept {
   sqlite3_reset(statement_.get());
+  database_->refill_steps();
 }
 
 int Statement::type(int column) const {
@@ -250,18 +297,39 @@ std::span<const std::uint8_t> Statement::blob(int column) const {
   return {data, data == nullptr ? 0 : size};
 }
 
-Transaction::Transaction(Database& database, Kind kind) : database_(database) {
+Transaction::Transaction(Database& database, Kind kind)
+    : database_(database), within_another_(database.in_transaction()) {
+  if (within_another_) {
+    open_ = kind == Kind::writing;
+    if (open_) database_.execute("SAVEPOINT part");
+    return;
+  }
+  database_.allow_steps();
   database_.execute(kind == Kind::writing ? "BEGIN IMMEDIATE" : "BEGIN");
+  try {
+    database_.require_name();
+  } catch (...) {
+    sqlite3_exec(database_.handle(), "ROLLBACK", nullptr, nullptr, nullptr);
+    throw;
+  }
 }
 
 Transaction::~Transaction() {
-  if (!database_.in_transaction()) return;
-  // SQLite rolls back by itself when this fails.
-  sqlite3_exec(database_.handle(), "ROLLBACK", nullptr, nullptr, nullptr);
+  if (!open_ || !database_.in_transaction()) return;  // SQLite rolls back by itself when it fails
+  sqlite3_exec(database_.handle(), within_another_ ? "ROLLBACK TO part; RELEASE part" : "ROLLBACK",
+               nullptr, nullptr, nullptr);
 }
 
 void Transaction::commit() {
-  database_.execute("COMMIT");
+  if (within_another_) {
+    database_.execute("RELEASE part");
+  } else {
+    database_.execute("UPDATE log SET before = now, now = randomblob(16)");
+    database_.require_name();
+    database_.execute("COMMIT");
+    database_.require_name();
+  }
+  open_ = false;
 }
 
 }  // namespace panonav

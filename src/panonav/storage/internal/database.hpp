@@ -28,6 +28,10 @@ class Database {
   void execute(const char* sql);
   [[nodiscard]] std::int64_t integer(const char* sql);
   [[nodiscard]] bool in_transaction() const noexcept;
+  /// From now on every transaction asks whether the file still has its name, and throws when it was
+  /// deleted, moved or replaced.
+  void watch_name() noexcept { watches_name_ = true; }
+  void require_name() const;
   /// Closing will leave the write-ahead log as it is instead of bringing it into the file.
   void leave_log_on_close() noexcept;
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
@@ -37,12 +41,21 @@ class Database {
   [[noreturn]] void fail(int code) const;
   [[noreturn]] void fail_damaged(std::string_view what) const;
 
+  /// From now on a statement may take a number of steps in proportion to the size that the file has
+  /// now, since tables whose pages refer to each other would be read without end.
+  void allow_steps() noexcept;
+  /// A statement begins.
+  void refill_steps() const noexcept;
+
  private:
   struct Close {
     void operator()(sqlite3* handle) const noexcept;
   };
   std::filesystem::path path_;
+  std::unique_ptr<std::int64_t> steps_left_;  // has an address that stays when this is moved
+  std::int64_t steps_allowed_ = 0;
   std::unique_ptr<sqlite3, Close> handle_;
+  bool watches_name_ = false;
 };
 
 /// A prepared statement. Bound texts and blobs must live until the statement is reset.
@@ -81,7 +94,8 @@ class Statement {
   std::unique_ptr<sqlite3_stmt, Finalise> statement_;
 };
 
-/// Rolls back unless committed.
+/// Rolls back unless committed. Within a writing transaction it is a part of that one, which is
+/// taken back alone or committed with the whole.
 class Transaction {
  public:
   enum class Kind { reading, writing };
@@ -89,11 +103,14 @@ class Transaction {
   ~Transaction();
   Transaction(const Transaction&) = delete;
   Transaction& operator=(const Transaction&) = delete;
-  /// Returns once everything is on the disk.
+  /// Returns once everything is on the disk, with a new mark in the table `log`. Throws FileError
+  /// when the file is no longer where it was opened.
   void commit();
 
  private:
   Database& database_;
+  bool within_another_;
+  bool open_ = true;
 };
 
 }  // namespace panonav

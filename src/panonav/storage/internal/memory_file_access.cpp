@@ -9,7 +9,9 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/temporary_file.hpp"
 #include "panonav/storage/internal/memory_schema.hpp"
+#include "panonav/storage/internal/write_ahead_log.hpp"
 #include "panonav/storage/memory_header.hpp"
 
 namespace panonav {
@@ -45,22 +47,11 @@ void sync_folder(const fs::path& folder) {
   ::close(descriptor);
 }
 
-// Removes a database that never got its name, with what SQLite may have laid beside it.
-class UnfinishedFile {
- public:
-  explicit UnfinishedFile(fs::path path) : path_(std::move(path)) {}
-  ~UnfinishedFile() {
-    for (const char* suffix : {"", "-journal", "-wal", "-shm"}) {
-      ::unlink(with_suffix(path_, suffix).c_str());
-    }
+void remove_beside(const fs::path& path) {
+  for (const char* suffix : {"-journal", "-wal", "-shm"}) {
+    ::unlink(with_suffix(path, suffix).c_str());
   }
-  UnfinishedFile(const UnfinishedFile&) = delete;
-  UnfinishedFile& operator=(const UnfinishedFile&) = delete;
-  [[nodiscard]] const fs::path& path() const noexcept { return path_; }
-
- private:
-  fs::path path_;
-};
+}
 
 }  // namespace
 
@@ -88,10 +79,9 @@ void make_memory_file(const fs::path& path, const MemoryHeader& header) {
     }
   }
 
-  std::string hidden_name(1, '.');
-  hidden_name += path.filename().string() + "." + std::to_string(::getpid()) + ".new";
-  const UnfinishedFile unfinished(folder / hidden_name);
-  {
+  const TemporaryFile unfinished(path);
+  remove_beside(unfinished.path());
+  try {
     Database database(unfinished.path(), DatabaseMode::create);
     database.execute("PRAGMA synchronous=FULL");
     // Three views of 80 x 15 fit on a page; larger pages cost more bytes per append.
@@ -101,6 +91,9 @@ void make_memory_file(const fs::path& path, const MemoryHeader& header) {
     for (const auto& [key, value] : settings_of(header)) write_setting(database, key, value);
     transaction.commit();
     database.execute("PRAGMA journal_mode=WAL");
+  } catch (...) {
+    remove_beside(unfinished.path());
+    throw;
   }
   // A link refuses a name that was taken meanwhile; a rename would replace that file.
   if (::link(unfinished.path().c_str(), path.c_str()) != 0) {
@@ -124,6 +117,7 @@ Database open_memory_database(const fs::path& path, Access access) {
     if (!may_write) {
       throw FileError(name, "cannot be changed: no permission to write the file and its folder");
     }
+    require_own_log(file);
     Database database(file, DatabaseMode::change);
     database.execute("PRAGMA synchronous=FULL");
     return database;
@@ -138,6 +132,7 @@ Database open_memory_database(const fs::path& path, Access access) {
   if (!may_write && at_rest()) {
     return {file, DatabaseMode::immutable};
   }
+  require_own_log(file);
   try {
     // Opened for writing, where that is possible, so that SQLite can clear its log away in the end;
     // no statement may write.
@@ -156,6 +151,29 @@ Database open_memory_database(const fs::path& path, Access access) {
                         " that can be read only with permission to write the folder; open the "
                         "file once with that permission");
   }
+}
+
+void prepare_for_changes(Database& database) {
+  const auto require_alone = [&](bool alone) {
+    if (!alone) {
+      throw FileError(database.path().string(),
+                      "is being used by another program; its first change by this version needs "
+                      "it alone");
+    }
+  };
+  const bool older = format_version(database) < memory_format_version;
+  if (older) {
+    Transaction transaction(database, Transaction::Kind::writing);
+    upgrade_schema(database);
+    transaction.commit();
+  }
+  {
+    Statement mode(database, "PRAGMA journal_mode=WAL");
+    require_alone(mode.step() && mode.text(0) == "wal");
+  }
+  // The marks must be in the file itself before its log holds anything else.
+  if (older) require_alone(database.integer("PRAGMA wal_checkpoint(TRUNCATE)") == 0);
+  database.watch_name();
 }
 
 }  // namespace panonav

@@ -15,4 +15,8 @@ void make_memory_file(const std::filesystem::path& path, const MemoryHeader& hea
 /// the connection can change the file.
 [[nodiscard]] Database open_memory_database(const std::filesystem::path& path, Access access);
 
+/// Gives a checked file of an older version or in another journal mode what changes need. Throws
+/// FileError when another program is using it just then.
+void prepare_for_changes(Database& database);
+
 }  // namespace panonav

@@ -1,6 +1,5 @@
 #include "panonav/storage/internal/memory_schema.hpp"
 
-#include <fcntl.h>
 #include <sqlite3.h>
 #include <unistd.h>
 
@@ -8,6 +7,8 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <map>
+#include <set>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -19,59 +20,69 @@ namespace panonav {
 
 namespace {
 
-// Names and texts as SQLite keeps them. Links have a < b. Every checksum is XXH64 over the other
-// fields of its row (docs/formats.md).
-constexpr std::array<std::pair<const char*, const char*>, 4> tables{{
+struct Table {
+  std::string_view name;
+  const char* sql;  // as SQLite keeps it
+  int since;        // version of the format
+};
+
+// Links have a < b. Every checksum is XXH64 over the other fields of its row (docs/formats.md). The
+// table `log` comes first, so that new files have it on their second page.
+constexpr std::array<Table, 9> tables{{
+    {"log",
+     "CREATE TABLE log(id INTEGER PRIMARY KEY, before BLOB NOT NULL, now BLOB NOT NULL) STRICT", 5},
+    {"undo",
+     "CREATE TABLE undo(id INTEGER PRIMARY KEY, what TEXT NOT NULL, changes BLOB NOT NULL, "
+     "checksum INTEGER NOT NULL) STRICT",
+     5},
     {"links",
      "CREATE TABLE links(a INTEGER NOT NULL, b INTEGER NOT NULL, kind INTEGER NOT NULL, checksum "
-     "INTEGER NOT NULL, PRIMARY KEY(a, b)) STRICT, WITHOUT ROWID"},
+     "INTEGER NOT NULL, PRIMARY KEY(a, b)) STRICT, WITHOUT ROWID",
+     1},
     {"settings",
      "CREATE TABLE settings(key TEXT NOT NULL PRIMARY KEY, value ANY NOT NULL, checksum INTEGER "
-     "NOT "
-     "NULL) STRICT, WITHOUT ROWID"},
+     "NOT NULL) STRICT, WITHOUT ROWID",
+     1},
     {"thumbnails",
      "CREATE TABLE thumbnails(view INTEGER PRIMARY KEY, picture BLOB NOT NULL, checksum INTEGER "
-     "NOT "
-     "NULL) STRICT"},
+     "NOT NULL) STRICT",
+     1},
     {"views",
      "CREATE TABLE views(id INTEGER PRIMARY KEY AUTOINCREMENT, name TEXT NOT NULL UNIQUE, x_m "
-     "REAL, "
-     "y_m REAL, heading_rad REAL, stamp_s REAL, signature BLOB NOT NULL, checksum INTEGER NOT "
-     "NULL) "
-     "STRICT"},
+     "REAL, y_m REAL, heading_rad REAL, stamp_s REAL, signature BLOB NOT NULL, checksum INTEGER "
+     "NOT NULL) STRICT",
+     1},
+    {"maps",
+     "CREATE TABLE maps(name TEXT NOT NULL PRIMARY KEY, nodes BLOB NOT NULL, edges BLOB NOT NULL, "
+     "checksum INTEGER NOT NULL) STRICT, WITHOUT ROWID",
+     3},
+    {"route_blocks",
+     "CREATE TABLE route_blocks(route TEXT NOT NULL, number INTEGER NOT NULL, lines BLOB NOT NULL, "
+     "checksum INTEGER NOT NULL, PRIMARY KEY(route, number)) STRICT, WITHOUT ROWID",
+     4},
+    {"routes",
+     "CREATE TABLE routes(name TEXT NOT NULL PRIMARY KEY, columns INTEGER NOT NULL, lines INTEGER "
+     "NOT NULL, checksum INTEGER NOT NULL) STRICT, WITHOUT ROWID",
+     4},
 }};
-
-// Of version 2; sorted by name they come before the others. Nothing but older programs writes them.
-constexpr std::array<std::pair<const char*, const char*>, 2> chain_tables{{
+// Of versions 2 to 4; files that were one of these keep them. Nothing writes or reads them any
+// more.
+constexpr std::array<Table, 2> chain_tables{{
     {"chain_snapshots",
      "CREATE TABLE chain_snapshots(chain TEXT NOT NULL, number INTEGER NOT NULL, travelled_m REAL "
      "NOT NULL, x_m REAL NOT NULL, y_m REAL NOT NULL, heading_rad REAL NOT NULL, coefficients BLOB "
-     "NOT NULL, checksum INTEGER NOT NULL, PRIMARY KEY(chain, number)) STRICT, WITHOUT ROWID"},
+     "NOT NULL, checksum INTEGER NOT NULL, PRIMARY KEY(chain, number)) STRICT, WITHOUT ROWID",
+     2},
     {"chains",
      "CREATE TABLE chains(name TEXT NOT NULL PRIMARY KEY, rows INTEGER NOT NULL, components "
-     "INTEGER "
-     "NOT NULL, elevation_bottom_rad REAL, elevation_top_rad REAL, snapshots INTEGER NOT NULL, "
-     "checksum INTEGER NOT NULL) STRICT, WITHOUT ROWID"},
+     "INTEGER NOT NULL, elevation_bottom_rad REAL, elevation_top_rad REAL, snapshots INTEGER NOT "
+     "NULL, checksum INTEGER NOT NULL) STRICT, WITHOUT ROWID",
+     2},
 }};
-// Of version 3; sorted by name it comes after the links.
-constexpr const char* map_table_name = "maps";
-constexpr const char* map_table =
-    "CREATE TABLE maps(name TEXT NOT NULL PRIMARY KEY, nodes BLOB NOT NULL, edges BLOB NOT NULL, "
-    "checksum INTEGER NOT NULL) STRICT, WITHOUT ROWID";
-// Of version 4; they come after the maps.
-constexpr std::array<std::pair<const char*, const char*>, 2> route_tables{{
-    {"route_blocks",
-     "CREATE TABLE route_blocks(route TEXT NOT NULL, number INTEGER NOT NULL, lines BLOB NOT NULL, "
-     "checksum INTEGER NOT NULL, PRIMARY KEY(route, number)) STRICT, WITHOUT ROWID"},
-    {"routes",
-     "CREATE TABLE routes(name TEXT NOT NULL PRIMARY KEY, columns INTEGER NOT NULL, lines INTEGER "
-     "NOT NULL, checksum INTEGER NOT NULL) STRICT, WITHOUT ROWID"},
-}};
-constexpr int first_version = 1;
-constexpr int version_with_chains = 2;
-constexpr int version_with_maps = 3;
-constexpr int version_with_routes = 4;
 
+// What SQLite adds by itself: the last id of the views, and the index of their names.
+constexpr std::string_view sequence = "CREATE TABLE sqlite_sequence(name,seq)";
+constexpr std::string_view names_index = "sqlite_autoindex_views_1";
 // The second end of a link, so that a view's links are found from either.
 constexpr const char* links_index = "CREATE INDEX links_b ON links(b)";
 
@@ -128,24 +139,22 @@ void require_memory_file(const std::filesystem::path& path) {
   if (std::filesystem::is_directory(path, ignored)) {
     throw FileError(name, "is a folder; allowed: a memory file");
   }
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) {
+  // Through SQLite, which knows of its other connections to the file in this process: closing a
+  // descriptor of our own would give up all locks that they hold.
+  if (::access(path.c_str(), R_OK) != 0) {
     throw FileError(name, "cannot be read: " + std::generic_category().message(errno));
   }
+  if (!std::filesystem::is_regular_file(path, ignored)) {
+    throw FileError(name, "is no file; allowed: a memory file");
+  }
+  const Database database(path, DatabaseMode::immutable);
+  sqlite3_file* file = nullptr;
+  sqlite3_file_control(database.handle(), "main", SQLITE_FCNTL_FILE_POINTER, &file);
   std::array<std::uint8_t, 100> head{};
-  std::size_t filled = 0;
-  ssize_t got = 1;
-  while (filled < head.size() && got > 0) {
-    got = ::read(descriptor, head.data() + filled, head.size() - filled);
-    if (got > 0) filled += static_cast<std::size_t>(got);
-  }
-  const int read_error = got < 0 ? errno : 0;
-  ::close(descriptor);
-  if (read_error != 0) {
-    throw FileError(name, "cannot be read: " + std::generic_category().message(read_error));
-  }
+  const int code = file->pMethods->xRead(file, head.data(), static_cast<int>(head.size()), 0);
+  if (code != SQLITE_OK && code != SQLITE_IOERR_SHORT_READ) database.fail(code);
   constexpr std::string_view magic("SQLite format 3\0", 16);
-  if (filled < head.size() || std::memcmp(head.data(), magic.data(), magic.size()) != 0) {
+  if (code != SQLITE_OK || std::memcmp(head.data(), magic.data(), magic.size()) != 0) {
     throw FileError(name, "is no memory file; allowed: files that panonav memorise made");
   }
   const std::uint32_t application_id = big_endian(head.data() + 68);
@@ -165,69 +174,66 @@ void require_memory_file(const std::filesystem::path& path) {
                               std::to_string(memory_format_version));
 }
 
+int format_version(Database& database) {
+  return static_cast<int>(database.integer("PRAGMA user_version"));
+}
+
 void create_schema(Database& database) {
   database.execute(("PRAGMA application_id=" + std::to_string(memory_application_id)).c_str());
-  database.execute(("PRAGMA user_version=" + std::to_string(first_version)).c_str());
-  for (const auto& [name, text] : tables) database.execute(text);
+  upgrade_schema(database);
   database.execute(links_index);
 }
 
-bool has_chain_tables(Database& database) {
-  return database.integer("PRAGMA user_version") >= version_with_chains;
-}
-
-bool has_map_table(Database& database) {
-  return database.integer("PRAGMA user_version") >= version_with_maps;
-}
-
-void add_map_table(Database& database) {
-  if (has_map_table(database)) return;
-  if (!has_chain_tables(database)) {
-    for (const auto& [name, text] : chain_tables) database.execute(text);
+void upgrade_schema(Database& database) {
+  const int version = format_version(database);
+  for (const Table& table : tables) {
+    if (version < table.since) database.execute(table.sql);
   }
-  database.execute(map_table);
-  database.execute(("PRAGMA user_version=" + std::to_string(version_with_maps)).c_str());
+  database.execute("INSERT INTO log VALUES(1, zeroblob(16), randomblob(16))");
+  database.execute(("PRAGMA user_version=" + std::to_string(memory_format_version)).c_str());
 }
 
-bool has_route_tables(Database& database) {
-  return database.integer("PRAGMA user_version") >= version_with_routes;
-}
-
-void add_route_tables(Database& database) {
-  if (has_route_tables(database)) return;
-  add_map_table(database);
-  for (const auto& [name, text] : route_tables) database.execute(text);
-  database.execute(("PRAGMA user_version=" + std::to_string(version_with_routes)).c_str());
+bool has_chain_tables(Database& database) {
+  return database.integer("SELECT count(*) FROM sqlite_schema WHERE name = 'chains'") > 0;
 }
 
 void require_schema(Database& database) {
-  Statement rows(database,
-                 "SELECT type, name, sql FROM sqlite_schema WHERE name NOT LIKE 'sqlite\\_%' "
-                 "ESCAPE '\\' ORDER BY type <> 'table', name");
-  const auto require_table = [&](std::string_view name, std::string_view text) {
-    if (!rows.step() || rows.text(0) != "table" || rows.text(1) != name || rows.text(2) != text) {
-      database.fail_damaged("table " + std::string(name) + " is missing or not as it was made");
-    }
+  const int version = format_version(database);
+  struct Entry {
+    std::string_view type, table, sql;
   };
-  if (has_chain_tables(database)) {
-    for (const auto& [name, text] : chain_tables) require_table(name, text);
-  }
-  const bool maps = has_map_table(database);
-  const bool routes = has_route_tables(database);
-  for (const auto& [name, text] : tables) {
-    if (std::string_view(name) == "settings") {
-      if (maps) require_table(map_table_name, map_table);
-      if (routes) {
-        for (const auto& [route_name, route_text] : route_tables) {
-          require_table(route_name, route_text);
-        }
-      }
+  std::map<std::string_view, Entry> wanted{
+      {"sqlite_sequence", {"table", "sqlite_sequence", sequence}},
+      {names_index, {"index", "views", ""}},
+      {"links_b", {"index", "links", links_index}}};
+  const auto want = [&](const Table& table) {
+    if (table.since <= version) wanted[table.name] = {"table", table.name, table.sql};
+  };
+  for (const Table& table : tables) want(table);
+  for (const Table& table : chain_tables) want(table);
+  const auto fail = [&](std::string_view type, std::string_view name, const char* what) {
+    database.fail_damaged(std::string(type) + " " + std::string(name.substr(0, 60)) + " " + what);
+  };
+  // An entry is taken out when it is found, so that a second one of its name is not wanted.
+  Statement rows(database,
+                 "SELECT type, name, tbl_name, coalesce(sql, ''), rootpage FROM sqlite_schema");
+  std::set<std::int64_t> pages{1};
+  while (rows.step()) {
+    const auto found = wanted.find(rows.text(1));
+    if (found == wanted.end()) fail(rows.text(0), rows.text(1), "is no part of a memory");
+    const Entry& entry = found->second;
+    if (rows.text(0) != entry.type || rows.text(2) != entry.table || rows.text(3) != entry.sql ||
+        !pages.insert(rows.integer(4)).second) {
+      fail(entry.type, found->first, "is not as it was made");
     }
-    require_table(name, text);
+    wanted.erase(found);
   }
-  if (!rows.step() || rows.text(1) != "links_b" || rows.text(2) != links_index || rows.step()) {
-    database.fail_damaged("the tables are not as they were made");
+  if (version == memory_format_version && wanted.contains("chains") &&
+      wanted.contains("chain_snapshots")) {
+    for (const Table& table : chain_tables) wanted.erase(table.name);
   }
+  for (const auto& [name, entry] : wanted)
+    fail(entry.type, name, "is missing or not as it was made");
 }
 
 Settings read_settings(Database& database) {

@@ -1,0 +1,200 @@
+#include "panonav/storage/internal/write_ahead_log.hpp"
+
+#include <sqlite3.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <fstream>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+#include "panonav/storage/internal/database.hpp"
+
+namespace panonav {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+using Mark = std::array<std::uint8_t, 16>;
+
+struct Marks {
+  Mark before{};
+  Mark now{};
+};
+
+// Where the file itself, without any log, keeps its mark, and the mark.
+struct FileMark {
+  std::uint32_t page = 0;
+  Mark now{};
+};
+
+std::uint32_t big_endian(const std::uint8_t* from) {
+  return (std::uint32_t{from[0]} << 24U) | (std::uint32_t{from[1]} << 16U) |
+         (std::uint32_t{from[2]} << 8U) | from[3];
+}
+
+std::uint32_t little_endian(const std::uint8_t* from) {
+  return (std::uint32_t{from[3]} << 24U) | (std::uint32_t{from[2]} << 16U) |
+         (std::uint32_t{from[1]} << 8U) | from[0];
+}
+
+// The only row of the table `log` in its only page (SQLite's file format, section 1.6): a leaf with
+// one cell of 36 bytes and row id 1, whose record of 4 bytes says: id, two blobs of 16 bytes.
+std::optional<Marks> marks_in(std::span<const std::uint8_t> page) {
+  constexpr std::array<std::uint8_t, 6> head{36, 1, 4, 0, 44, 44};
+  if (page[0] != 0x0D || page[3] != 0 || page[4] != 1) return std::nullopt;
+  const std::size_t at = std::size_t{page[8]} * 256 + page[9];
+  if (at + head.size() + 2 * sizeof(Mark) > page.size()) return std::nullopt;
+  const auto cell = page.subspan(at);
+  if (!std::ranges::equal(head, cell.first(head.size()))) return std::nullopt;
+  Marks marks;
+  std::ranges::copy(cell.subspan(head.size(), sizeof(Mark)), marks.before.begin());
+  std::ranges::copy(cell.subspan(head.size() + sizeof(Mark), sizeof(Mark)), marks.now.begin());
+  return marks;
+}
+
+// Empty: a file of a version without marks.
+std::optional<FileMark> mark_of(const fs::path& file) {
+  Database database(file, DatabaseMode::immutable);
+  // A writer that was killed while the log went into the file may have left it shorter than its
+  // first page says; with this, SQLite reads it nevertheless.
+  sqlite3_db_config(database.handle(), SQLITE_DBCONFIG_DEFENSIVE, 0, nullptr);
+  database.execute("PRAGMA writable_schema=ON");
+  Statement root(database,
+                 "SELECT rootpage FROM sqlite_schema WHERE type = 'table' AND name = 'log'");
+  if (!root.step()) return std::nullopt;
+  const std::int64_t page = root.integer(0);
+  root.reset();
+  Statement row(database, "SELECT now FROM log WHERE id = 1");
+  FileMark mark;
+  if (page < 2 || page > std::int64_t{UINT32_MAX} || !row.step() ||
+      row.blob(0).size() != sizeof(Mark)) {
+    database.fail_damaged("table log");
+  }
+  mark.page = static_cast<std::uint32_t>(page);
+  std::ranges::copy(row.blob(0), mark.now.begin());
+  return mark;
+}
+
+// Reads a log as SQLite does (file format, section 4): frames count as far as salts and running
+// checksums hold, and up to the last one that ends a change.
+class LogReader {
+ public:
+  explicit LogReader(const fs::path& log) : in_(log, std::ios::binary) {
+    std::array<std::uint8_t, 32> head{};
+    if (!read(head)) return;
+    const std::uint32_t magic = big_endian(head.data());
+    page_bytes_ = big_endian(head.data() + 8);
+    big_endian_sums_ = (magic & 1U) != 0;
+    salts_ = {big_endian(head.data() + 16), big_endian(head.data() + 20)};
+    add_to_sums(std::span(head).first(24));
+    const bool power_of_two =
+        page_bytes_ >= 512 && page_bytes_ <= 65536 && (page_bytes_ & (page_bytes_ - 1)) == 0;
+    valid_ = (magic & ~1U) == 0x377F0682U && power_of_two && sums_[0] == big_endian(&head[24]) &&
+             sums_[1] == big_endian(&head[28]);
+  }
+
+  struct Content {
+    std::size_t changes = 0;
+    bool starts_with_mark = false;  // the first change holds one
+    std::vector<Marks> marks;       // of all changes
+  };
+  Content read_all(std::uint32_t page_of_marks) {
+    Content content;
+    std::size_t marks_of_changes = 0;
+    std::vector<std::uint8_t> frame(24 + std::size_t{page_bytes_});
+    while (valid_ && read(frame)) {
+      const auto page = std::span<const std::uint8_t>(frame).subspan(24);
+      add_to_sums(std::span<const std::uint8_t>(frame).first(8));
+      add_to_sums(page);
+      if (salts_[0] != big_endian(&frame[8]) || salts_[1] != big_endian(&frame[12]) ||
+          sums_[0] != big_endian(&frame[16]) || sums_[1] != big_endian(&frame[20])) {
+        break;
+      }
+      if (big_endian(frame.data()) == page_of_marks) {
+        if (const auto marks = marks_in(page)) content.marks.push_back(*marks);
+      }
+      if (big_endian(&frame[4]) == 0) continue;
+      ++content.changes;
+      marks_of_changes = content.marks.size();
+      if (content.changes == 1) content.starts_with_mark = !content.marks.empty();
+    }
+    content.marks.resize(marks_of_changes);
+    return content;
+  }
+
+ private:
+  bool read(std::span<std::uint8_t> bytes) {
+    in_.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    return static_cast<bool>(in_);
+  }
+  void add_to_sums(std::span<const std::uint8_t> bytes) {
+    for (std::size_t i = 0; i + 8 <= bytes.size(); i += 8) {
+      const auto word = [&](std::size_t at) {
+        return big_endian_sums_ ? big_endian(&bytes[at]) : little_endian(&bytes[at]);
+      };
+      sums_[0] += word(i) + sums_[1];
+      sums_[1] += word(i + 4) + sums_[0];
+    }
+  }
+
+  std::ifstream in_;
+  std::uint32_t page_bytes_ = 0;
+  bool big_endian_sums_ = false;
+  bool valid_ = false;
+  std::array<std::uint32_t, 2> salts_{};
+  std::array<std::uint32_t, 2> sums_{};
+};
+
+bool is_own(const fs::path& file, const fs::path& log) {
+  const auto mark = mark_of(file);
+  const auto content = LogReader(log).read_all(mark ? mark->page : 0);
+  if (content.changes == 0) return true;  // SQLite finds nothing in it either
+  if (!mark || !content.starts_with_mark) return false;
+  return mark->now == content.marks.front().before ||
+         std::ranges::any_of(content.marks, [&](const Marks& m) { return m.now == mark->now; });
+}
+
+}  // namespace
+
+void require_own_log(const fs::path& file) {
+  std::error_code missing;
+  const auto beside = [&](const char* suffix) {
+    fs::path path = file;
+    path += suffix;
+    return path;
+  };
+  const auto size = [&](const fs::path& path) {
+    const auto bytes = fs::file_size(path, missing);
+    return missing ? 0 : bytes;
+  };
+  const auto refuse = [&](const fs::path& log) {
+    throw FileError(file.string(),
+                    "has a log beside it that is not its own, " + log.string() +
+                        "; remove the log if the file is a backup, or put back the file that the "
+                        "log belongs to");
+  };
+  // Files in that mode belong to other programs, whose changes are not marked.
+  const fs::path journal = beside("-journal");
+  if (size(journal) > 0 && std::ifstream(journal).peek() != 0) refuse(journal);
+
+  const fs::path log = beside("-wal");
+  // A writer at work may bring its log into the file between the two looks.
+  constexpr int max_looks = 20;
+  constexpr std::chrono::milliseconds pause(20);
+  for (int look = 0; look < max_looks; ++look) {
+    if (size(log) == 0 || is_own(file, log)) return;
+    std::this_thread::sleep_for(pause);
+  }
+  refuse(log);
+}
+
+}  // namespace panonav

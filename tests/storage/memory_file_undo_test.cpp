@@ -1,0 +1,107 @@
+// Taking back the last change.
+#include <gtest/gtest.h>
+
+#include "panonav/core/error.hpp"
+#include "panonav/storage/memory_file.hpp"
+#include "support/memory_samples.hpp"
+
+namespace panonav::testing {
+namespace {
+
+class MemoryFileUndo : public MemoryFileTest {
+ protected:
+  void SetUp() override {
+    file.emplace(MemoryFile::create(path, small_header()));
+    Random random(5);
+    for (int number = 0; number < 12; ++number) {
+      ids.push_back(file->append(random_view(random, small_header().shape, number)));
+    }
+    for (std::size_t i = 1; i < ids.size(); ++i) {
+      file->link(std::vector<Link>{{ids[i - 1], ids[i], LinkKind::sequence}});
+      map.nodes.push_back({ids[i], {static_cast<double>(i), 0.0, 0.0}});
+    }
+    file->save_map("map", map);
+    file->set_parameter("recordings", "one");
+    before.emplace(file->load());
+  }
+  void forget(const std::vector<ViewId>& views) {
+    file->change(
+        [&] {
+          file->set_parameter("recordings", "");
+          file->remove(views);
+        },
+        "forget " + std::to_string(views.size()));
+  }
+  std::optional<MemoryFile> file;
+  std::vector<ViewId> ids;
+  TopologicalMap map;
+  std::optional<VisualMemory> before;
+};
+
+TEST_F(MemoryFileUndo, BringsBackAllThatWasDropped) {
+  EXPECT_FALSE(file->undoable());
+  EXPECT_TRUE(contains(message_of<ContractError>([&] { file->undo(); }), "undo"));
+  const auto thumbnail = file->thumbnail(ids[4]);
+  ASSERT_TRUE(thumbnail);
+  forget({ids[1]});
+  forget({ids[4], ids[5]});
+  EXPECT_EQ(file->load().size(), 9U);
+  file.reset();
+  file.emplace(MemoryFile::open(path, Access::read_write));
+  EXPECT_EQ(file->undoable(), "forget 2");
+  file->undo();  // the last change, not the one before
+  EXPECT_EQ(file->load().size(), 11U);
+  EXPECT_EQ(file->thumbnail(ids[4]), thumbnail);
+  EXPECT_EQ(file->map("map")->nodes.size(), 10U);
+  EXPECT_FALSE(file->undoable());
+  EXPECT_TRUE(file->verify().empty());
+}
+
+TEST_F(MemoryFileUndo, BringsBackTheSameMemory) {
+  forget({ids[4], ids[0], ids[11]});
+  EXPECT_FALSE(same_content(file->load(), *before));
+  file->undo();
+  EXPECT_TRUE(same_content(file->load(), *before));
+  EXPECT_EQ(file->map("map"), map);
+  EXPECT_EQ(file->parameter("recordings"), "one");
+  EXPECT_TRUE(file->verify().empty());
+}
+
+TEST_F(MemoryFileUndo, LeavesWhatWasAddedSince) {
+  forget({ids[4]});
+  Random random(6);
+  const ViewId added = file->append(random_view(random, small_header().shape, 99));
+  file->set_parameter("recordings", "two");
+  file->undo();
+  EXPECT_EQ(file->load().size(), 13U);
+  EXPECT_EQ(file->find("view_99.png"), added);
+  EXPECT_EQ(file->parameter("recordings"), "two");
+  EXPECT_TRUE(file->verify().empty());
+}
+
+TEST_F(MemoryFileUndo, IsRefusedWhereItWouldOverwrite) {
+  forget({ids[4]});
+  Random random(6);
+  NewView same_name = random_view(random, small_header().shape, 4);
+  file->append(same_name);
+  const VisualMemory now = file->load();
+  const auto message = message_of<FileError>([&] { file->undo(); });
+  EXPECT_TRUE(contains(message, "cannot undo \"forget 1\": the table views has changed since"));
+  EXPECT_TRUE(same_content(file->load(), now));
+  EXPECT_TRUE(file->undoable());
+  EXPECT_TRUE(file->verify().empty());
+}
+
+TEST_F(MemoryFileUndo, DamageIsNotApplied) {
+  forget({ids[4]});
+  file.reset();
+  run_sql(path, "UPDATE undo SET changes = CAST(changes || x'00' AS BLOB)");
+  file.emplace(MemoryFile::open(path, Access::read_write));
+  EXPECT_TRUE(
+      contains(message_of<FileError>([&] { file->undo(); }), "does not match its checksum"));
+  EXPECT_EQ(file->load().size(), 11U);
+  EXPECT_FALSE(file->verify().empty());
+}
+
+}  // namespace
+}  // namespace panonav::testing
