@@ -319,7 +319,7 @@ void Navigator::Core::decide(Step& step) {
       if (!go_along_route(step)) follow(step);
     }
   }
-  if (state == NavigationState::moving && progress.steps >= options.max_steps) {
+  if (state == NavigationState::moving && progress.steps >= options.max_run_steps) {
     state = NavigationState::blocked;
   }
   last.view = step.view.view;

@@ -40,7 +40,7 @@ struct NavigatorOptions {
   /// Of the way along a recorded route that is worth a leg: three steps.
   double min_leg_m = 0.75;
   int attempts = 3;      ///< times that closed edges, or the last stretch, are tried
-  int max_steps = 5000;  ///< after which a run ends as blocked
+  int max_run_steps = 5000;  ///< after which a run ends as blocked
 };
 void visit_options(NavigatorOptions& options, OptionVisitor& visitor);
 

@@ -64,7 +64,7 @@ void visit_options(NavigatorOptions& options, OptionVisitor& visitor) {
                             1000)
           .formerly("shortest_leg_m"),
       option<&T::attempts>("times that closed edges, or the last stretch, are tried", 1, 1000),
-      option<&T::max_steps>("steps after which a run ends", 1, 1e9).formerly("most_looks"),
+      option<&T::max_run_steps>("steps after which a run ends", 1, 1e9).formerly("most_looks"),
   };
   table.visit(options, visitor);
 }
