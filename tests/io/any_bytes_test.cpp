@@ -135,6 +135,9 @@ TEST_F(AnyBytes, TomlBeyondAsciiStandsInQuotationMarksAlone) {
                                  "[s]\na = \"b\"\xC2\xA1\n"}) {
     EXPECT_TRUE(contains(refusal(text), "u.toml: line 2 has " + place)) << text;
   }
+  EXPECT_TRUE(
+      contains(refusal("a = 1\"\xC3\xA9\"\n"), "a quotation mark within a name or a value"));
+  EXPECT_TRUE(contains(refusal("a = \"\xC3\xA9\n"), "a quotation mark that is not closed"));
   for (const std::string text : {"[s]\na = \"\"\"\n\\\n\xC3\xA9\"\"\"\n", "[s]\na = '''x\n'''\n"}) {
     EXPECT_TRUE(contains(refusal(text), "line 2 has a text in three quotation marks")) << text;
   }

@@ -89,9 +89,14 @@ void require_plain(std::string_view text, const std::filesystem::path& path) {
       if (line.substr(i).starts_with(std::string(3, c))) {
         refuse("a text in three quotation marks; allowed: one, around a text on one line");
       }
+      constexpr std::string_view before = " \t=,[{.";
+      if (i > 0 && before.find(line[i - 1]) == std::string_view::npos) {
+        refuse("a quotation mark within a name or a value; allowed: around them");
+      }
       for (++i; i < line.size() && line[i] != c; ++i) {
         if (c == '"' && line[i] == '\\') ++i;
       }
+      if (i >= line.size()) refuse("a quotation mark that is not closed");
     }
   }
 }
