@@ -59,7 +59,7 @@ TEST_F(Evaluate, TextForPeopleSaysTheSame) {
       run_panonav({"evaluate", folder_ / "shifted.tum", folder_ / "truth.tum", "--align", "false"});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_TRUE(contains(result.out, "8 poses compared"));
-  EXPECT_TRUE(contains(result.out, "rms 3.000"));
+  EXPECT_TRUE(contains(result.out, "RMSE 3.000"));
 }
 
 TEST_F(Evaluate, NoCommonTimeIsNoAnswer) {

@@ -130,6 +130,95 @@ TEST_F(Memorise, TakesAFolderOfImagesWithoutPoses) {
   EXPECT_EQ(info["views_with_position"], 0);
 }
 
+TEST_F(Memorise, OneDamagedPictureIsNamedAndSkipped) {
+  const auto damage = [&](std::size_t number) {
+    const fs::path file = data() / view_name(number);
+    fs::resize_file(file, fs::file_size(file) / 2);
+  };
+  damage(0);
+  damage(5);
+  const auto result = run_panonav({"memorise", data(), memory(), "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto said = json::parse(result.out);
+  EXPECT_EQ(said["appended"], 14);
+  ASSERT_EQ(said["skipped"].size(), 2U);
+  EXPECT_EQ(said["skipped"][1]["file"], view_name(5));
+  EXPECT_TRUE(contains(said["skipped"][1]["why"].get<std::string>(), "damaged PNG"));
+  ASSERT_EQ(lines(result.err).size(), 2U);
+  EXPECT_TRUE(contains(lines(result.err)[0], "skipped: " + (data() / view_name(0)).string()));
+  EXPECT_EQ(views_in(memory()), 14);
+
+  // Once it is whole, the same command takes it.
+  write_picture(data() / view_name(5), world_, grid_poses(4)[5]);
+  const auto again = run_panonav({"memorise", data(), memory()});
+  ASSERT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_TRUE(contains(again.out, "1 views memorised, 14 were known before, 1 could not be read"));
+  EXPECT_EQ(views_in(memory()), 15);
+
+  EXPECT_TRUE(contains(refusal({"memorise", data(), folder_ / "s.panonav", "--strict"}),
+                       view_name(0) + ": damaged PNG"));
+  EXPECT_FALSE(fs::exists(folder_ / "s.panonav"));
+}
+
+TEST_F(Memorise, WhereNoPictureCanBeReadThereIsNoMemory) {
+  const fs::path file = folder_ / "a.png";
+  write_text(file, "no picture");
+  const auto result = run_panonav({"memorise", file, memory(), "--kind", "panorama"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_TRUE(contains(result.err, "holds no picture that can be read"));
+  EXPECT_FALSE(fs::exists(memory()));
+}
+
+TEST_F(Memorise, NamesWhatOfAFolderItLeavesOutAndTakesFoldersWithinWhenAsked) {
+  const fs::path folder = folder_ / "photos";
+  for (const std::string name : {"view_9.png", "view_10.png", "evening/view_1.png"}) {
+    fs::create_directories((folder / name).parent_path());
+    write_picture(folder / name, world_, grid_poses(2)[1]);
+  }
+  write_text(folder / "notes.txt", "mine");
+  const auto flat = run_panonav({"memorise", folder, memory(), "--kind", "panorama"});
+  ASSERT_EQ(flat.exit_code, 0) << flat.err;
+  EXPECT_TRUE(contains(flat.err, "left out, no PNG or JPEG by name: notes.txt\n"));
+  EXPECT_TRUE(contains(flat.err, "left out, folders within: evening/\n"));
+  EXPECT_EQ(views_in(memory()), 2);
+  const auto deep =
+      run_panonav({"memorise", folder, memory(), "--kind", "panorama", "--recursive"});
+  ASSERT_EQ(deep.exit_code, 0) << deep.err;
+  EXPECT_EQ(deep.err, "left out, no PNG or JPEG by name: notes.txt\n");
+  EXPECT_EQ(views_in(memory()), 3);
+  const auto found = answers_of({"localise", memory(), folder / "evening", "--json"}, 0);
+  EXPECT_EQ(found.size(), 1U);
+  EXPECT_TRUE(contains(refusal({"memorise", data(), folder_ / "r.panonav", "--recursive"}),
+                       "leave out --recursive"));
+}
+
+TEST_F(Memorise, ImplausiblePicturesAreRefusedOrHinted) {
+  const fs::path folder = folder_ / "sphere";
+  fs::create_directory(folder);
+  write_picture(folder / "a.png", world_, grid_poses(2)[1], 96, 48);
+  const auto hinted = run_panonav({"memorise", folder, memory(), "--kind", "panorama"});
+  ASSERT_EQ(hinted.exit_code, 0) << hinted.err;
+  EXPECT_TRUE(contains(hinted.err, "hint: " + (folder / "a.png").string() + " is 96 x 48 px"));
+  EXPECT_TRUE(contains(hinted.err, "of the kind equirectangular"));
+  const auto known = run_panonav({"memorise", folder, folder_ / "b.panonav", "--kind", "panorama",
+                                  "--elevation-deg", "-30", "60"});
+  EXPECT_EQ(known.exit_code, 0);
+  EXPECT_EQ(known.err, "");
+  run_well({"memorise", folder, folder_ / "c.panonav", "--kind", "equirectangular"});
+
+  write_picture(folder / "a.png", world_, grid_poses(2)[1], 96, 40);
+  const std::vector<std::string> whole{"memorise", folder, folder_ / "d.panonav", "--kind",
+                                       "equirectangular"};
+  EXPECT_TRUE(contains(refusal(whole),
+                       "a.png: equirectangular picture is 96 x 40 px; allowed: "
+                       "twice as wide as high"));
+  // Radians in the place of degrees.
+  EXPECT_TRUE(contains(refusal({"memorise", folder, folder_ / "d.panonav", "--kind", "panorama",
+                                "--elevation-deg", "-0.52", "0.7"}),
+                       "elevation band is -0.52 to 0.7 degrees; allowed: 5 degrees or more"));
+  EXPECT_FALSE(fs::exists(folder_ / "d.panonav"));
+}
+
 TEST_F(Memorise, AFolderWithoutDatasetTomlNeedsAKind) {
   fs::remove(data() / "dataset.toml");
   EXPECT_TRUE(contains(refusal({"memorise", data(), memory()}), "--kind"));
@@ -184,7 +273,7 @@ class BadInput : public Memorise {
     run_well({"memorise", first_, memory()});
   }
   void expect_refused(const std::vector<std::string>& words, int views_kept_at_least = 2) {
-    const auto line = refusal({"memorise", data(), memory()});
+    const auto line = refusal({"memorise", data(), memory(), "--strict"});
     for (const auto& word : words) EXPECT_TRUE(contains(line, word));
     EXPECT_GE(views_in(memory()), views_kept_at_least);
     run_well({"verify", memory()});

@@ -49,6 +49,21 @@ TEST_F(Simulate, WritesADataSetThatSaysWhereEachViewWasTaken) {
   EXPECT_NE(bytes_of(dataset.entries[0].path), bytes_of(dataset.entries[1].path));
 }
 
+TEST_F(Simulate, AMeshThatCrashesItsReaderGivesOneLine) {
+  // A node that contains itself: the packaged reader follows it until its stack ends.
+  const auto mesh = folder.write("cycle.dae",
+                                 R"(<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><up_axis>Z_UP</up_axis></asset>
+<library_nodes><node id="a" name="a"><instance_node url="#a"/></node></library_nodes>
+<library_visual_scenes><visual_scene id="s"><node id="n"><instance_node url="#a"/></node>
+</visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene></COLLADA>)");
+  const auto line = refusal({"simulate", mesh, folder / "out", "--grid", "1"});
+  EXPECT_TRUE(contains(line, mesh.string() + ": is damaged: the reader of its format crashes"));
+  EXPECT_FALSE(fs::exists(folder / "out"));
+}
+
 TEST_F(Simulate, ArenaOnAGridNeedsNoFurtherFlags) {
   const std::string out = folder / "run";
   run_well({"simulate", "arena", out, "--grid", "0.4"});

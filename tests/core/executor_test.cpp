@@ -1,6 +1,9 @@
 #include "panonav/core/executor.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -33,6 +36,39 @@ TEST(Executor, CallsEveryIndexOnceOnAnyNumberOfThreads) {
         for (const auto& c : calls) ASSERT_EQ(c.load(), 1);
       }
     }
+  }
+}
+
+// Runs where the system starts only `processes` processes and threads for the user. Gives 0 when
+// the executor of 64 threads has fewer and still computes `expected`.
+int sum_with_few_threads(rlim_t processes, std::size_t expected) {
+  constexpr uid_t nobody = 65534;
+  if (geteuid() == 0 && setuid(nobody) != 0) return 2;
+  const rlimit limit{processes, processes};
+  if (setrlimit(RLIMIT_NPROC, &limit) != 0) return 2;
+  Executor executor(64);
+  if (executor.threads() >= 64) return 3;
+  std::vector<std::size_t> sums(100);
+  executor.for_chunks(1000, 10, [&](std::size_t begin, std::size_t end, std::size_t number) {
+    for (std::size_t i = begin; i < end; ++i) sums[number] += i * i;
+  });
+  std::size_t sum = 0;
+  for (const std::size_t s : sums) sum += s;
+  return sum == expected ? 0 : 4;
+}
+
+TEST(Executor, GoesOnWithTheThreadsThatCouldBeStarted) {
+  std::size_t expected = 0;
+  for (std::size_t i = 0; i < 1000; ++i) expected += i * i;
+  for (const rlim_t processes : {rlim_t{1}, rlim_t{8}}) {
+    const pid_t child = fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) _exit(sum_with_few_threads(processes, expected));
+    int status = 0;
+    ASSERT_EQ(waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFEXITED(status)) << "ended by signal " << WTERMSIG(status);
+    if (WEXITSTATUS(status) == 2) GTEST_SKIP() << "the number of threads cannot be limited here";
+    EXPECT_EQ(WEXITSTATUS(status), 0);
   }
 }
 

@@ -123,6 +123,29 @@ TEST_F(AnyBytes, OptionFile) {
                          [](const auto& path) { (void)OptionFile(path).has("search", "top"); });
 }
 
+TEST_F(AnyBytes, TomlBeyondAsciiStandsInQuotationMarksAlone) {
+  const auto refusal = [&](std::string_view text) {
+    return message_of<FileError>([&] { (void)OptionFile(folder.write("u.toml", text)); });
+  };
+  const std::string place = "a character beyond ASCII outside of quotation marks";
+  for (const std::string text : {"[s]\n\xC3\xA9 = 1\n", "[s]\na = \xC3\xA9\n",
+                                 "[s]\na = 1 \xE2\x80\x83\n", "[s]\na\xC3\xA9 = 1\n",
+                                 "[s]\n\xE3\x80\x80"
+                                 "a = 1\n",
+                                 "[s]\na = \"b\"\xC2\xA1\n"}) {
+    EXPECT_TRUE(contains(refusal(text), "u.toml: line 2 has " + place)) << text;
+  }
+  EXPECT_TRUE(
+      contains(refusal("a = 1\"\xC3\xA9\"\n"), "a quotation mark within a name or a value"));
+  EXPECT_TRUE(contains(refusal("a = \"\xC3\xA9\n"), "a quotation mark that is not closed"));
+  for (const std::string text : {"[s]\na = \"\"\"\n\\\n\xC3\xA9\"\"\"\n", "[s]\na = '''x\n'''\n"}) {
+    EXPECT_TRUE(contains(refusal(text), "line 2 has a text in three quotation marks")) << text;
+  }
+  EXPECT_EQ(refusal("\xEF\xBB\xBF[s]\na = \"\xC3\xA9\"\nb = '\\\xC3\xA9' # \xC3\xA9\n"
+                    "c = \"\\\"\xC3\xA9#\"\n\"\xC3\xA9\" = ''\n"),
+            "no error");
+}
+
 TEST_F(AnyBytes, DeeplyNestedToml) {
   const auto path = folder.write("deep.toml", "a = " + std::string(100000, '['));
   EXPECT_THROW(OptionFile file(path), FileError);

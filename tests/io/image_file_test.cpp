@@ -173,6 +173,115 @@ TEST_F(ImageFile, SizesAreBounded) {
                        "huge.jpg: picture is 65021 x 65021 px; allowed:"));
 }
 
+TEST_F(ImageFile, LimitsAreTheCallers) {
+  const Image image = smooth_image(20, 10, 1);
+  const Bytes bytes = encode_png(image.view());
+  const auto message = [&](const ImageLimits& limits) {
+    return message_of<FileError>([&] { (void)decode_image(bytes, "a.png", limits); });
+  };
+  EXPECT_EQ(message({.side_px = 20, .area_px = 200}), "no error");
+  EXPECT_TRUE(contains(message({.side_px = 19}), "20 x 10 px; allowed: 1 .. 19 px a side"));
+  EXPECT_TRUE(contains(message({.area_px = 199}), "at most 199 px in all"));
+}
+
+TEST_F(ImageFile, TheScansOfAJpegAreBoundedByItsSize) {
+  const Bytes bomb = make_scan_bomb(64, 48);
+  const Image image = decode_image(bomb, "bomb");
+  EXPECT_EQ(image.size(), (ImageSize{64, 48})) << "a small picture may have them";
+  constexpr std::int64_t scan_px = 64 * 48 + 65536;
+  EXPECT_EQ(decode_image(bomb, "bomb", {.scanned_px = 190 * scan_px}), image);
+  EXPECT_EQ(message_of<FileError>(
+                [&] { (void)decode_image(bomb, "bomb", {.scanned_px = 189 * scan_px}); }),
+            "bomb: damaged JPEG: more than 189 scans for 64 x 48 px");
+  // At its largest a picture may have the scans of every common encoder and few more.
+  const ImageLimits limits;
+  EXPECT_GE(limits.scanned_px / (limits.area_px + 65536), 12);
+  EXPECT_LE(limits.scanned_px / (limits.area_px + 65536), 16);
+}
+
+// The picture as it lies in the file when a camera that was turned calls it upright.
+Image turned_for(int orientation, const Image& upright) {
+  const int w = upright.width();
+  const int h = upright.height();
+  Image stored =
+      orientation >= 5 ? Image(h, w, upright.channels()) : Image(w, h, upright.channels());
+  for (int v = 0; v < h; ++v) {
+    for (int u = 0; u < w; ++u) {
+      for (int c = 0; c < upright.channels(); ++c) {
+        // Where row 0 and column 0 of the stored picture are on the upright one [EXIF 2.32].
+        const std::uint8_t value = upright.at(u, v, c);
+        switch (orientation) {
+          case 1:
+            stored.at(u, v, c) = value;
+            break;  // top, left
+          case 2:
+            stored.at(w - 1 - u, v, c) = value;
+            break;  // top, right
+          case 3:
+            stored.at(w - 1 - u, h - 1 - v, c) = value;
+            break;  // bottom, right
+          case 4:
+            stored.at(u, h - 1 - v, c) = value;
+            break;  // bottom, left
+          case 5:
+            stored.at(v, u, c) = value;
+            break;  // left, top
+          case 6:
+            stored.at(v, w - 1 - u, c) = value;
+            break;  // right, top
+          case 7:
+            stored.at(h - 1 - v, w - 1 - u, c) = value;
+            break;  // right, bottom
+          default:
+            stored.at(h - 1 - v, u, c) = value;  // left, bottom
+        }
+      }
+    }
+  }
+  return stored;
+}
+
+TEST_F(ImageFile, ExifOrientationIsApplied) {
+  Random random(6);
+  for (int orientation = 1; orientation <= 8; ++orientation) {
+    const Image picture = random_image(random, 9, 4, orientation % 2 == 0 ? 1 : 3);
+    const Image stored = turned_for(orientation, picture);
+    const Bytes png = with_exif(encode_png(stored.view()), orientation);
+    EXPECT_EQ(decode_image(png, "png"), picture) << orientation;
+    const Image smooth = smooth_image(64, 32, 1);
+    const Bytes plain = make_jpeg(turned_for(orientation, smooth), 95, false);
+    for (const bool big_endian : {false, true}) {
+      const Bytes jpeg = with_exif(plain, orientation, big_endian);
+      const Image back = decode_image(jpeg, "jpeg");
+      ASSERT_EQ(back.size(), smooth.size()) << orientation;
+      int worst = 0;
+      for (std::size_t i = 0; i < smooth.pixels().size(); ++i) {
+        worst = std::max(worst, std::abs(smooth.pixels()[i] - back.pixels()[i]));
+      }
+      EXPECT_LE(worst, 4) << orientation;
+      const std::string_view text(reinterpret_cast<const char*>(jpeg.data()), jpeg.size());
+      EXPECT_EQ(read_image_size(folder.write("a.jpg", text)), smooth.size());
+    }
+  }
+}
+
+TEST_F(ImageFile, ExifThatCannotBeReadChangesNothing) {
+  const Bytes plain = make_jpeg(smooth_image(16, 8, 1), 95, false);
+  const Image picture = decode_image(plain, "plain");
+  for (const int wrong : {0, 9, 65535}) {
+    EXPECT_EQ(decode_image(with_exif(plain, wrong), "jpeg"), picture);
+  }
+  // The block is cut, or says that it begins beyond its end.
+  const Bytes whole = with_exif(plain, 3);
+  for (std::size_t byte = 0; byte < 26; ++byte) {
+    for (const int value : {0x00, 0x7F, 0xFF}) {
+      Bytes damaged = whole;
+      damaged[12 + byte] = static_cast<std::uint8_t>(value);
+      EXPECT_EQ(decode_image(damaged, "jpeg").size(), picture.size());
+    }
+  }
+}
+
 TEST_F(ImageFile, ClearLinesForWhatIsNoPicture) {
   EXPECT_TRUE(contains(message_of<FileError>([&] { (void)read_image(folder / "none.png"); }),
                        "none.png: cannot be read: No such file"));

@@ -2,6 +2,7 @@
 #include "support/skips.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -205,6 +206,45 @@ TEST_F(GazeboWorld, AModelThatIncludesItselfIsRefused) {
   with_folder.model_folders.push_back(data / "models");
   EXPECT_TRUE(contains(message_of<FileError>([&] { (void)load_gazebo(world, with_folder); }),
                        "includes itself"));
+}
+
+TEST_F(GazeboWorld, IncludesAreBoundedInDepthAndNumber) {
+  // Each model includes the next one, `copies` times.
+  const auto refusal = [&](int models, int copies) {
+    const fs::path folder = folder_ / ("chain" + std::to_string(copies));
+    fs::create_directory(folder);
+    const auto name = [](int i) { return "m" + std::to_string(i) + ".sdf"; };
+    for (int i = 0; i < models; ++i) {
+      std::ofstream file(folder / name(i));
+      file << "<sdf version='1.6'><model name='m'><link name='l'/>";
+      for (int copy = 0; i + 1 < models && copy < copies; ++copy) {
+        file << "<include><name>c" << copy << "</name><uri>" << name(i + 1) << "</uri></include>";
+      }
+      file << "</model></sdf>";
+    }
+    return message_of<FileError>([&] { (void)load_gazebo(folder / name(0), options()); });
+  };
+  EXPECT_TRUE(contains(refusal(33, 1), "m32.sdf: is included more than 32 models deep"));
+  EXPECT_TRUE(contains(refusal(32, 2), "includes more than 100000 models in all"));
+  EXPECT_TRUE(contains(refusal(3, 2), "shows nothing"));
+}
+
+TEST_F(GazeboWorld, DevicesAndPipesAreNotRead) {
+  const fs::path pipe = folder_ / "pipe.sdf";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  for (const std::string file : {"/dev/zero", pipe.c_str()}) {
+    const auto world =
+        folder_.write("w.world", "<sdf version='1.6'><world name='w'><include><uri>" + file +
+                                     "</uri></include></world></sdf>");
+    EXPECT_TRUE(contains(message_of<FileError>([&] { (void)load_gazebo(world, options()); }),
+                         file + ": is no regular file"));
+    const auto mesh = folder_.write("m.world", R"(<sdf version="1.6"><model name="m"><link name="l">
+        <visual name="v"><geometry><mesh><uri>)" + file +
+                                                   "</uri></mesh></geometry></visual></link>"
+                                                   "</model></sdf>");
+    EXPECT_TRUE(contains(message_of<FileError>([&] { (void)load_gazebo(mesh, options()); }),
+                         file + ": is no regular file"));
+  }
 }
 
 TEST_F(GazeboWorld, RealWorldsLoadWithTheirWalls) {

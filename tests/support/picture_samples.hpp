@@ -1,6 +1,7 @@
 #pragma once
 
 #include <png.h>
+#include <zlib.h>
 
 #include <csetjmp>
 #include <cstdint>
@@ -61,7 +62,8 @@ inline std::vector<std::uint8_t> make_png(int width, int height, int colour_type
   return bytes;
 }
 
-inline std::vector<std::uint8_t> make_jpeg(const Image& image, int quality, bool progressive) {
+inline std::vector<std::uint8_t> make_jpeg(const Image& image, int quality, bool progressive,
+                                           const std::vector<jpeg_scan_info>& scans = {}) {
   jpeg_compress_struct jpeg{};
   jpeg_error_mgr errors{};
   jpeg.err = jpeg_std_error(&errors);
@@ -76,6 +78,10 @@ inline std::vector<std::uint8_t> make_jpeg(const Image& image, int quality, bool
   jpeg_set_defaults(&jpeg);
   jpeg_set_quality(&jpeg, quality, TRUE);
   if (progressive) jpeg_simple_progression(&jpeg);
+  if (!scans.empty()) {
+    jpeg.scan_info = scans.data();
+    jpeg.num_scans = static_cast<int>(scans.size());
+  }
   jpeg_start_compress(&jpeg, TRUE);
   const auto stride = static_cast<std::size_t>(image.width()) * image.channels();
   while (jpeg.next_scanline < jpeg.image_height) {
@@ -87,6 +93,58 @@ inline std::vector<std::uint8_t> make_jpeg(const Image& image, int quality, bool
   jpeg_destroy_compress(&jpeg);
   std::free(buffer);
   return bytes;
+}
+
+/// A progressive JPEG of one grey in 190 scans: the average, and each of the 63 other coefficients
+/// three times, bit by bit.
+inline std::vector<std::uint8_t> make_scan_bomb(int width, int height) {
+  std::vector<jpeg_scan_info> scans;
+  const auto add = [&scans](int coefficient, int above, int bit) {
+    jpeg_scan_info scan{};
+    scan.comps_in_scan = 1;
+    scan.Ss = scan.Se = coefficient;
+    scan.Ah = above;
+    scan.Al = bit;
+    scans.push_back(scan);
+  };
+  add(0, 0, 0);
+  for (int coefficient = 1; coefficient < 64; ++coefficient) {
+    add(coefficient, 0, 2);
+    add(coefficient, 2, 1);
+    add(coefficient, 1, 0);
+  }
+  return make_jpeg(Image(width, height), 90, false, scans);
+}
+
+/// The PNG or JPEG with an EXIF block that says how the camera was turned (1 .. 8).
+inline std::vector<std::uint8_t> with_exif(std::vector<std::uint8_t> file, int orientation,
+                                           bool big_endian = false) {
+  const auto high = static_cast<std::uint8_t>(orientation >> 8);
+  const auto low = static_cast<std::uint8_t>(orientation);
+  std::vector<std::uint8_t> exif{'I', 'I', 42, 0, 8, 0,   0,    0, 1, 0, 0x12, 1, 3,
+                                 0,   1,   0,  0, 0, low, high, 0, 0, 0, 0,    0, 0};
+  if (big_endian) {
+    exif = {'M', 'M', 0, 42, 0, 0,    0,   8, 0, 1, 1, 0x12, 0,
+            3,   0,   0, 0,  1, high, low, 0, 0, 0, 0, 0,    0};
+  }
+  if (file[0] == 0xFF) {
+    std::vector<std::uint8_t> segment{
+        0xFF, 0xE1, 0, static_cast<std::uint8_t>(exif.size() + 8), 'E', 'x', 'i', 'f', 0, 0};
+    segment.insert(segment.end(), exif.begin(), exif.end());
+    file.insert(file.begin() + 2, segment.begin(), segment.end());
+    return file;
+  }
+  std::vector<std::uint8_t> chunk{'e', 'X', 'I', 'f'};
+  chunk.insert(chunk.end(), exif.begin(), exif.end());
+  const auto checksum =
+      static_cast<std::uint32_t>(crc32(0, chunk.data(), static_cast<unsigned>(chunk.size())));
+  chunk.insert(chunk.begin(), {0, 0, 0, static_cast<std::uint8_t>(exif.size())});
+  for (int shift = 24; shift >= 0; shift -= 8) {
+    chunk.push_back(static_cast<std::uint8_t>(checksum >> static_cast<unsigned>(shift)));
+  }
+  constexpr std::ptrdiff_t signature_and_header = 8 + 25;
+  file.insert(file.begin() + signature_and_header, chunk.begin(), chunk.end());
+  return file;
 }
 
 }  // namespace panonav::testing

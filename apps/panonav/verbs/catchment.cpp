@@ -221,9 +221,10 @@ ExitCode catchment(const Arguments& arguments, const CatchmentArguments& wanted,
   settings.typical_distance_given = arguments.given("run", "typical_distance_m");
   settings.longest_step_given = arguments.given("run", "max_step_m");
   settings.obstacle_given = arguments.given("run", "obstacle_m");
-  const auto recording = open_recording(wanted.dataset, wanted.pictures, std::nullopt);
+  const auto recording = open_recording(wanted.dataset, wanted.pictures, std::nullopt, session);
   std::optional<Dataset> second;
-  if (wanted.current) second = open_recording(*wanted.current, wanted.pictures, recording.source);
+  if (wanted.current)
+    second = open_recording(*wanted.current, wanted.pictures, recording.source, session);
   if (wanted.report) prepare_catchment_report(*wanted.report);
 
   if (wanted.ahead) {

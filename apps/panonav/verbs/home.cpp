@@ -132,7 +132,7 @@ ExitCode home_from_memory(const Arguments& arguments, const HomeArguments& wante
     components = wanted.homing.views.signature.components;
   }
   const ViewId view = named_view(file, wanted.goal);
-  const auto recording = open_recording(wanted.current, wanted.pictures, header.source);
+  const auto recording = open_recording(wanted.current, wanted.pictures, header.source, session);
   const HomingGuide guide(file, wanted.goal, recording.source,
                           homing_options(arguments, wanted.homing, components), components,
                           wanted.homing.views.horizon);
@@ -155,10 +155,10 @@ ExitCode home(const Arguments& arguments, const HomeArguments& wanted, Session& 
   // Either picture may be the one whose folder says how both lie.
   std::optional<PictureSource> known = source_beside(wanted.current);
   if (!known) known = source_beside(wanted.goal);
-  const auto recording = open_recording(wanted.current, wanted.pictures, known);
+  const auto recording = open_recording(wanted.current, wanted.pictures, known, session);
   std::optional<PictureSource> goal_source = source_beside(wanted.goal);
   if (!goal_source) goal_source = recording.source;
-  const auto goals = open_recording(wanted.goal, wanted.pictures, goal_source);
+  const auto goals = open_recording(wanted.goal, wanted.pictures, goal_source, session);
   const HomingEncoder encoder(goals.source, views);
   const Panorama picture = encoder.panorama(read_observation(goals.entries.front()));
   const Goal goal{wanted.goal, std::nullopt, encoder.view(picture), picture};

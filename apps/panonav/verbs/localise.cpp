@@ -137,7 +137,8 @@ void check(const Arguments& arguments, const LocaliseArguments& wanted,
 ExitCode localise(const Arguments& arguments, const LocaliseArguments& wanted, Session& session) {
   const auto file = MemoryFile::open(wanted.memory, Access::read_only);
   check(arguments, wanted, file.header());
-  const auto recording = open_recording(wanted.input, wanted.pictures, file.header().source);
+  const auto recording =
+      open_recording(wanted.input, wanted.pictures, file.header().source, session);
   const PlaceRecogniser recogniser(
       file, {.localiser = wanted.localiser,
              .source = recording.source,

@@ -167,7 +167,7 @@ ExitCode map(const Arguments& arguments, const MapArguments& wanted, Session& se
   if (there) memory = MemoryFile::open(wanted.memory, Access::read_write);
   const Dataset recording =
       open_recording(wanted.dataset, wanted.pictures,
-                     memory ? std::optional(memory->header().source) : std::nullopt);
+                     memory ? std::optional(memory->header().source) : std::nullopt, session);
   if (memory) {
     if (arguments.given("signature")) {
       throw FileError(wanted.memory,

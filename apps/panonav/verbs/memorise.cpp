@@ -7,6 +7,7 @@
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/observation_source.hpp"
@@ -25,6 +26,13 @@ struct MemoriseArguments {
   SignatureOptions signature;
   PreprocessingOptions preprocessing;
   bool no_thumbnails = false;
+  bool strict = false;
+};
+
+/// A picture that was not memorised.
+struct Skipped {
+  std::string file;
+  std::string why;
 };
 
 /// A resumed memory keeps its own options; other ones that the user asks for are refused.
@@ -55,9 +63,10 @@ void check_same_options(const Arguments& arguments, const MemoriseArguments& wan
   }
 }
 
-/// Appends what is missing; notes which recording it is of as soon as there is a file.
-void add_all(const Dataset& missing, const Dataset& recording, Memoriser& memoriser,
-             Session& session) {
+/// Appends what is missing; notes which recording it is of as soon as there is a file. Gives the
+/// pictures that cannot be read; with `strict` the first of them ends it.
+std::vector<Skipped> add_all(const Dataset& missing, const Dataset& recording, bool strict,
+                             Memoriser& memoriser, Session& session) {
   bool noted = false;
   const auto note = [&] {
     if (!noted && memoriser.file() != nullptr) remember_recording(recording, *memoriser.file());
@@ -66,31 +75,42 @@ void add_all(const Dataset& missing, const Dataset& recording, Memoriser& memori
   note();
   Progress progress("memorising", missing.entries.size());
   DatasetObservations source(missing, session.executor());
+  std::vector<Skipped> skipped;
   std::exception_ptr failure;
-  while (!failure) {
+  std::size_t read = 0;
+  while (!failure && read < missing.entries.size()) {
     std::vector<Observation> batch;
-    try {
-      while (batch.size() < DatasetObservations::decoded_ahead) {
-        auto observation = source.next();
-        if (!observation) break;
-        batch.push_back(std::move(*observation));
+    while (!failure && batch.size() < DatasetObservations::decoded_ahead &&
+           read < missing.entries.size()) {
+      const DatasetEntry& entry = missing.entries[read++];
+      try {
+        batch.push_back(source.next().value());
+      } catch (const FileError& error) {
+        if (strict) {
+          failure = std::current_exception();  // what comes before it is memorised
+          break;
+        }
+        progress.clear();
+        session.note("skipped: " + readable_line(error.what()));
+        skipped.push_back({entry.file, error.what()});
       }
-    } catch (const Error&) {
-      failure = std::current_exception();  // what comes before it is memorised
     }
-    if (batch.empty()) break;
     progress.advance(batch.size());
-    memoriser.add(std::move(batch), session.executor());
+    if (!batch.empty()) memoriser.add(std::move(batch), session.executor());
     note();
   }
   if (failure) std::rethrow_exception(failure);
+  if (memoriser.file() == nullptr && skipped.size() == missing.entries.size()) {
+    throw FileError(recording.folder.string(), "holds no picture that can be read");
+  }
+  return skipped;
 }
 
 ExitCode memorise(const Arguments& arguments, const MemoriseArguments& wanted, Session& session) {
   const bool resumes = fs::exists(wanted.memory);
   std::optional<PictureSource> remembered;
   if (resumes) remembered = MemoryFile::open(wanted.memory, Access::read_write).header().source;
-  const auto recording = open_recording(wanted.input, wanted.pictures, remembered);
+  const auto recording = open_recording(wanted.input, wanted.pictures, remembered, session);
   Memoriser memoriser(wanted.memory, {.source = recording.source,
                                       .signature = wanted.signature,
                                       .preprocessing = wanted.preprocessing,
@@ -106,14 +126,19 @@ ExitCode memorise(const Arguments& arguments, const MemoriseArguments& wanted, S
     });
   }
   const std::size_t known_before = recording.entries.size() - missing.entries.size();
-  add_all(missing, recording, memoriser, session);
+  const auto skipped = add_all(missing, recording, wanted.strict, memoriser, session);
   const auto counts = memoriser.finish(session.executor());
   const MemoryFile* const memory = memoriser.file();
   const auto info = memory->info();
   if (session.json()) {
+    auto skipped_json = nlohmann::ordered_json::array();
+    for (const Skipped& one : skipped) {
+      skipped_json.push_back({{"file", readable_line(one.file)}, {"why", readable_line(one.why)}});
+    }
     session.print(nlohmann::ordered_json{{"memory", wanted.memory},
                                          {"appended", counts.appended},
                                          {"known_before", known_before},
+                                         {"skipped", std::move(skipped_json)},
                                          {"views", info.views},
                                          {"file_bytes", info.file_bytes}}
                       .dump());
@@ -121,7 +146,8 @@ ExitCode memorise(const Arguments& arguments, const MemoriseArguments& wanted, S
   }
   session.print(
       session.strong(std::to_string(counts.appended)) + " views memorised" +
-      (known_before > 0 ? ", " + std::to_string(known_before) + " were known before" : "") + "; " +
+      (known_before > 0 ? ", " + std::to_string(known_before) + " were known before" : "") +
+      (skipped.empty() ? "" : ", " + std::to_string(skipped.size()) + " could not be read") + "; " +
       wanted.memory + " holds " + std::to_string(info.views));
   if (!memory->header().elevations) {
     session.print(
@@ -139,6 +165,10 @@ Run declare(Arguments& arguments) {
   declare_pictures(arguments, wanted->pictures);
   arguments.flag("--no-thumbnails", wanted->no_thumbnails,
                  "Do not keep small pictures of the views");
+  arguments.flag("--strict", wanted->strict,
+                 "End at the first picture that cannot be read; otherwise it is named and skipped");
+  arguments.flag("--recursive", wanted->pictures.recursive,
+                 "A folder of pictures: take those of the folders within, too");
   arguments.options("signature", wanted->signature);
   arguments.options("preprocessing", wanted->preprocessing);
   return [wanted, &arguments](Session& session) { return memorise(arguments, *wanted, session); };

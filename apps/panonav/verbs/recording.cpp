@@ -3,12 +3,61 @@
 #include <filesystem>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/positions.hpp"
 #include "panonav/io/camera_file.hpp"
+#include "panonav/io/image_file.hpp"
 #include "panonav/motion/headed_path.hpp"
 
 namespace panonav::command {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The first ones, and how many more there are.
+std::string listed(const std::vector<std::string>& names) {
+  constexpr std::size_t shown = 8;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(shown, names.size()); ++i) {
+    text += (i > 0 ? ", " : "") + readable_line(names[i]);
+  }
+  if (names.size() > shown) text += " and " + std::to_string(names.size() - shown) + " more";
+  return text;
+}
+
+void note_left_out(const Dataset& recording, Session& session) {
+  std::vector<std::string> files;
+  std::vector<std::string> folders;
+  for (const std::string& name : recording.left_out) {
+    (name.ends_with('/') ? folders : files).push_back(name);
+  }
+  if (!files.empty()) session.note("left out, no PNG or JPEG by name: " + listed(files));
+  if (!folders.empty()) session.note("left out, folders within: " + listed(folders));
+}
+
+/// A picture twice as wide as high that is said to be a panorama shows the whole sphere in all
+/// likelihood; a panorama of square pixels that high would reach from pole to pole.
+void note_other_kind(const Dataset& recording, Session& session) {
+  if (recording.source.kind != PictureKind::panorama) return;
+  const auto& band = recording.source.layout.elevations;
+  if (band && band->top_rad - band->bottom_rad < radians(170.0)) return;
+  const fs::path& first = recording.entries.front().path;
+  ImageSize size;
+  try {
+    size = read_image_size(first);
+  } catch (const Error&) {
+    return;  // who reads its pixels says what is wrong
+  }
+  if (size.width != 2 * size.height) return;
+  session.note("hint: " + readable_line(first.string()) + " is " + std::to_string(size.width) +
+               " x " + std::to_string(size.height) +
+               " px; a picture of the whole sphere is of the kind equirectangular, a panorama has "
+               "an elevation band");
+}
+
+}  // namespace
 
 void declare_pictures(Arguments& arguments, PictureArguments& pictures) {
   arguments.choice("--kind", pictures.kind, {"panorama", "equirectangular", "mirror"},
@@ -80,8 +129,7 @@ std::optional<PictureSource> picture_source(const PictureArguments& pictures) {
 }
 
 Dataset open_recording(const std::string& input, const PictureArguments& pictures,
-                       const std::optional<PictureSource>& remembered) {
-  namespace fs = std::filesystem;
+                       const std::optional<PictureSource>& remembered, Session& session) {
   const auto stated = picture_source(pictures);
   std::error_code ignored;
   if (!fs::exists(input, ignored)) throw FileError(input, "there is no such file or folder");
@@ -91,14 +139,26 @@ Dataset open_recording(const std::string& input, const PictureArguments& picture
                        " has a dataset.toml, which says how its pictures lie; leave out "
                        "--kind and its companions");
     }
-    return read_dataset(input);
+    if (pictures.recursive) {
+      throw UsageError(input +
+                       " has a dataset.toml, which names its pictures; leave out "
+                       "--recursive");
+    }
+    Dataset recording = read_dataset(input);
+    note_other_kind(recording, session);
+    return recording;
   }
   const auto& source = stated ? stated : remembered;
   if (!source) {
     throw UsageError(input + " has no dataset.toml; say what the pictures show with --kind");
   }
-  if (fs::is_directory(input, ignored)) return read_picture_folder(input, *source);
-  return single_picture(input, *source);
+  const bool is_folder = fs::is_directory(input, ignored);
+  Dataset recording = is_folder
+                          ? read_picture_folder(input, *source, {.recursive = pictures.recursive})
+                          : single_picture(input, *source);
+  note_left_out(recording, session);
+  if (stated) note_other_kind(recording, session);
+  return recording;
 }
 
 std::vector<Pose2> dataset_poses(const Dataset& dataset) {

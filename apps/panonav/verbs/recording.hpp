@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "cli/arguments.hpp"
+#include "cli/session.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/pipeline/observation.hpp"
@@ -21,6 +22,7 @@ struct PictureArguments {
   std::optional<std::string> columns;
   std::optional<double> forward_column;
   std::optional<std::pair<double, double>> elevation_deg;
+  bool recursive = false;  ///< a folder of pictures: those of the folders within, too
 };
 
 /// Adds --kind, --camera, --columns-run, --forward-column and --elevation-deg.
@@ -32,9 +34,11 @@ void declare_pictures(Arguments& arguments, PictureArguments& pictures);
 
 /// A data set, a folder of pictures or one picture. `remembered` is how pictures lay that the
 /// memory was made from: it reads what comes without a description of its own. A data set describes
-/// itself, so flags beside it throw UsageError. Throws FileError.
+/// itself, so flags beside it throw UsageError. Throws FileError. Notes what of a folder is left
+/// out and pictures that look as if they were of another kind.
 [[nodiscard]] Dataset open_recording(const std::string& input, const PictureArguments& pictures,
-                                     const std::optional<PictureSource>& remembered);
+                                     const std::optional<PictureSource>& remembered,
+                                     Session& session);
 
 /// Poses of all entries in the data set's frame. Where it knows positions but no headings, those
 /// along the way: the tangent fitted to the positions within 0.3 m of way to either side. Empty

@@ -1,7 +1,17 @@
 #include "verbs/simulated_recording.hpp"
 
+#include <fcntl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <array>
 #include <cctype>
+#include <cerrno>
+#include <csignal>
+#include <fstream>
+#include <functional>
 
 #include "panonav/core/error.hpp"
 #include "panonav/io/image_file.hpp"
@@ -34,6 +44,69 @@ void refuse_variations_of_file(const std::string& file, const Given& given) {
   }
 }
 
+/// What a world or a mesh may cost to read, in a process of its own.
+constexpr unsigned scene_seconds = 60;
+constexpr rlim_t scene_bytes = rlim_t{4} << 30U;
+
+void limit_this_process() {
+  const rlimit no_core{0, 0};
+  setrlimit(RLIMIT_CORE, &no_core);
+  const rlimit seconds{scene_seconds, scene_seconds};
+  setrlimit(RLIMIT_CPU, &seconds);
+  alarm(2 * scene_seconds);  // what only waits, too
+  rlim_t pages_now = 0;
+  std::ifstream("/proc/self/statm") >> pages_now;
+  const rlim_t bytes = pages_now * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)) + scene_bytes;
+  const rlimit memory{bytes, bytes};
+  setrlimit(RLIMIT_AS, &memory);
+}
+
+/// The end of a process that read a scene: its exit code is 0, or it wrote an error's message.
+[[noreturn]] void read_and_exit(const std::function<Scene()>& read, int answer) {
+  limit_this_process();
+  std::string message;
+  try {
+    (void)read();
+  } catch (const Error& error) {
+    message = error.what();
+  } catch (const std::exception& error) {
+    message = std::string("the reader of the format failed: ") + error.what();
+  }
+  const ssize_t written = write(answer, message.data(), message.size());
+  _exit(message.empty() || written < 0 ? 0 : 1);
+}
+
+/// The packaged readers of worlds and meshes crash on some damaged files and never end on others.
+/// Such a file ends a process of its own, and this one with a clear line. What can be read is read
+/// again here. Between fork and _exit only this thread runs in the child; those of the executor
+/// wait for work and hold no lock.
+Scene read_safely(const std::string& file, const std::function<Scene()>& read) {
+  std::array<int, 2> answer{-1, -1};
+  if (pipe2(answer.data(), O_CLOEXEC) != 0) throw FileError(file, "cannot be read: no pipe left");
+  const pid_t child = fork();
+  if (child == 0) read_and_exit(read, answer[1]);
+  close(answer[1]);
+  std::string message;
+  std::array<char, 4096> buffer{};
+  ssize_t count = 0;
+  while ((count = ::read(answer[0], buffer.data(), buffer.size())) > 0 ||
+         (count < 0 && errno == EINTR)) {
+    if (count > 0) message.append(buffer.data(), static_cast<std::size_t>(count));
+  }
+  close(answer[0]);
+  if (child < 0) throw FileError(file, "cannot be read: the system starts no process");
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (!message.empty()) throw Error(message);
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return read();
+  const int signal = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+  if (signal == SIGXCPU || signal == SIGALRM || signal == SIGKILL) {
+    throw FileError(file, "takes more than " + std::to_string(scene_seconds) + " s to read");
+  }
+  throw FileError(file, "is damaged: the reader of its format crashes on it");
+}
+
 Scene load_scene(const std::string& name, const SceneOptions& options, const Given& given) {
   const auto names = scene_names();
   if (std::find(names.begin(), names.end(), name) != names.end()) {
@@ -57,11 +130,11 @@ Scene load_scene(const std::string& name, const SceneOptions& options, const Giv
     GazeboOptions gazebo;
     gazebo.textures.read = [](const fs::path& path) { return read_image(path); };
     gazebo.model_folders = gazebo_model_folders_of_environment();
-    scene = load_gazebo(name, gazebo);
+    scene = read_safely(name, [&] { return load_gazebo(name, gazebo); });
   } else {
     MeshOptions mesh;
     mesh.textures.read = [](const fs::path& path) { return read_image(path); };
-    scene = load_mesh(name, mesh);
+    scene = read_safely(name, [&] { return load_mesh(name, mesh); });
   }
   scale_light(scene, options.light);
   return scene;

@@ -4,6 +4,7 @@
 #include <condition_variable>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -52,20 +53,24 @@ struct Executor::Pool {
   }
 };
 
-Executor::Executor(int threads) : pool_(std::make_unique<Pool>()) {
-  require(threads >= 0 && threads <= 1024, "number of threads", threads, "0 .. 1024");
-  if (threads == 0) threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  for (int i = 1; i < threads; ++i) {
-    pool_->workers.emplace_back([pool = pool_.get()] {
-      std::unique_lock lock(pool->mutex);
-      while (!pool->stopping) {
-        pool->run(lock);
-        pool->work_there.wait(lock, [pool] {
-          return pool->stopping ||
-                 (pool->body != nullptr && pool->next_chunk * pool->chunk < pool->count);
-        });
-      }
-    });
+Executor::Executor(int wanted) : pool_(std::make_unique<Pool>()) {
+  require(wanted >= 0 && wanted <= 1024, "number of threads", wanted, "0 .. 1024");
+  if (wanted == 0) wanted = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  pool_->workers.reserve(static_cast<std::size_t>(wanted - 1));
+  const auto work = [pool = pool_.get()] {
+    std::unique_lock lock(pool->mutex);
+    while (!pool->stopping) {
+      pool->run(lock);
+      pool->work_there.wait(lock, [pool] {
+        return pool->stopping ||
+               (pool->body != nullptr && pool->next_chunk * pool->chunk < pool->count);
+      });
+    }
+  };
+  try {
+    while (threads() < wanted) pool_->workers.emplace_back(work);
+  } catch (const std::system_error&) {
+    // The system has no thread left. Those that run do the same work, only more slowly.
   }
 }
 

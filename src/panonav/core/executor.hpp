@@ -12,13 +12,15 @@ namespace panonav {
 /// numbers, give the same bits on any number of threads.
 class Executor {
  public:
-  /// `threads` 1 runs everything in the calling thread; 0 takes one thread per core. Throws
-  /// ContractError outside 0 .. 1024.
+  /// `threads` 1 runs everything in the calling thread; 0 takes one thread per core. Where the
+  /// system starts fewer threads, the executor goes on with those. Throws ContractError outside
+  /// 0 .. 1024.
   explicit Executor(int threads = 1);
   ~Executor();
   Executor(const Executor&) = delete;
   Executor& operator=(const Executor&) = delete;
 
+  /// Those that run, the calling one included.
   [[nodiscard]] int threads() const noexcept;
 
   /// Calls body(begin, end, chunk_number) for each chunk of [0, count) and waits for all. The first

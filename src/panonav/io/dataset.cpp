@@ -209,17 +209,27 @@ Dataset read_dataset(const fs::path& folder) {
   return dataset;
 }
 
-Dataset read_picture_folder(const fs::path& folder, PictureSource source) {
-  Dataset dataset{folder, std::move(source), {}};
+Dataset read_picture_folder(const fs::path& folder, PictureSource source,
+                            const PictureFolderOptions& options) {
+  Dataset dataset{folder, std::move(source), {}, {}};
   std::error_code error;
   std::vector<std::string> names;
-  fs::directory_iterator iterator(folder, error);
-  if (error) throw FileError(folder.string(), "cannot be read: " + error.message());
-  for (const auto& file : iterator) {
-    if (is_picture(file.path()) && file.is_regular_file(error)) {
-      names.push_back(file.path().filename().string());
+  fs::recursive_directory_iterator file(folder, error);
+  for (; !error && file != fs::recursive_directory_iterator(); file.increment(error)) {
+    std::error_code unknown;
+    const std::string name = file->path().lexically_relative(folder).string();
+    const bool is_folder = file->is_directory(unknown) && !file->is_symlink(unknown);
+    if (is_picture(file->path()) && file->is_regular_file(unknown)) {
+      names.push_back(name);
+    } else if (!is_folder) {
+      dataset.left_out.push_back(name);
+    } else if (!options.recursive) {
+      dataset.left_out.push_back(name + "/");
+      file.disable_recursion_pending();
     }
   }
+  if (error) throw FileError(folder.string(), "cannot be read: " + error.message());
+  std::ranges::sort(dataset.left_out, natural_less);
   if (names.empty())
     throw FileError(folder.string(), "holds no PNG or JPEG picture; allowed: one or more");
   std::sort(names.begin(), names.end(), natural_less);
@@ -236,7 +246,7 @@ Dataset single_picture(const fs::path& file, PictureSource source) {
   std::error_code error;
   if (!fs::is_regular_file(file, error))
     throw FileError(file.string(), "is not there; allowed: a PNG or JPEG picture");
-  Dataset dataset{file.parent_path(), std::move(source), {}};
+  Dataset dataset{file.parent_path(), std::move(source), {}, {}};
   DatasetEntry entry;
   entry.file = file.filename().string();
   entry.path = file;

@@ -27,6 +27,8 @@ struct Dataset {
   std::filesystem::path folder;
   PictureSource source;
   std::vector<DatasetEntry> entries;
+  /// Of a folder of pictures: what lies in it and was left out, sorted; folders end in "/".
+  std::vector<std::string> left_out;
 };
 
 /// Reads `folder`/dataset.toml and the table that it names (docs/formats.md). Throws FileError with
@@ -35,10 +37,15 @@ struct Dataset {
 /// picture at all.
 [[nodiscard]] Dataset read_dataset(const std::filesystem::path& folder);
 
+struct PictureFolderOptions {
+  bool recursive = false;  ///< pictures of the folders within count, too; links are not followed
+};
+
 /// A folder of PNG and JPEG pictures without dataset.toml, in natural order of their names
-/// ("view_9" before "view_10"). Throws FileError when there is none.
-[[nodiscard]] Dataset read_picture_folder(const std::filesystem::path& folder,
-                                          PictureSource source);
+/// ("view_9" before "view_10", "morning/view_1" with their folders). Throws FileError when there is
+/// none.
+[[nodiscard]] Dataset read_picture_folder(const std::filesystem::path& folder, PictureSource source,
+                                          const PictureFolderOptions& options = {});
 
 /// One picture as a data set.
 [[nodiscard]] Dataset single_picture(const std::filesystem::path& file, PictureSource source);

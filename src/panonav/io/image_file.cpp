@@ -30,16 +30,51 @@ Format format_of(Bytes bytes, std::string_view name) {
                                       : "is no picture that can be read; allowed: PNG, JPEG");
 }
 
-}  // namespace
-
-Image decode_image(Bytes bytes, std::string_view name) {
-  return format_of(bytes, name) == Format::png ? detail::decode_png(bytes, name)
-                                               : detail::decode_jpeg(bytes, name);
+// Which source pixel an upright picture shows at (u, v); EXIF 2.32, tag 0x0112.
+struct Source {
+  int u;
+  int v;
+};
+Source source_of(int orientation, ImageSize stored, int u, int v) {
+  const int right = stored.width - 1;
+  const int bottom = stored.height - 1;
+  switch (orientation) {
+    case 2:
+      return {right - u, v};
+    case 3:
+      return {right - u, bottom - v};
+    case 4:
+      return {u, bottom - v};
+    case 5:
+      return {v, u};
+    case 6:
+      return {v, bottom - u};
+    case 7:
+      return {right - v, bottom - u};
+    case 8:
+      return {right - v, u};
+    default:
+      return {u, v};
+  }
 }
 
-Image read_image(const std::filesystem::path& path) {
+}  // namespace
+
+Image decode_image(Bytes bytes, std::string_view name, const ImageLimits& limits) {
+  return format_of(bytes, name) == Format::png ? detail::decode_png(bytes, name, limits)
+                                               : detail::decode_jpeg(bytes, name, limits);
+}
+
+Image read_image(const std::filesystem::path& path, const ImageLimits& limits) {
   const auto bytes = read_file(path, file_limit_bytes);
-  return decode_image(bytes, path.string());
+  return decode_image(bytes, path.string(), limits);
+}
+
+ImageSize read_image_size(const std::filesystem::path& path, const ImageLimits& limits) {
+  const auto bytes = read_file(path, file_limit_bytes);
+  const std::string name = path.string();
+  return format_of(bytes, name) == Format::png ? detail::png_size(bytes, name, limits)
+                                               : detail::jpeg_size(bytes, name, limits);
 }
 
 std::vector<std::uint8_t> encode_png(ImageView image) {
@@ -53,15 +88,60 @@ void write_png(const std::filesystem::path& path, ImageView image) {
 
 namespace detail {
 
-void check_image_size(std::int64_t width, std::int64_t height, std::string_view name) {
-  if (width >= 1 && height >= 1 && width <= image_side_limit_px && height <= image_side_limit_px &&
-      width * height <= image_area_limit_px) {
+void check_image_size(ImageSize size, std::string_view name, const ImageLimits& limits) {
+  const std::int64_t area = std::int64_t{size.width} * size.height;
+  if (size.width >= 1 && size.height >= 1 && size.width <= limits.side_px &&
+      size.height <= limits.side_px && area <= limits.area_px) {
     return;
   }
-  throw FileError(name, "picture is " + std::to_string(width) + " x " + std::to_string(height) +
-                            " px; allowed: 1 .. " + std::to_string(image_side_limit_px) +
-                            " px a side and at most " + std::to_string(image_area_limit_px) +
-                            " px in all");
+  throw FileError(name, "picture is " + std::to_string(size.width) + " x " +
+                            std::to_string(size.height) + " px; allowed: 1 .. " +
+                            std::to_string(limits.side_px) + " px a side and at most " +
+                            std::to_string(limits.area_px) + " px in all");
+}
+
+int exif_orientation(Bytes exif) {
+  const bool little = exif.size() >= 8 && exif[0] == 'I' && exif[1] == 'I';
+  const bool big = exif.size() >= 8 && exif[0] == 'M' && exif[1] == 'M';
+  if (!little && !big) return 1;
+  const auto number = [&](std::size_t at, std::size_t bytes) {
+    std::size_t value = 0;
+    for (std::size_t i = 0; i < bytes; ++i) {
+      value = value << 8U | exif[at + (little ? bytes - 1 - i : i)];
+    }
+    return value;
+  };
+  constexpr std::size_t entry_bytes = 12;
+  const std::size_t directory = number(4, 4);
+  if (directory > exif.size() - 2) return 1;
+  const std::size_t entries =
+      std::min(number(directory, 2), (exif.size() - 2 - directory) / entry_bytes);
+  for (std::size_t i = 0; i < entries; ++i) {
+    const std::size_t entry = directory + 2 + i * entry_bytes;
+    constexpr std::size_t orientation_tag = 0x0112;
+    constexpr std::size_t short_type = 3;
+    if (number(entry, 2) != orientation_tag || number(entry + 2, 2) != short_type) continue;
+    const std::size_t value = number(entry + 8, 2);
+    return value >= 1 && value <= 8 ? static_cast<int>(value) : 1;
+  }
+  return 1;
+}
+
+ImageSize upright_size(ImageSize stored, int orientation) {
+  return orientation >= 5 ? ImageSize{stored.height, stored.width} : stored;
+}
+
+Image upright(Image stored, int orientation) {
+  if (orientation == 1) return stored;
+  const ImageSize size = upright_size(stored.size(), orientation);
+  Image image(size.width, size.height, stored.channels());
+  for (int v = 0; v < size.height; ++v) {
+    for (int u = 0; u < size.width; ++u) {
+      const Source from = source_of(orientation, stored.size(), u, v);
+      std::copy_n(&stored.at(from.u, from.v), stored.channels(), &image.at(u, v));
+    }
+  }
+  return image;
 }
 
 }  // namespace detail

@@ -10,19 +10,32 @@
 
 namespace panonav {
 
-/// Largest picture that is read: sides and area. Larger ones are refused before memory is taken.
-inline constexpr int image_side_limit_px = 32768;
-inline constexpr std::int64_t image_area_limit_px = 134217728;
+/// What a picture may cost. Pictures that are larger are refused before the memory is taken, those
+/// with too many scans before the time is.
+struct ImageLimits {
+  int side_px = 32768;
+  std::int64_t area_px = 134217728;  ///< 16384 x 8192
+  /// Of a JPEG: pixels that all its scans pass over, each scan counted as 65536 more. A progressive
+  /// picture comes in about ten scans, but a small file can ask for thousands.
+  std::int64_t scanned_px = std::int64_t{16} * 134217728;
+};
 
-/// Reads a PNG or JPEG file, told apart by content. Grey pictures of any bit depth give one channel
-/// of 8 bit, colour and palette pictures three; 16-bit values are scaled, an alpha channel is
-/// dropped (the stored colours are what the camera saw), gamma chunks, colour profiles and EXIF
-/// orientation are ignored. Throws FileError on a file that is missing, of another format, damaged,
-/// cut short or too large; never crashes, whatever the bytes.
-[[nodiscard]] Image read_image(const std::filesystem::path& path);
+/// Reads a PNG or JPEG file, told apart by content, and turns it upright as its EXIF orientation
+/// says. Grey pictures of any bit depth give one channel of 8 bit, colour and palette pictures
+/// three; 16-bit values are scaled, an alpha channel is dropped (the stored colours are what the
+/// camera saw), gamma chunks and colour profiles are ignored. Throws FileError on a file that is
+/// missing, of another format, damaged, cut short or beyond the limits; never crashes, whatever the
+/// bytes.
+[[nodiscard]] Image read_image(const std::filesystem::path& path, const ImageLimits& limits = {});
+
+/// Width and height of the upright picture from the head of the file, without decoding the pixels.
+/// Throws FileError.
+[[nodiscard]] ImageSize read_image_size(const std::filesystem::path& path,
+                                        const ImageLimits& limits = {});
 
 /// The same from bytes in memory; `name` stands in error messages.
-[[nodiscard]] Image decode_image(std::span<const std::uint8_t> bytes, std::string_view name);
+[[nodiscard]] Image decode_image(std::span<const std::uint8_t> bytes, std::string_view name,
+                                 const ImageLimits& limits = {});
 
 /// The picture (1 or 3 channels) as PNG. Throws ContractError on an empty picture.
 [[nodiscard]] std::vector<std::uint8_t> encode_png(ImageView image);

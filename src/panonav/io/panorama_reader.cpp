@@ -1,15 +1,47 @@
 #include "panonav/io/panorama_reader.hpp"
 
+#include <cmath>
+#include <numbers>
+#include <string>
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/panorama/hidden_values.hpp"
 
 namespace panonav {
 
+namespace {
+
+void require_plausible(const std::optional<ElevationBand>& band) {
+  constexpr double min_height_rad = 5.0 * std::numbers::pi / 180.0;
+  constexpr double rounding_rad = 1e-9;
+  if (!band || band->top_rad - band->bottom_rad >= min_height_rad - rounding_rad) return;
+  throw ContractError("elevation band",
+                      short_number(degrees(band->bottom_rad)) + " to " +
+                          short_number(degrees(band->top_rad)) + " degrees",
+                      "5 degrees or more from bottom to top; radians in the place of degrees "
+                      "make it too small");
+}
+
+// Of a picture that is said to show the whole sphere.
+void require_whole_sphere(ImageSize size) {
+  constexpr double tolerance = 0.02;  // borders and scaling take or add a few pixels
+  if (std::abs(size.width - 2.0 * size.height) <= tolerance * size.width) return;
+  throw ContractError("equirectangular picture",
+                      std::to_string(size.width) + " x " + std::to_string(size.height) + " px",
+                      "twice as wide as high, the whole sphere; a part of the sphere is of the "
+                      "kind panorama, with its elevation band");
+}
+
+}  // namespace
+
 PanoramaReader::PanoramaReader(PictureSource source, PanoramaShape shape)
     : source_(std::move(source)), shape_(shape) {
+  require_plausible(source_.layout.elevations);
+  require_plausible(source_.layout.kept_elevations);
   if (source_.kind != PictureKind::mirror) return;
   require(source_.camera.has_value(), "camera of mirror pictures", 0.0, "one camera");
   UnwarperOptions options;
@@ -21,6 +53,7 @@ PanoramaReader::PanoramaReader(PictureSource source, PanoramaShape shape)
 }
 
 Panorama PanoramaReader::convert(ImageView picture) const {
+  if (source_.kind == PictureKind::equirectangular) require_whole_sphere(picture.size());
   if (!unwarper_) return panorama_from_picture(picture, source_.layout, shape_);
   Panorama panorama = unwarper_->unwrap(picture);
   if (!hidden_.empty()) fill_hidden_values(panorama, hidden_);

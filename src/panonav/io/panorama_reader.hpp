@@ -17,7 +17,8 @@ namespace panonav {
 class PanoramaReader {
  public:
   /// `shape`: rows or columns 0 keep the pictures' own (80 x 512 for mirror pictures). Throws
-  /// ContractError on a source that is not valid.
+  /// ContractError on a source that is not valid, and on an elevation band of less than 5 degrees:
+  /// no panorama is that low, but radians that stand for degrees look like it.
   PanoramaReader(PictureSource source, PanoramaShape shape);
 
   [[nodiscard]] const PictureSource& source() const noexcept { return source_; }
@@ -26,7 +27,8 @@ class PanoramaReader {
   [[nodiscard]] const Unwarper* unwarper() const noexcept {
     return unwarper_ && hidden_.empty() ? &*unwarper_ : nullptr;
   }
-  /// Throws ContractError on a picture whose size is not the camera's.
+  /// Throws ContractError on a picture whose size is not the camera's, and on an equirectangular
+  /// one that is not twice as wide as high (2 % off at most).
   [[nodiscard]] Panorama convert(ImageView picture) const;
   /// Reads and converts. Throws FileError that names the file and what is wrong with it.
   [[nodiscard]] Panorama read(const std::filesystem::path& file) const;

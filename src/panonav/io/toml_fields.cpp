@@ -59,27 +59,44 @@ TomlTable copy_of(const toml::table& table) {
   return result;
 }
 
-// Names joined by dots make nested tables, and the parser follows them by recursion without a
-// bound. Throws FileError when any stretch of text could be a name of too many parts.
-void require_shallow_names(std::string_view text, const std::filesystem::path& path) {
+// The parser follows names that are joined by dots by recursion without a bound, and characters
+// beyond ASCII lead it to a statement that it calls unreachable, wherever it looks for blanks:
+// around names and values and within texts of several lines. Throws FileError where the text has
+// such.
+void require_plain(std::string_view text, const std::filesystem::path& path) {
   constexpr int max_parts = 64;
-  std::size_t line_number = 0;
-  while (!text.empty()) {
+  constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+  if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
+  for (int number = 1; !text.empty(); ++number) {
     const std::size_t end = std::min(text.find('\n'), text.size());
     const std::string_view line = text.substr(0, end);
     text.remove_prefix(std::min(end + 1, text.size()));
-    ++line_number;
-    const std::size_t first = line.find_first_not_of(" \t\r");
-    if (first == std::string_view::npos || line[first] == '#') continue;
+    const auto refuse = [&](const std::string& what) {
+      throw FileError(path.string(), "line " + std::to_string(number) + " has " + what);
+    };
     int dots = 0;
-    for (const char c : line) {
+    for (std::size_t i = 0; i < line.size() && line[i] != '#'; ++i) {
+      const char c = line[i];
       constexpr std::string_view borders = "=,[]{}";
+      if (static_cast<unsigned char>(c) >= 0x80U) {
+        refuse("a character beyond ASCII outside of quotation marks; allowed: within them");
+      }
       if (borders.find(c) != std::string_view::npos) dots = 0;
       if (c == '.' && ++dots >= max_parts) {
-        throw FileError(path.string(), "line " + std::to_string(line_number) +
-                                           " has a name of too many parts; allowed: up to " +
-                                           std::to_string(max_parts));
+        refuse("a name of too many parts; allowed: up to " + std::to_string(max_parts));
       }
+      if (c != '"' && c != '\'') continue;
+      if (line.substr(i).starts_with(std::string(3, c))) {
+        refuse("a text in three quotation marks; allowed: one, around a text on one line");
+      }
+      constexpr std::string_view before = " \t=,[{.";
+      if (i > 0 && before.find(line[i - 1]) == std::string_view::npos) {
+        refuse("a quotation mark within a name or a value; allowed: around them");
+      }
+      for (++i; i < line.size() && line[i] != c; ++i) {
+        if (c == '"' && line[i] == '\\') ++i;
+      }
+      if (i >= line.size()) refuse("a quotation mark that is not closed");
     }
   }
 }
@@ -97,7 +114,7 @@ std::optional<double> as_number(const TomlValue& value) {
 TomlTable read_toml(const std::filesystem::path& path) {
   const auto bytes = read_file(path, file_limit_bytes);
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  require_shallow_names(text, path);
+  require_plain(text, path);
   try {
     return copy_of(toml::parse(text));
   } catch (const toml::parse_error& error) {

@@ -29,7 +29,8 @@ struct TomlField {
   TomlValue value;
 };
 
-/// Parses the file. Throws FileError: missing, larger than 1 MB, not TOML (with the line).
+/// Parses the file. Throws FileError with the line: missing, larger than 1 MB, not TOML, or TOML
+/// that no file of ours needs: texts of several lines, names of 64 parts and more.
 [[nodiscard]] TomlTable read_toml(const std::filesystem::path& path);
 
 /// The text in quotation marks as TOML writes it.

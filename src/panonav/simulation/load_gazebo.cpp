@@ -149,7 +149,9 @@ class WorldReader {
     sdf::ParserConfig config;
     config.SetFindCallback([this](const std::string& uri) {
       const auto found = files_.resolve(uri, world_.parent_path());
-      return found ? found->string() : std::string();
+      std::error_code code;
+      if (!found || fs::is_directory(*found, code)) return found ? found->string() : std::string();
+      return fs::is_regular_file(*found, code) ? found->string() : std::string();
     });
     sdf::Root root;
     const sdf::Errors errors = root.Load(world_.string(), config);

@@ -4,6 +4,7 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
+#include <assimp/DefaultIOSystem.h>
 #include <algorithm>
 #include <assimp/Importer.hpp>
 #include <cctype>
@@ -11,6 +12,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
+#include "panonav/simulation/internal/gazebo_files.hpp"
 #include "panonav/simulation/internal/mesh_library.hpp"
 
 namespace panonav {
@@ -119,14 +121,28 @@ struct Collector {
   }
 };
 
+// Mesh files name others: materials, buffers. Those that are no regular files do not count as
+// there.
+class RegularFiles final : public Assimp::DefaultIOSystem {
+ public:
+  Assimp::IOStream* Open(const char* file, const char* mode) override {
+    try {
+      require_scene_file(file);
+    } catch (const FileError&) {
+      return nullptr;
+    }
+    return Assimp::DefaultIOSystem::Open(file, mode);
+  }
+};
+
 }  // namespace
 
 const std::vector<FileMesh>& MeshLibrary::read(const fs::path& path, UpAxis up) {
   const auto key = std::make_pair(path.lexically_normal().string(), up);
   if (const auto known = files_.find(key); known != files_.end()) return known->second;
-  std::error_code code;
-  if (!fs::is_regular_file(path, code)) throw FileError(path.string(), "no such mesh file");
+  require_scene_file(path);
   Assimp::Importer importer;
+  importer.SetIOHandler(new RegularFiles);  // the importer owns it
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE,
                               aiPrimitiveType_LINE | aiPrimitiveType_POINT);
   importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS,

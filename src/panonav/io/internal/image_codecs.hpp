@@ -6,16 +6,29 @@
 #include <vector>
 
 #include "panonav/core/image.hpp"
+#include "panonav/io/image_file.hpp"
 
 /// The two codecs behind image_file.hpp, one file each, because their C headers do not mix.
 namespace panonav::detail {
 
 /// Throws FileError unless a picture of this size may be read.
-void check_image_size(std::int64_t width, std::int64_t height, std::string_view name);
+void check_image_size(ImageSize size, std::string_view name, const ImageLimits& limits);
 
-[[nodiscard]] Image decode_png(std::span<const std::uint8_t> bytes, std::string_view name);
+/// 1 .. 8 as in EXIF, from a block that begins with its byte order; 1, upright, where it says
+/// nothing that can be read.
+[[nodiscard]] int exif_orientation(std::span<const std::uint8_t> exif);
+[[nodiscard]] ImageSize upright_size(ImageSize stored, int orientation);
+[[nodiscard]] Image upright(Image stored, int orientation);
+
+[[nodiscard]] Image decode_png(std::span<const std::uint8_t> bytes, std::string_view name,
+                               const ImageLimits& limits);
+[[nodiscard]] ImageSize png_size(std::span<const std::uint8_t> bytes, std::string_view name,
+                                 const ImageLimits& limits);
 [[nodiscard]] std::vector<std::uint8_t> encode_png(ImageView image);
 
-[[nodiscard]] Image decode_jpeg(std::span<const std::uint8_t> bytes, std::string_view name);
+[[nodiscard]] Image decode_jpeg(std::span<const std::uint8_t> bytes, std::string_view name,
+                                const ImageLimits& limits);
+[[nodiscard]] ImageSize jpeg_size(std::span<const std::uint8_t> bytes, std::string_view name,
+                                  const ImageLimits& limits);
 
 }  // namespace panonav::detail

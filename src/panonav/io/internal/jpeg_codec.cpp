@@ -1,8 +1,10 @@
 #include <algorithm>
+#include <array>
 #include <csetjmp>
 #include <cstddef>
 #include <cstdio>
 #include <string>
+#include <utility>
 
 // jpeglib.h needs the C types above it, jerror.h the settings of jpeglib.h.
 #include <jpeglib.h>
@@ -25,6 +27,7 @@ struct Reader {
   jpeg_progress_mgr progress{};
   std::jmp_buf on_failure{};
   char message[JMSG_LENGTH_MAX] = {};
+  std::int64_t max_scans = 0;
   bool created = false;
   ~Reader() {
     if (created) jpeg_destroy_decompress(&jpeg);
@@ -57,13 +60,13 @@ void on_message(j_common_ptr jpeg, int level) {
 
 void on_output(j_common_ptr /*jpeg*/) {}
 
-// A small file can ask for millions of passes over the picture; real ones have a dozen.
 void on_progress(j_common_ptr jpeg) {
-  constexpr int scan_limit = 200;
-  if (reinterpret_cast<j_decompress_ptr>(jpeg)->input_scan_number > scan_limit) {
-    jpeg->err->msg_code = JERR_BAD_PROGRESSION;
-    on_error(jpeg);
-  }
+  auto* reader = static_cast<Reader*>(jpeg->client_data);
+  if (reader->jpeg.input_scan_number <= reader->max_scans) return;
+  std::snprintf(reader->message, sizeof reader->message, "more than %lld scans for %u x %u px",
+                static_cast<long long>(reader->max_scans), reader->jpeg.image_width,
+                reader->jpeg.image_height);
+  std::longjmp(reader->on_failure, 1);
 }
 
 bool open_steps(Reader& reader, const std::uint8_t* data, std::size_t size) {
@@ -100,7 +103,32 @@ bool pixel_steps(Reader& reader, std::uint8_t* pixels, std::size_t stride) {
   throw FileError(name, std::string("damaged JPEG: ") + reader.message);
 }
 
-ImageSize open(Reader& reader, std::span<const std::uint8_t> bytes, std::string_view name) {
+// The EXIF block: what an APP1 segment before the first scan holds behind its name.
+std::span<const std::uint8_t> exif_of(std::span<const std::uint8_t> bytes) {
+  constexpr std::uint8_t app1 = 0xE1;
+  constexpr std::uint8_t start_of_scan = 0xDA;
+  constexpr std::array<std::uint8_t, 6> exif{'E', 'x', 'i', 'f', 0, 0};
+  std::size_t at = 2;
+  while (at + 4 <= bytes.size() && bytes[at] == 0xFF) {
+    const std::uint8_t marker = bytes[at + 1];
+    if (marker == 0xFF) {  // padding
+      ++at;
+      continue;
+    }
+    const std::size_t size = bytes[at + 2] << 8U | bytes[at + 3];
+    if (marker == start_of_scan || size < 2 || size > bytes.size() - at - 2) break;
+    const auto content = bytes.subspan(at + 4, size - 2);
+    if (marker == app1 && content.size() > exif.size() &&
+        std::equal(exif.begin(), exif.end(), content.begin())) {
+      return content.subspan(exif.size());
+    }
+    at += 2 + size;
+  }
+  return {};
+}
+
+ImageSize open(Reader& reader, std::span<const std::uint8_t> bytes, std::string_view name,
+               const ImageLimits& limits) {
   reader.jpeg.err = jpeg_std_error(&reader.errors);
   reader.errors.error_exit = on_error;
   reader.errors.emit_message = on_message;
@@ -108,15 +136,28 @@ ImageSize open(Reader& reader, std::span<const std::uint8_t> bytes, std::string_
   reader.progress.progress_monitor = on_progress;
   reader.jpeg.client_data = &reader;
   if (!open_steps(reader, bytes.data(), bytes.size())) fail(reader, name);
-  check_image_size(reader.jpeg.image_width, reader.jpeg.image_height, name);
-  return {static_cast<int>(reader.jpeg.image_width), static_cast<int>(reader.jpeg.image_height)};
+  const ImageSize size{static_cast<int>(reader.jpeg.image_width),
+                       static_cast<int>(reader.jpeg.image_height)};
+  check_image_size(size, name, limits);
+  constexpr std::int64_t scan_overhead_px = 65536;
+  reader.max_scans =
+      limits.scanned_px / (std::int64_t{size.width} * size.height + scan_overhead_px);
+  return size;
 }
 
 }  // namespace
 
-Image decode_jpeg(std::span<const std::uint8_t> bytes, std::string_view name) {
+ImageSize jpeg_size(std::span<const std::uint8_t> bytes, std::string_view name,
+                    const ImageLimits& limits) {
   Reader reader;
-  const ImageSize size = open(reader, bytes, name);
+  const ImageSize stored = open(reader, bytes, name, limits);
+  return upright_size(stored, exif_orientation(exif_of(bytes)));
+}
+
+Image decode_jpeg(std::span<const std::uint8_t> bytes, std::string_view name,
+                  const ImageLimits& limits) {
+  Reader reader;
+  const ImageSize size = open(reader, bytes, name, limits);
   if (reader.jpeg.jpeg_color_space == JCS_CMYK || reader.jpeg.jpeg_color_space == JCS_YCCK) {
     throw FileError(name, "is a JPEG in printing colours (CMYK); allowed: grey, RGB");
   }
@@ -132,7 +173,7 @@ Image decode_jpeg(std::span<const std::uint8_t> bytes, std::string_view name) {
                    static_cast<std::size_t>(size.width) * static_cast<std::size_t>(channels))) {
     fail(reader, name);
   }
-  return image;
+  return upright(std::move(image), exif_orientation(exif_of(bytes)));
 }
 
 }  // namespace panonav::detail

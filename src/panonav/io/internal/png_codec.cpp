@@ -26,6 +26,7 @@ struct Reader {
   png_infop info = nullptr;
   const std::uint8_t* next = nullptr;
   std::size_t left = 0;
+  std::span<const std::uint8_t> exif;  // libpng's; empty: none before the pixels
   char message[message_size] = {};
   ~Reader() { png_destroy_read_struct(&png, &info, nullptr); }
 };
@@ -45,7 +46,7 @@ void on_read(png_structp png, png_bytep to, png_size_t count) {
   reader->left -= count;
 }
 
-bool open_steps(Reader& reader, png_uint_32& width, png_uint_32& height) {
+bool open_steps(Reader& reader, ImageSize& size) {
   if (setjmp(png_jmpbuf(reader.png))) return false;
   // Sizes are checked by the caller, with its own message; ancillary chunks must not take much
   // memory.
@@ -54,8 +55,15 @@ bool open_steps(Reader& reader, png_uint_32& width, png_uint_32& height) {
   png_set_chunk_cache_max(reader.png, 64);
   png_set_read_fn(reader.png, &reader, on_read);
   png_read_info(reader.png, reader.info);
-  width = png_get_image_width(reader.png, reader.info);
-  height = png_get_image_height(reader.png, reader.info);
+  size = {static_cast<int>(png_get_image_width(reader.png, reader.info)),
+          static_cast<int>(png_get_image_height(reader.png, reader.info))};
+#ifdef PNG_eXIf_SUPPORTED
+  png_uint_32 exif_bytes = 0;
+  png_bytep exif = nullptr;
+  if (png_get_eXIf_1(reader.png, reader.info, &exif_bytes, &exif) != 0) {
+    reader.exif = {exif, exif_bytes};
+  }
+#endif
   return true;
 }
 
@@ -83,17 +91,17 @@ bool pixel_steps(Reader& reader, png_bytepp rows) {
   throw FileError(name, std::string("damaged PNG: ") + reader.message);
 }
 
-ImageSize open(Reader& reader, std::span<const std::uint8_t> bytes, std::string_view name) {
+ImageSize open(Reader& reader, std::span<const std::uint8_t> bytes, std::string_view name,
+               const ImageLimits& limits) {
   reader.next = bytes.data();
   reader.left = bytes.size();
   reader.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &reader, on_read_error, on_warning);
   reader.info = reader.png == nullptr ? nullptr : png_create_info_struct(reader.png);
   if (reader.info == nullptr) throw FileError(name, "cannot be read: out of memory");
-  png_uint_32 width = 0;
-  png_uint_32 height = 0;
-  if (!open_steps(reader, width, height)) fail(reader, name);
-  check_image_size(width, height, name);
-  return {static_cast<int>(width), static_cast<int>(height)};
+  ImageSize size;
+  if (!open_steps(reader, size)) fail(reader, name);
+  check_image_size(size, name, limits);
+  return size;
 }
 
 struct Writer {
@@ -144,9 +152,17 @@ bool write_steps(Writer& writer, const ImageView& image) {
 
 }  // namespace
 
-Image decode_png(std::span<const std::uint8_t> bytes, std::string_view name) {
+ImageSize png_size(std::span<const std::uint8_t> bytes, std::string_view name,
+                   const ImageLimits& limits) {
   Reader reader;
-  const ImageSize size = open(reader, bytes, name);
+  const ImageSize stored = open(reader, bytes, name, limits);
+  return upright_size(stored, exif_orientation(reader.exif));
+}
+
+Image decode_png(std::span<const std::uint8_t> bytes, std::string_view name,
+                 const ImageLimits& limits) {
+  Reader reader;
+  const ImageSize size = open(reader, bytes, name, limits);
   // Deflate packs at most 1032 to 1: a larger picture cannot be in this file, so take no memory for
   // it.
   const auto min_bits = static_cast<std::int64_t>(size.width) * size.height;
@@ -161,7 +177,7 @@ Image decode_png(std::span<const std::uint8_t> bytes, std::string_view name) {
   std::vector<png_bytep> rows(static_cast<std::size_t>(size.height));
   for (int v = 0; v < size.height; ++v) rows[static_cast<std::size_t>(v)] = &image.at(0, v);
   if (!pixel_steps(reader, rows.data())) fail(reader, name);
-  return image;
+  return upright(std::move(image), exif_orientation(reader.exif));
 }
 
 std::vector<std::uint8_t> encode_png(ImageView image) {

@@ -21,14 +21,19 @@ bool is_there(const fs::path& path) {
 }
 
 std::string text_without_comments(const fs::path& file) {
+  require_scene_file(file);
   std::ifstream stream(file, std::ios::binary);
-  std::string text((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
-  for (auto begin = text.find("<!--"); begin != std::string::npos;
-       begin = text.find("<!--", begin)) {
-    const auto end = text.find("-->", begin);
-    text.erase(begin, end == std::string::npos ? std::string::npos : end + 3 - begin);
+  const std::string text((std::istreambuf_iterator<char>(stream)),
+                         std::istreambuf_iterator<char>());
+  std::string result;
+  std::size_t at = 0;
+  while (at != std::string::npos) {
+    const auto begin = text.find("<!--", at);
+    result.append(text, at, begin == std::string::npos ? begin : begin - at);
+    const auto end = begin == std::string::npos ? begin : text.find("-->", begin);
+    at = end == std::string::npos ? end : end + 3;
   }
-  return text;
+  return result;
 }
 
 // The parser hands files with another root element to another parser, which prints.
@@ -43,55 +48,83 @@ bool is_sdf(const std::string& text) {
 // What the <uri> of every <include> says.
 std::vector<std::string> included_uris(const std::string& text) {
   std::vector<std::string> uris;
-  for (auto at = text.find("<include"); at != std::string::npos;
-       at = text.find("<include", at + 1)) {
-    const auto begin = text.find("<uri>", at);
-    const auto end = text.find("</uri>", at);
-    const auto close = text.find("</include>", at);
-    if (begin == std::string::npos || end == std::string::npos || begin > end || begin > close)
-      continue;
-    std::string uri = text.substr(begin + 5, end - begin - 5);
+  for (auto at = text.find("<include"); at != std::string::npos; at = text.find("<include", at)) {
+    const auto close = std::min(text.find("</include>", at), text.size());
+    const std::string_view include(text.data() + at, close - at);
+    at = close;
+    const auto begin = include.find("<uri>");
+    const auto end = include.find("</uri>");
+    if (begin == std::string_view::npos || end == std::string_view::npos || begin > end) continue;
+    const std::string_view uri = include.substr(begin + 5, end - begin - 5);
     const auto first = uri.find_first_not_of(" \t\r\n");
-    if (first == std::string::npos) continue;
-    uris.push_back(uri.substr(first, uri.find_last_not_of(" \t\r\n") + 1 - first));
+    if (first == std::string_view::npos) continue;
+    uris.emplace_back(uri.substr(first, uri.find_last_not_of(" \t\r\n") + 1 - first));
   }
   return uris;
 }
 
-enum class Visit { open, done };
+// What a file includes, itself counted: how deep, and how many in all.
+struct Included {
+  int depth = 0;  // 0: not known yet
+  double files = 0.0;
+};
 
-void follow_includes(const fs::path& file, const GazeboFiles& files,
-                     std::map<std::string, Visit>& visits) {
+Included follow_includes(const fs::path& file, const GazeboFiles& files, int depth,
+                         std::map<std::string, Included>& visits) {
+  constexpr int max_depth = 32;
+  constexpr double max_files = 100000.0;
   const std::string key = file.lexically_normal().string();
-  const auto known = visits.find(key);
-  if (known != visits.end()) {
-    if (known->second == Visit::open)
+  const auto [visit, is_new] = visits.try_emplace(key);
+  if (!is_new) {
+    if (visit->second.depth == 0)
       throw FileError(key, "includes itself, directly or through other models");
-    return;
+    return visit->second;
   }
-  visits[key] = Visit::open;
+  if (depth > max_depth) throw FileError(key, "is included more than 32 models deep");
   const std::string text = text_without_comments(file);
   if (!is_sdf(text))
     throw FileError(file.string(), "not an SDF file: its first element is not <sdf>");
+  Included all{1, 1.0};
+  const auto follow = [&](const fs::path& included) {
+    const Included below = follow_includes(included, files, depth + 1, visits);
+    all = {std::max(all.depth, below.depth + 1), all.files + below.files};
+    if (all.depth > max_depth) throw FileError(key, "includes models more than 32 deep");
+    if (all.files > max_files) throw FileError(key, "includes more than 100000 models in all");
+  };
   for (const std::string& uri : included_uris(text)) {
     const auto place = files.resolve(uri, file.parent_path());
     if (!place) continue;  // the parser says what is missing
     std::error_code code;
     if (!fs::is_directory(*place, code)) {
-      follow_includes(*place, files, visits);
+      follow(*place);
       continue;
     }
     std::vector<fs::path> descriptions;
     for (fs::directory_iterator it(*place, code), end; !code && it != end; it.increment(code)) {
-      if (it->path().extension() == ".sdf") descriptions.push_back(it->path());
+      const std::string ending = it->path().extension().string();
+      if (ending == ".sdf") descriptions.push_back(it->path());
+      if (ending == ".config" || ending == ".xml") require_scene_file(it->path());
     }
     std::sort(descriptions.begin(), descriptions.end());
-    for (const fs::path& description : descriptions) follow_includes(description, files, visits);
+    for (const fs::path& description : descriptions) follow(description);
   }
-  visits[key] = Visit::done;
+  return visits[key] = all;
 }
 
 }  // namespace
+
+void require_scene_file(const fs::path& file) {
+  constexpr std::uintmax_t max_bytes = std::uintmax_t{256} << 20U;
+  std::error_code code;
+  const fs::file_status status = fs::status(file, code);
+  if (!fs::exists(status)) throw FileError(file.string(), "no such file");
+  if (!fs::is_regular_file(status)) throw FileError(file.string(), "is no regular file");
+  const std::uintmax_t bytes = fs::file_size(file, code);
+  if (code || bytes > max_bytes) {
+    throw FileError(file.string(), "is " + std::to_string(bytes) + " bytes; allowed: up to " +
+                                       std::to_string(max_bytes));
+  }
+}
 
 std::vector<fs::path> gazebo_model_folders_of_environment() {
   std::vector<fs::path> folders;
@@ -145,8 +178,8 @@ std::string GazeboFiles::places() const {
 }
 
 void GazeboFiles::check_includes() const {
-  std::map<std::string, Visit> visits;
-  follow_includes(world_, *this, visits);
+  std::map<std::string, Included> visits;
+  follow_includes(world_, *this, 1, visits);
 }
 
 }  // namespace panonav

@@ -8,6 +8,10 @@
 
 namespace panonav {
 
+/// Throws FileError unless this is a regular file of at most 256 MB: worlds and meshes name other
+/// files, and devices and pipes have no end.
+void require_scene_file(const std::filesystem::path& file);
+
 /// Finds the files that a Gazebo world refers to.
 class GazeboFiles {
  public:
@@ -23,7 +27,8 @@ class GazeboFiles {
   [[nodiscard]] std::string places() const;
 
   /// Throws FileError on files that the SDF parser does not survive or not quietly: models that
-  /// include themselves, directly or through others, and files whose root is not <sdf>.
+  /// include themselves, directly or through others, more than 32 deep or 100,000 in all, and files
+  /// that are not regular ones or whose root is not <sdf>.
   void check_includes() const;
 
  private:

@@ -5,6 +5,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "panonav/simulation/internal/gazebo_files.hpp"
+
 namespace panonav {
 
 namespace {
@@ -43,6 +45,7 @@ constexpr std::array<NamedColour, 21> gazebo_colours{{
 
 // Words of a script; braces stand alone, comments are left out.
 std::vector<std::string> words_of(const fs::path& file) {
+  require_scene_file(file);
   std::ifstream stream(file);
   std::vector<std::string> words;
   std::string line;

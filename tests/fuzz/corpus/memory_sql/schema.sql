@@ -1,0 +1,1 @@
+PRAGMA writable_schema=ON; UPDATE sqlite_master SET sql='CREATE TABLE views(a)' WHERE name='views';

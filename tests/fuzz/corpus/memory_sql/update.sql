@@ -1,0 +1,1 @@
+UPDATE views SET name = 7; UPDATE maps SET name = NULL; PRAGMA user_version = 99;

@@ -1,0 +1,200 @@
+#include "fuzz/targets.hpp"
+
+#include <sqlite3.h>
+
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+#include "panonav/io/atomic_file.hpp"
+#include "panonav/io/camera_file.hpp"
+#include "panonav/io/dataset.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav/io/option_file.hpp"
+#include "panonav/io/trajectory_file.hpp"
+#include "panonav/panorama/preprocessing.hpp"
+#include "panonav/storage/memory_file.hpp"
+#include "support/temporary_folder.hpp"
+#ifdef PANONAV_FUZZ_WORLDS
+#include "panonav/simulation/load_gazebo.hpp"
+#endif
+
+namespace panonav::testing {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Bytes = std::span<const std::uint8_t>;
+
+template <class Read>
+void expect_value_or_line(const Read& read) {
+  try {
+    read();
+  } catch (const FileError& error) {
+    const std::string_view message = error.what();
+    if (message.empty() || message.find('\n') != std::string_view::npos) {
+      throw std::logic_error("not one line: " + std::string(message));
+    }
+  }
+}
+
+// Written again and again; a plain write, as nothing must survive.
+fs::path file_of(std::string_view name, Bytes bytes) {
+  static const TemporaryFolder folder;
+  return folder.write(name, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
+
+Bytes bytes_of(std::string_view text) {
+  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
+}
+
+void read_picture(Bytes bytes) {
+  constexpr ImageLimits small{.side_px = 4096, .area_px = 1 << 22, .scanned_px = 1 << 27};
+  expect_value_or_line([&] { (void)decode_image(bytes, "picture", small); });
+}
+
+void read_config(Bytes bytes) {
+  expect_value_or_line([&] {
+    OptionFile file(file_of("config.toml", bytes));
+    PreprocessingOptions options;
+    file.apply("preprocessing", options);
+    file.require_sections(std::array<std::string_view, 1>{"preprocessing"});
+  });
+}
+
+void read_camera_bytes(Bytes bytes) {
+  expect_value_or_line([&] {
+    const CameraFile file = read_camera(file_of("camera.toml", bytes));
+    validate(file.camera);
+    write_camera(file_of("written.toml", {}), file);
+    if (read_camera(file_of("camera.toml", bytes)).camera != file.camera) {
+      throw std::logic_error("a camera changes on its way");
+    }
+  });
+}
+
+constexpr std::string_view dataset_text =
+    "[images]\nkind = \"panorama\"\n[poses]\nfile = \"poses.csv\"\n";
+constexpr std::string_view poses_text = "file,x_m,y_m\na.png,1,2\n";
+
+void read_dataset_of(Bytes dataset, Bytes poses) {
+  expect_value_or_line([&] {
+    (void)file_of("a.png", {});
+    (void)file_of("poses.csv", poses);
+    (void)read_dataset(file_of("dataset.toml", dataset).parent_path());
+  });
+}
+void read_dataset_bytes(Bytes bytes) {
+  read_dataset_of(bytes, bytes_of(poses_text));
+}
+void read_poses(Bytes bytes) {
+  read_dataset_of(bytes_of(dataset_text), bytes);
+}
+
+void read_csv(Bytes bytes) {
+  expect_value_or_line([&] { (void)read_trajectory(file_of("t.csv", bytes)); });
+}
+void read_tum(Bytes bytes) {
+  expect_value_or_line([&] { (void)read_trajectory(file_of("t.tum", bytes)); });
+}
+
+void read_all_of(const fs::path& path) {
+  expect_value_or_line([&] { (void)MemoryFile::open(path, Access::read_only).verify(); });
+  expect_value_or_line([&] {
+    const MemoryFile file = MemoryFile::open(path, Access::read_only);
+    (void)file.info();
+    (void)file.load();
+    for (const ViewId view : file.views()) (void)file.thumbnail(view);
+    for (const auto& name : file.map_names()) (void)file.map(name);
+    for (const auto& name : file.route_names()) (void)file.route(name);
+  });
+}
+
+fs::path new_memory(Bytes bytes) {
+  const fs::path path = file_of("m.panonav", bytes);
+  for (const char* log : {"-wal", "-shm", "-journal"}) fs::remove(path.string() + log);
+  return path;
+}
+
+void read_memory(Bytes bytes) {
+  read_all_of(new_memory(bytes));
+}
+
+// A memory of everything that one can hold.
+std::vector<std::uint8_t> good_memory() {
+  const fs::path path = new_memory({});
+  fs::remove(path);
+  MemoryHeader header;
+  header.shape = {2, 3};
+  header.panorama_columns = 8;
+  {
+    MemoryFile file = MemoryFile::create(path, header);
+    std::vector<ViewId> views;
+    for (const char* name : {"a", "b", "c"}) {
+      NewView view{{name, ReferencePose{1.0, 2.0, 0.5}, 3.0}, {}, {1, 2, 3}};
+      view.signature = pack(FourierSignature({2, 3}, {0.5F, 0.1F, 0.2F, 0.4F, 0.3F, 0.2F},
+                                             std::vector<float>(6), std::nullopt),
+                            1.0F);
+      views.push_back(file.append(view));
+    }
+    file.set_parameter("p", "{}");
+    TopologicalMap map;
+    map.nodes = {{views[0], {}, 0}, {views[1], {1.0, 0.0, 0.0}, 0}};
+    file.save_map("m", map);
+  }
+  return read_file(path, 1U << 24U);
+}
+
+// The bytes are SQL that somebody ran on a good memory.
+void read_memory_sql(Bytes bytes) {
+  static const std::vector<std::uint8_t> good = good_memory();
+  const fs::path path = new_memory(good);
+  sqlite3* raw = nullptr;
+  const int opened = sqlite3_open(path.c_str(), &raw);
+  const std::unique_ptr<sqlite3, int (*)(sqlite3*)> database(raw, sqlite3_close);
+  if (opened != SQLITE_OK) throw std::logic_error("the good memory cannot be opened");
+  // Nothing outside of the file, and no script without an end.
+  sqlite3_limit(raw, SQLITE_LIMIT_ATTACHED, 0);
+  sqlite3_limit(raw, SQLITE_LIMIT_LENGTH, 1 << 20);
+  int steps = 0;
+  sqlite3_progress_handler(
+      raw, 1000, [](void* count) { return ++*static_cast<int*>(count) > 100 ? 1 : 0; }, &steps);
+  const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  (void)sqlite3_exec(raw, text.c_str(), nullptr, nullptr, nullptr);
+  sqlite3_exec(raw, "COMMIT", nullptr, nullptr, nullptr);
+  read_all_of(path);
+}
+
+#ifdef PANONAV_FUZZ_WORLDS
+void read_world(Bytes bytes) {
+  expect_value_or_line([&] { (void)load_gazebo(file_of("world.sdf", bytes)); });
+}
+#endif
+
+constexpr std::array targets{
+    FuzzTarget{"png", read_picture},
+    FuzzTarget{"jpeg", read_picture},
+    FuzzTarget{"config", read_config},
+    FuzzTarget{"camera", read_camera_bytes},
+    FuzzTarget{"dataset", read_dataset_bytes},
+    FuzzTarget{"poses", read_poses},
+    FuzzTarget{"csv", read_csv},
+    FuzzTarget{"tum", read_tum},
+    FuzzTarget{"memory", read_memory},
+    FuzzTarget{"memory_sql", read_memory_sql},
+#ifdef PANONAV_FUZZ_WORLDS
+    FuzzTarget{"world", read_world},
+#endif
+};
+
+}  // namespace
+
+std::span<const FuzzTarget> fuzz_targets() {
+  return targets;
+}
+
+}  // namespace panonav::testing
