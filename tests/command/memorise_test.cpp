@@ -215,8 +215,14 @@ TEST_F(Memorise, ImplausiblePicturesAreRefusedOrHinted) {
   // Radians in the place of degrees.
   EXPECT_TRUE(contains(refusal({"memorise", folder, folder_ / "d.panonav", "--kind", "panorama",
                                 "--elevation-deg", "-0.52", "0.7"}),
-                       "elevation band is -0.52 to 0.7 degrees; allowed: 5 degrees or more"));
+                       "--elevation-deg is -0.52 0.7; allowed: LOW HIGH in degrees"));
   EXPECT_FALSE(fs::exists(folder_ / "d.panonav"));
+  write_text(data() / "dataset.toml",
+             "[images]\nkind = \"panorama\"\nelevation_deg = [-0.35, 0.35]\n[poses]\nfile = "
+             "\"poses.csv\"\n");
+  const auto radians_there = run_panonav({"memorise", data(), folder_ / "e.panonav"});
+  EXPECT_EQ(radians_there.exit_code, 0);
+  EXPECT_TRUE(contains(radians_there.err, "is -0.35 to 0.35 degrees; are these radians?"));
 }
 
 TEST_F(Memorise, AFolderWithoutDatasetTomlNeedsAKind) {

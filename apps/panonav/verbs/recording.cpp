@@ -37,6 +37,22 @@ void note_left_out(const Dataset& recording, Session& session) {
   if (!folders.empty()) session.note("left out, folders within: " + listed(folders));
 }
 
+/// Pictures are higher than this, but radians that stand for degrees look like it. A data set may
+/// be of single lines, as a route's is.
+constexpr double min_band_deg = 5.0;
+
+void note_low_band(const Dataset& recording, Session& session) {
+  const PictureLayout& layout = recording.source.layout;
+  const auto& band = layout.kept_elevations ? layout.kept_elevations : layout.elevations;
+  if (!band) return;
+  const double low = degrees(band->bottom_rad);
+  const double high = degrees(band->top_rad);
+  if (high - low >= min_band_deg) return;
+  session.note("hint: the elevation band of " + readable_line(recording.folder.string()) + " is " +
+               short_number(low) + " to " + short_number(high) +
+               " degrees; are these radians? elevation_deg is in degrees");
+}
+
 /// A picture twice as wide as high that is said to be a panorama shows the whole sphere in all
 /// likelihood; a panorama of square pixels that high would reach from pole to pole.
 void note_other_kind(const Dataset& recording, Session& session) {
@@ -83,9 +99,10 @@ std::optional<PictureSource> picture_source(const PictureArguments& pictures) {
   std::optional<ElevationBand> band;
   if (pictures.elevation_deg) {
     const auto [low, high] = *pictures.elevation_deg;
-    if (low < -90.0 || high > 90.0 || low >= high) {
+    if (low < -90.0 || high > 90.0 || high - low < min_band_deg) {
       throw UsageError("--elevation-deg is " + to_text(low) + " " + to_text(high) +
-                       "; allowed: -90 <= LOW < HIGH <= 90");
+                       "; allowed: LOW HIGH in degrees, -90 <= LOW < HIGH <= 90, 5 degrees apart "
+                       "or more");
     }
     band = ElevationBand{radians(low), radians(high)};
   }
@@ -145,6 +162,7 @@ Dataset open_recording(const std::string& input, const PictureArguments& picture
                        "--recursive");
     }
     Dataset recording = read_dataset(input);
+    note_low_band(recording, session);
     note_other_kind(recording, session);
     return recording;
   }

@@ -61,12 +61,15 @@ void limit_this_process() {
   setrlimit(RLIMIT_AS, &memory);
 }
 
+/// Reads a file whose textures the argument reads; empty: surfaces get plain colours.
+using ReadScene = std::function<Scene(const TextureReader&)>;
+
 /// The end of a process that read a scene: its exit code is 0, or it wrote an error's message.
-[[noreturn]] void read_and_exit(const std::function<Scene()>& read, int answer) {
+[[noreturn]] void read_and_exit(const ReadScene& read, int answer) {
   limit_this_process();
   std::string message;
   try {
-    (void)read();
+    (void)read({});
   } catch (const Error& error) {
     message = error.what();
   } catch (const std::exception& error) {
@@ -78,9 +81,9 @@ void limit_this_process() {
 
 /// The packaged readers of worlds and meshes crash on some damaged files and never end on others.
 /// Such a file ends a process of its own, and this one with a clear line. What can be read is read
-/// again here. Between fork and _exit only this thread runs in the child; those of the executor
-/// wait for work and hold no lock.
-Scene read_safely(const std::string& file, const std::function<Scene()>& read) {
+/// again here, with its textures. Between fork and _exit only this thread runs in the child; those
+/// of the executor wait for work and hold no lock.
+Scene read_safely(const std::string& file, const ReadScene& read) {
   std::array<int, 2> answer{-1, -1};
   if (pipe2(answer.data(), O_CLOEXEC) != 0) throw FileError(file, "cannot be read: no pipe left");
   const pid_t child = fork();
@@ -99,7 +102,9 @@ Scene read_safely(const std::string& file, const std::function<Scene()>& read) {
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
   if (!message.empty()) throw Error(message);
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return read();
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) {
+    return read([](const fs::path& path) { return read_image(path); });
+  }
   const int signal = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
   if (signal == SIGXCPU || signal == SIGALRM || signal == SIGKILL) {
     throw FileError(file, "takes more than " + std::to_string(scene_seconds) + " s to read");
@@ -128,13 +133,17 @@ Scene load_scene(const std::string& name, const SceneOptions& options, const Giv
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (ending == ".world" || ending == ".sdf") {
     GazeboOptions gazebo;
-    gazebo.textures.read = [](const fs::path& path) { return read_image(path); };
     gazebo.model_folders = gazebo_model_folders_of_environment();
-    scene = read_safely(name, [&] { return load_gazebo(name, gazebo); });
+    scene = read_safely(name, [&](const TextureReader& textures) {
+      gazebo.textures.read = textures;
+      return load_gazebo(name, gazebo);
+    });
   } else {
     MeshOptions mesh;
-    mesh.textures.read = [](const fs::path& path) { return read_image(path); };
-    scene = read_safely(name, [&] { return load_mesh(name, mesh); });
+    scene = read_safely(name, [&](const TextureReader& textures) {
+      mesh.textures.read = textures;
+      return load_mesh(name, mesh);
+    });
   }
   scale_light(scene, options.light);
   return scene;

@@ -16,6 +16,8 @@ template <class... Functions>
 struct Overloaded : Functions... {
   using Functions::operator()...;
 };
+template <class... Functions>
+Overloaded(Functions...) -> Overloaded<Functions...>;  // clang 14 does not find it
 
 /// How far beyond a border rounding may carry a value, relative to the image's size.
 constexpr double border_tolerance = 1e-9;

@@ -1,30 +1,16 @@
 #include "panonav/io/panorama_reader.hpp"
 
 #include <cmath>
-#include <numbers>
 #include <string>
 #include <utility>
 
 #include "panonav/core/error.hpp"
-#include "panonav/core/text.hpp"
-#include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/panorama/hidden_values.hpp"
 
 namespace panonav {
 
 namespace {
-
-void require_plausible(const std::optional<ElevationBand>& band) {
-  constexpr double min_height_rad = 5.0 * std::numbers::pi / 180.0;
-  constexpr double rounding_rad = 1e-9;
-  if (!band || band->top_rad - band->bottom_rad >= min_height_rad - rounding_rad) return;
-  throw ContractError("elevation band",
-                      short_number(degrees(band->bottom_rad)) + " to " +
-                          short_number(degrees(band->top_rad)) + " degrees",
-                      "5 degrees or more from bottom to top; radians in the place of degrees "
-                      "make it too small");
-}
 
 // Of a picture that is said to show the whole sphere.
 void require_whole_sphere(ImageSize size) {
@@ -40,8 +26,6 @@ void require_whole_sphere(ImageSize size) {
 
 PanoramaReader::PanoramaReader(PictureSource source, PanoramaShape shape)
     : source_(std::move(source)), shape_(shape) {
-  require_plausible(source_.layout.elevations);
-  require_plausible(source_.layout.kept_elevations);
   if (source_.kind != PictureKind::mirror) return;
   require(source_.camera.has_value(), "camera of mirror pictures", 0.0, "one camera");
   UnwarperOptions options;

@@ -17,8 +17,7 @@ namespace panonav {
 class PanoramaReader {
  public:
   /// `shape`: rows or columns 0 keep the pictures' own (80 x 512 for mirror pictures). Throws
-  /// ContractError on a source that is not valid, and on an elevation band of less than 5 degrees:
-  /// no panorama is that low, but radians that stand for degrees look like it.
+  /// ContractError on a source that is not valid.
   PanoramaReader(PictureSource source, PanoramaShape shape);
 
   [[nodiscard]] const PictureSource& source() const noexcept { return source_; }
