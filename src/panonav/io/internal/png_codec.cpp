@@ -91,8 +91,23 @@ bool pixel_steps(Reader& reader, png_bytepp rows) {
   throw FileError(name, std::string("damaged PNG: ") + reader.message);
 }
 
+// libpng takes the memory of some chunks before it reads them, up to 2 GB whatever its limits are.
+bool holds_its_chunks(std::span<const std::uint8_t> bytes) {
+  constexpr std::size_t around = 12;  // length, name and checksum
+  std::size_t at = 8;
+  while (at + around <= bytes.size()) {
+    std::size_t length = 0;
+    for (std::size_t i = 0; i < 4; ++i) length = length << 8U | bytes[at + i];
+    if (length > bytes.size() - at - around) return false;
+    if (std::memcmp(&bytes[at + 4], "IEND", 4) == 0) return true;
+    at += around + length;
+  }
+  return false;
+}
+
 ImageSize open(Reader& reader, std::span<const std::uint8_t> bytes, std::string_view name,
                const ImageLimits& limits) {
+  if (!holds_its_chunks(bytes)) throw FileError(name, "damaged PNG: the file ends too early");
   reader.next = bytes.data();
   reader.left = bytes.size();
   reader.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &reader, on_read_error, on_warning);
