@@ -399,9 +399,9 @@ void write_plot(const std::filesystem::path& path, const MapPlot& plot) {
   Bounds bounds;
   bounds.include(plot);
   draw(path, map_size(bounds, 800),
-       "set xlabel \"x [m]\"\nset ylabel \"y [m]\"\n"
-       "set offsets graph 0.03, graph 0.03, graph 0.03, graph 0.03\n" +
-           map_text(plot, "m"));
+       "set xlabel " + gnuplot_text("x [" + plot.unit + "]") + "\nset ylabel " +
+           gnuplot_text("y [" + plot.unit + "]") +
+           "\nset offsets graph 0.03, graph 0.03, graph 0.03, graph 0.03\n" + map_text(plot, "m"));
 }
 
 void write_plot(const std::filesystem::path& path, const std::vector<MapPlot>& panels,
@@ -418,8 +418,7 @@ void write_plot(const std::filesystem::path& path, const std::vector<MapPlot>& p
   size.width *= panel_columns;
   size.height *= panel_rows;
   std::string body = "set multiplot layout " + std::to_string(panel_rows) + "," +
-                     std::to_string(panel_columns) +
-                     "\nset xlabel \"x [m]\"\nset ylabel \"y [m]\"\n";
+                     std::to_string(panel_columns) + "\nset xlabel 'x [m]'\nset ylabel 'y [m]'\n";
   if (!bounds.empty()) {
     const double margin =
         0.03 * std::max(bounds.high.x_m - bounds.low.x_m, bounds.high.y_m - bounds.low.y_m);

@@ -72,6 +72,7 @@ struct MapLayer {
 struct MapPlot {
   std::string title;
   std::vector<MapLayer> layers;  ///< drawn in this order
+  std::string unit = "m";        ///< of both axes; panels beside each other are in metres
 };
 
 /// Writes a PNG (or, for a path ending in .svg, an SVG) through the external program gnuplot; the

@@ -114,6 +114,23 @@ TEST_F(Map, TheLibraryMakesTheSameMapOnePictureAtATime) {
   EXPECT_THROW(mapper.add(Image(97, 12)), ContractError) << "another size than the memory's";
 }
 
+TEST_F(Map, SaysWhatItWroteAndWhatAPictureShows) {
+  const auto result = run_panonav({"map", folder_ / "run", memory(), "--tum", folder_ / "m.tum",
+                                   "--picture", folder_ / "m.svg"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_TRUE(contains(result.out, memory() + " holds the map"));
+  EXPECT_TRUE(contains(result.out, std::string(folder_ / "m.tum") + " holds the poses"));
+  EXPECT_TRUE(contains(result.out, std::string(folder_ / "m.svg") + " shows the"));
+}
+
+TEST_F(Map, AHeightOfTheCameraThatHasNoEffectIsRefused) {
+  write_file(folder_ / "run" / "dataset.toml", std::string_view("[images]\nkind = \"panorama\"\n"
+                                                                "[poses]\nfile = \"poses.csv\"\n"));
+  const auto line = refusal({"map", folder_ / "run", memory(), "--camera-height-m", "0.5"});
+  EXPECT_TRUE(contains(line, "elevations")) << line;
+  EXPECT_FALSE(fs::exists(memory()));
+}
+
 TEST_F(Map, WrongUseIsRefused) {
   EXPECT_TRUE(contains(refusal({"map", folder_ / "run", memory(), "--scale-m", "0"}), "scale_m"));
   EXPECT_FALSE(fs::exists(memory()));
@@ -138,6 +155,8 @@ TEST(MapOfADrive, TheHeightOfTheCameraTellsMetres) {
   };
   // Narrow rooms: what stands on the ground makes lengths up to 15 % too long.
   EXPECT_NEAR(scale_with(folder / "ground.panonav", {"--camera-height-m", "0.6"}), 1.0, 0.2);
+  EXPECT_TRUE(contains(refusal({"map", run, folder / "wheels.panonav", "--camera-height-m", "0.6"}),
+                       "odometry"));
   EXPECT_LT(scale_with(folder / "guess.panonav", {}), 0.7) << "guard: the guess is wrong";
 }
 

@@ -67,6 +67,16 @@ TEST_F(Plot, ShowsTextOfAnyKindAsItIs) {
             (std::vector<std::string>{"heat.svg", "line.png", "line.svg", "map.svg", "maps.svg"}));
 }
 
+TEST_F(Plot, TheAxesOfAMapSayTheirUnit) {
+  MapPlot map{.layers = {{.lines = {{{0.0, 0.0}, {1.0, 2.0}}}}}};
+  write_plot("metres.svg", map);
+  map.unit = "cells";
+  write_plot("cells.svg", map);
+  EXPECT_TRUE(contains(bytes_of("metres.svg"), "x [m]"));
+  EXPECT_TRUE(contains(bytes_of("cells.svg"), "y [cells]"));
+  EXPECT_FALSE(contains(bytes_of("cells.svg"), "[m]"));
+}
+
 TEST_F(Plot, WritesToAPathOfAnyName) {
   const LinePlot plot{.title = "t", .series = {{.x = {1.0, 2.0}, .y = {1.0, 3.0}}}};
   std::vector<std::string> names{"\"; system 'touch run'.svg",

@@ -91,8 +91,9 @@ void write_lattice_picture(const std::filesystem::path& path, const Lattice& lat
     const auto& pose = memory.info(node.view).pose;
     if (pose) truth.back() = pose->position();
   }
-  const MapPlot map = plot_of("as the views arrange themselves", lattice, arranged);
+  MapPlot map = plot_of("as the views arrange themselves", lattice, arranged);
   if (!comparable) {
+    if (!lattice.metric) map.unit = "median distance to the nearest view";
     write_plot(path, map);
     return;
   }

@@ -140,9 +140,9 @@ void print_result(const Lattice& lattice, const VisualMemory& memory, Session& s
     for (const auto& component : lattice.components) {
       sizes += (sizes.empty() ? "" : ", ") + std::to_string(component.views);
     }
-    session.print(
-        session.bad("The map is in " + std::to_string(lattice.components.size()) + " components") +
-        " that nothing connects, of so many views: " + sizes);
+    session.print(session.bad("The map has " + std::to_string(lattice.components.size()) +
+                              " connected components") +
+                  ", with these numbers of views: " + sizes + ".");
   }
   if (!lattice.components.front().handedness_known) {
     session.print("It may as well be the mirror image: nothing tells left from right.");
@@ -186,6 +186,13 @@ ExitCode arrange_views(const ArrangeArguments& wanted, Session& session) {
     session.print(as_json(wanted, lattice, memory).dump());
   } else {
     print_result(lattice, memory, session);
+#ifdef PANONAV_COMMAND_SIMULATES
+    if (wanted.picture && lattice.components.size() > 1) {
+      session.print(*wanted.picture + " shows the largest connected component of the map, " +
+                    std::to_string(lattice.components.front().views) + " of " +
+                    std::to_string(lattice.nodes.size()) + " views.");
+    }
+#endif
   }
   return ExitCode::done;
 }

@@ -133,8 +133,12 @@ void print_result(const MapArguments& wanted, const Dataset& recording, const Ma
   if (sizes.size() > 1) {
     std::string text;
     for (const std::size_t size : sizes) text += (text.empty() ? "" : ", ") + std::to_string(size);
-    session.print(session.bad("The map is in " + std::to_string(sizes.size()) + " components") +
-                  " that nothing connects, of so many places: " + text);
+    session.print(
+        session.bad("The map has " + std::to_string(sizes.size()) + " connected components") +
+        ", with these numbers of places: " + text + ".");
+    session.print(
+        "Pictures taken closer together, odometry in the recording, or another drive through the "
+        "same places connect them.");
   }
   const double height_m = wanted.mapper.odometry.camera_height_m;
   if (!run.wheels && height_m > 0.0) {
@@ -146,7 +150,20 @@ void print_result(const MapArguments& wanted, const Dataset& recording, const Ma
   }
 #ifdef PANONAV_COMMAND_SIMULATES
   if (comparison) print_comparison(*comparison, run, session);
+  if (wanted.picture) {
+    session.print(*wanted.picture + " shows " +
+                  (sizes.size() > 1 ? "the largest connected component of the map, " +
+                                          std::to_string(std::ranges::max(sizes)) + " of " +
+                                          std::to_string(nodes) + " places"
+                                    : "the map"));
+  }
 #endif
+  session.print(wanted.memory + " holds the map and the views of its places.");
+  if (wanted.tum) {
+    session.print(*wanted.tum + " holds the poses" +
+                  (sizes.size() > 1 ? " of the largest connected component." : "."));
+  }
+  if (wanted.graph) session.print(*wanted.graph + " holds the map as a graph.");
 }
 
 MappedRun map_recording(const Dataset& recording, Mapper& mapper, Session& session) {
@@ -159,6 +176,27 @@ MappedRun map_recording(const Dataset& recording, Mapper& mapper, Session& sessi
         mapper.add(std::move(seen));
       });
   return mapper.finish();
+}
+
+/// Refuses a height of the camera where lengths cannot be read from the ground.
+void require_ground(const Arguments& arguments, const MapArguments& wanted,
+                    const Dataset& recording, const MemoryHeader& header) {
+  if (!arguments.given("visual_odometry", "camera_height_m")) return;
+  if (!header.elevations) {
+    throw FileError(wanted.dataset,
+                    "does not tell the elevations of its pictures' rows, without which the ground "
+                    "is not found; allowed with --camera-height-m: panoramas with elevation_deg, "
+                    "equirectangular pictures, and mirror pictures with a camera");
+  }
+  const bool wheels = wanted.mapper.mapping.wheel_lengths &&
+                      std::ranges::all_of(recording.entries, [](const DatasetEntry& entry) {
+                        return entry.odometry.has_value();
+                      });
+  if (wheels) {
+    throw FileError(wanted.dataset,
+                    "has odometry, which tells the lengths of all steps; allowed with "
+                    "--camera-height-m: recordings without it, or --wheel-lengths false");
+  }
 }
 
 ExitCode map(const Arguments& arguments, const MapArguments& wanted, Session& session) {
@@ -174,9 +212,12 @@ ExitCode map(const Arguments& arguments, const MapArguments& wanted, Session& se
                       "is there already and keeps its shape of signatures; leave "
                       "these options out or start a new memory");
     }
+    require_ground(arguments, wanted, recording, memory->header());
   } else {
-    memory = MemoryFile::create(wanted.memory, header_from_first_views(recording, wanted.signature,
-                                                                       {}, session.executor()));
+    const MemoryHeader header =
+        header_from_first_views(recording, wanted.signature, {}, session.executor());
+    require_ground(arguments, wanted, recording, header);
+    memory = MemoryFile::create(wanted.memory, header);
   }
   MapperOptions options = wanted.mapper;
   options.thumbnails = !wanted.no_thumbnails;

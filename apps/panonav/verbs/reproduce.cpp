@@ -37,7 +37,8 @@ ExitCode reproduce(const ReproduceArguments& wanted, Session& session) {
     throw OptionError("PAPER is '" + wanted.paper + "'; allowed: " + allowed + "all");
   }
   refuse_meaningless(*paper, wanted);
-  const Reproduction result = reproduce_paper(*paper, wanted, wanted.out, session);
+  const std::string out = wanted.out.value_or("reproduction/" + wanted.paper);
+  const Reproduction result = reproduce_paper(*paper, wanted, out, session);
   if (session.json()) {
     const std::string json = to_json(result.rows);
     session.print(json.substr(0, json.size() - 1));
@@ -48,14 +49,15 @@ ExitCode reproduce(const ReproduceArguments& wanted, Session& session) {
   session.print(std::to_string(result.rows.size()) + " rows, " +
                 std::to_string(count.judged - count.held) +
                 " of them miss their target; pictures and tables: " +
-                (std::filesystem::path(wanted.out) / "index.html").string());
+                (std::filesystem::path(out) / "index.html").string());
   return ExitCode::done;
 }
 
 Run declare(Arguments& arguments) {
   auto wanted = std::make_shared<ReproduceArguments>();
   arguments.positional("PAPER", wanted->paper, "f11, m03, m04, navigation, s06, y03 or all");
-  arguments.option("-o,--out", wanted->out, "Folder for the report (default: reproduction)");
+  arguments.option("-o,--out", wanted->out,
+                   "Folder for the report (default: reproduction/PAPER; all: reproduction)");
   arguments.flag("--quick", wanted->quick, "A smoke run: few scenes, few questions or runs");
   arguments.flag("--continue", wanted->continues,
                  "all: go on with a run of the same options that was stopped; papers that it "

@@ -118,7 +118,7 @@ Reproduction reproduce_paper(const ReproducedPaper& paper, const ReproduceArgume
 ExitCode reproduce_all(const ReproduceArguments& wanted, Session& session) {
   if (wanted.only) throw OptionError("--only has no meaning for all");
   check_scenes(wanted);  // before anything of an earlier run is removed
-  const fs::path out(wanted.out);
+  const fs::path out(wanted.out.value_or("reproduction"));
   const ordered_json record = run_record(wanted);
   if (wanted.continues) {
     require_same_run(out, record);

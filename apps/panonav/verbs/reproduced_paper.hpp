@@ -15,7 +15,7 @@ namespace panonav::command {
 /// What the caller of `reproduce` wants; what is not given is as the paper has it.
 struct ReproduceArguments {
   std::string paper;
-  std::string out = "reproduction";
+  std::optional<std::string> out;  ///< empty: reproduction/PAPER, `reproduction` for all
   bool quick = false;
   bool continues = false;
   std::optional<std::uint64_t> seed;
