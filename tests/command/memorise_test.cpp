@@ -1,8 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "support/command_runner.hpp"
 #include "support/landmark_pictures.hpp"
@@ -392,6 +394,126 @@ TEST_F(Memorise, InfoCountsTheChainsOfAnOlderVersion) {
   EXPECT_EQ(views_in(memory()), 16);
   EXPECT_NE(run_panonav({"info", memory()}).out.find("does not use them"), std::string::npos);
   run_well({"verify", memory()});
+}
+
+TEST_F(Memorise, WhatWasForgottenComesBackWithUndo) {
+  run_well({"memorise", data(), memory()});
+  EXPECT_TRUE(contains(refusal({"undo", memory()}), "has nothing to undo"));
+  const auto shown =
+      answer_of({"forget", memory(), view_name(2), view_name(3), "--dry-run", "--json"});
+  EXPECT_EQ(shown["forgotten"], 2);
+  EXPECT_EQ(shown["views"], 14);
+  EXPECT_EQ(views_in(memory()), 16) << "--dry-run must forget nothing";
+  const auto before = run_panonav({"localise", memory(), data(), "--json"});
+  run_well({"forget", memory(), view_name(2), view_name(3)});
+  EXPECT_EQ(views_in(memory()), 14);
+  EXPECT_EQ(answer_of({"undo", memory(), "--dry-run", "--json"})["views"], 14);
+  const auto undone = answer_of({"undo", memory(), "--json"});
+  EXPECT_EQ(undone["views"], 16);
+  EXPECT_EQ(undone["undone"], "forget: 2 views dropped");
+  EXPECT_EQ(run_panonav({"localise", memory(), data(), "--json"}).out, before.out);
+  EXPECT_TRUE(contains(refusal({"undo", memory()}), "has nothing to undo"));
+  run_well({"verify", memory()});
+
+  const auto dry = answer_of({"prune", memory(), "--max-difference", "0.5", "--dry-run", "--json"});
+  const auto pruned = answer_of({"prune", memory(), "--max-difference", "0.5", "--json"});
+  EXPECT_EQ(pruned["dropped"], dry["dropped"]);
+  ASSERT_GT(pruned["dropped"].size(), 0U);
+  EXPECT_EQ(views_in(memory()), 16 - static_cast<int>(pruned["dropped"].size()));
+  run_well({"undo", memory()});
+  EXPECT_EQ(run_panonav({"localise", memory(), data(), "--json"}).out, before.out);
+}
+
+// Without room for a part of it, `prune` changes nothing.
+TEST_F(Memorise, PruneIsAllOrNothing) {
+  run_well({"memorise", data(), memory()});
+  run_well({"arrange", memory()});
+  const std::string whole = bytes_of(memory());
+  const auto links = info_of(memory())["links"];
+  ASSERT_GT(links, 0);
+  int refused = 0;
+  for (std::uint64_t more = 0; more < 400000; more += 12000) {
+    write_text(memory(), whole);
+    const auto result = run_panonav({"prune", memory(), "--max-difference", "0.5"},
+                                    {.file_size_limit_bytes = 8192 + more, .kill_after_ms = {}});
+    if (result.exit_code == 0) break;
+    ++refused;
+    EXPECT_EQ(lines(result.err).size(), 1U) << result.err;
+    EXPECT_EQ(views_in(memory()), 16);
+    EXPECT_EQ(info_of(memory())["links"], links);
+  }
+  EXPECT_GT(refused, 2);
+  EXPECT_LT(views_in(memory()), 16);
+}
+
+TEST_F(Memorise, AMemoryThatIsTakenAwayIsNoticed) {
+  write_dataset(data(), world_, grid_poses(18));
+  for (const bool replaced : {false, true}) {
+    run_well({"memorise", data() / view_name(0), folder_ / "other.panonav", "--kind", "panorama"});
+    std::thread thief([&] {
+      std::error_code missing;  // until the first views are there
+      while (fs::file_size(memory() + "-wal", missing) + 1 < 20000) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+      if (replaced) {
+        fs::rename(folder_ / "other.panonav", memory());
+      } else {
+        fs::remove(memory());
+      }
+    });
+    const auto line = refusal({"memorise", data(), memory()});
+    thief.join();
+    EXPECT_TRUE(
+        contains(line, "m.panonav: was deleted, moved or replaced while it was being written"));
+    for (const char* suffix : {"", "-wal", "-shm"}) fs::remove(memory() + suffix);
+  }
+}
+
+// What the system does not take is said in a line, and what is no UTF-8 is shown as far as it is.
+TEST_F(Memorise, NamesThatAreTooLongOrNotUtf8) {
+  const std::string long_name(300, 'n');
+  for (const auto& arguments : std::vector<std::vector<std::string>>{
+           {"memorise", data(), folder_ / (long_name + ".panonav")},
+           {"memorise", folder_ / long_name, memory()},
+           {"map", data(), folder_ / long_name},
+           {"route", "record", data(), folder_ / long_name},
+           {"info", folder_ / long_name},
+           {"forget", folder_ / long_name, view_name(1)}}) {
+    const auto line = refusal(arguments);
+    EXPECT_TRUE(contains(line, long_name)) << arguments.front();
+    EXPECT_EQ(line.find("fault of the program"), std::string::npos);
+  }
+  fs::remove(data() / "dataset.toml");
+  fs::remove(data() / "poses.csv");
+  const std::string latin = "caf\xE9.png";
+  const std::string control = "a\x1B[2J\nb.png";
+  fs::rename(data() / view_name(1), data() / latin);
+  fs::rename(data() / view_name(2), data() / control);
+  const std::vector<std::string> kind{"--kind", "panorama"};
+  run_well(with({"memorise", data(), memory()}, kind));
+  EXPECT_EQ(views_in(memory()), 16);
+  const auto found = answers_of({"localise", memory(), data() / latin, "--json"});
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0]["matches"][0]["file"], "caf\xEF\xBF\xBD.png");
+  const auto text = run_panonav({"localise", memory(), data()});
+  EXPECT_EQ(text.exit_code, 0);
+  EXPECT_EQ(text.out.find('\x1B'), std::string::npos);
+  EXPECT_EQ(text.out.find('\xE9'), std::string::npos);
+  EXPECT_TRUE(contains(text.out, "caf\xEF\xBF\xBD.png"));
+  for (const auto& arguments : std::vector<std::vector<std::string>>{
+           {"arrange", memory(), "--json", "--graphml", folder_ / "g.graphml"},
+           {"prune", memory(), "--dry-run", "--max-difference", "0.5", "--json"},
+           {"verify", memory(), "--json"},
+           {"info", memory(), "--json"},
+           {"forget", memory(), latin, control, "--json"},
+           {"undo", memory(), "--json"}}) {
+    SCOPED_TRACE(arguments.front());
+    EXPECT_TRUE(answer_of(arguments).is_object());
+  }
+  const auto refused = refusal({"forget", memory(), "\xFF\xFE"});
+  EXPECT_EQ(refused.find('\xFF'), std::string::npos);
+  const std::string odd_memory = folder_ / "m\xE9moire.panonav";
+  EXPECT_EQ(answer_of(with({"memorise", data(), odd_memory, "--json"}, kind))["views"], 16);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/io/atomic_file.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/trajectory_file.hpp"
@@ -97,6 +98,25 @@ class RouteVerbs : public ::testing::Test {
   TemporaryFolder folder_;
   ToyWorld room_ = pillared_room(3);
 };
+
+TEST_F(RouteVerbs, TheSameDriveGoesOnWhereItsRecordingStopped) {
+  const std::string whole = bytes_of(folder_ / "teach" / "poses.csv");
+  const json at_once = record({"--every-m", "0.05", "--name", "at once"});
+  // What an interrupted recording leaves: the first lines.
+  std::string first;
+  for (const auto& line : lines(whole)) {
+    if (first.size() < whole.size() / 2) first += line + "\n";
+  }
+  write_file(folder_ / "teach" / "poses.csv", std::string_view(first));
+  const json begun = record({"--every-m", "0.05"});
+  EXPECT_LT(begun["lines"], at_once["lines"]);
+  write_file(folder_ / "teach" / "poses.csv", std::string_view(whole));
+  const json ended = record({"--every-m", "0.05"});
+  EXPECT_EQ(ended["appended"].get<int>() + begun["lines"].get<int>(), at_once["lines"]);
+  EXPECT_EQ(ended["lines"], at_once["lines"]);
+  EXPECT_EQ(ended["length_m"], at_once["length_m"]);
+  EXPECT_EQ(record({"--every-m", "0.05"})["appended"], 0);
+}
 
 TEST_F(RouteVerbs, RecordsALineEveryTenCentimetresAndFollowsToTheCentimetre) {
   const json recorded = record();

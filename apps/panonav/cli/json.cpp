@@ -63,7 +63,7 @@ ordered_json with_former_keys(const ordered_json& value) {
 std::string with_former_keys(std::string_view line) {
   const auto value = ordered_json::parse(line);
   const auto renamed = with_former_keys(value);
-  return renamed == value ? std::string(line) : renamed.dump();
+  return renamed == value ? std::string(line) : json_line(renamed);
 }
 
 }  // namespace panonav::command

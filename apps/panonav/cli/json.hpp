@@ -26,6 +26,12 @@ template <class Value>
   return {{"x_m", pose.x_m}, {"y_m", pose.y_m}, {"heading_rad", pose.heading_rad}};
 }
 
+/// The document on one line. Bytes of names that are not UTF-8 become the replacement character
+/// U+FFFD.
+[[nodiscard]] inline std::string json_line(const ordered_json& document) {
+  return document.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
+}
+
 /// A line of JSON with the names of keys that the last version gave them (`--former-keys`).
 [[nodiscard]] std::string with_former_keys(std::string_view line);
 

@@ -1,4 +1,5 @@
 #include <csignal>
+#include <filesystem>
 #include <iostream>
 #include <new>
 #include <string>
@@ -7,17 +8,16 @@
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 
 namespace {
 
 using panonav::command::ExitCode;
 
 /// One line, whatever the message holds.
-void report(std::string_view verb, std::string message) {
-  for (char& c : message) {
-    if (c == '\n' || c == '\r') c = ' ';
-  }
-  std::cerr << "panonav" << (verb.empty() ? "" : " ") << verb << ": " << message << '\n';
+void report(std::string_view verb, std::string_view message) {
+  std::cerr << "panonav" << (verb.empty() ? "" : " ") << verb << ": "
+            << panonav::readable_line(message) << '\n';
 }
 
 ExitCode run(std::string_view& verb, int argc, char** argv) {
@@ -46,6 +46,10 @@ int main(int argc, char** argv) {
     return static_cast<int>(ExitCode::bad_input);
   } catch (const panonav::Error& error) {
     report(verb, error.what());
+    return static_cast<int>(ExitCode::bad_input);
+  } catch (const std::filesystem::filesystem_error& error) {
+    // A path that the system does not take, such as a name of 300 characters.
+    report(verb, error.path1().string() + ": cannot be used: " + error.code().message());
     return static_cast<int>(ExitCode::bad_input);
   } catch (const std::bad_alloc&) {
     report(verb, "not enough memory");

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <iomanip>
 #include <iostream>
@@ -22,6 +23,28 @@ bool wants_colours(int descriptor) {
          std::string_view(terminal) != "dumb";
 }
 
+// A name may hold anything, also what a terminal takes for a command. Lines and our own styles
+// stay.
+std::string readable(std::string_view text) {
+  constexpr std::array<std::string_view, 5> kept{"\n", "\033[0m", "\033[1m", "\033[31m",
+                                                 "\033[32m"};
+  std::string result;
+  while (!text.empty()) {
+    std::size_t end = text.size();
+    std::string_view next;
+    for (const std::string_view mark : kept) {
+      if (const auto at = text.find(mark); at < end) {
+        end = at;
+        next = mark;
+      }
+    }
+    result += readable_line(text.substr(0, end));
+    result += next;
+    text.remove_prefix(end + next.size());
+  }
+  return result;
+}
+
 }  // namespace
 
 Session::Session(bool json, int threads, bool former_keys)
@@ -35,8 +58,10 @@ Session::Session(bool json, int threads, bool former_keys)
 void Session::print(std::string_view line) {
   if (former_keys_) {
     std::cout << with_former_keys(line) << '\n';
-  } else {
+  } else if (json_) {
     std::cout << line << '\n';
+  } else {
+    std::cout << readable(line) << '\n';
   }
 }
 

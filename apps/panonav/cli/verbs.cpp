@@ -7,11 +7,11 @@ std::vector<Verb> all_verbs() {
 #ifdef PANONAV_COMMAND_SIMULATES
       demo_verb(),      simulate_verb(),
 #endif
-      calibrate_verb(), unwrap_verb(),    memorise_verb(),     info_verb(),         verify_verb(),
-      forget_verb(),    prune_verb(),     localise_verb(),     track_verb(),        map_verb(),
-      arrange_verb(),   home_verb(),      route_record_verb(), route_follow_verb(),
+      calibrate_verb(), unwrap_verb(),    memorise_verb(), info_verb(),         verify_verb(),
+      forget_verb(),    prune_verb(),     undo_verb(),     localise_verb(),     track_verb(),
+      map_verb(),       arrange_verb(),   home_verb(),     route_record_verb(), route_follow_verb(),
 #ifdef PANONAV_COMMAND_SIMULATES
-      navigate_verb(),  catchment_verb(), evaluate_verb(),     reproduce_verb(),
+      navigate_verb(),  catchment_verb(), evaluate_verb(), reproduce_verb(),
 #endif
   };
 }

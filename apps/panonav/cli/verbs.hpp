@@ -27,6 +27,7 @@ namespace panonav::command {
 [[nodiscard]] Verb route_record_verb();
 [[nodiscard]] Verb simulate_verb();
 [[nodiscard]] Verb track_verb();
+[[nodiscard]] Verb undo_verb();
 [[nodiscard]] Verb unwrap_verb();
 [[nodiscard]] Verb verify_verb();
 

@@ -403,7 +403,7 @@ ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
 
   done.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (session.json()) {
-    session.print(as_json(done, out).dump());
+    session.print(json_line(as_json(done, out)));
   } else {
     print(done, session);
     tell_report(out, session);

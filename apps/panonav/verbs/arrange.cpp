@@ -183,7 +183,7 @@ ExitCode arrange_views(const ArrangeArguments& wanted, Session& session) {
   if (wanted.picture) write_lattice_picture(*wanted.picture, lattice, memory);
 #endif
   if (session.json()) {
-    session.print(as_json(wanted, lattice, memory).dump());
+    session.print(json_line(as_json(wanted, lattice, memory)));
   } else {
     print_result(lattice, memory, session);
 #ifdef PANONAV_COMMAND_SIMULATES

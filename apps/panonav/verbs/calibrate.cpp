@@ -164,7 +164,7 @@ ExitCode calibrate(const Arguments& arguments, const CalibrateArguments& wanted,
   }
   write_camera(wanted.out, {camera, std::nullopt});
   if (session.json()) {
-    session.print(as_json(wanted, *mirror, camera).dump());
+    session.print(json_line(as_json(wanted, *mirror, camera)));
   } else {
     print_text(arguments, wanted, *mirror, camera, session);
   }

@@ -123,14 +123,13 @@ ExitCode look_ahead(const CatchmentArguments& wanted, const RecordedViews& views
   }
   const auto mean = circular_mean(directions);
   if (session.json()) {
-    session.print(ordered_json{
-        {"dataset", wanted.dataset},
-        {"ahead", ahead},
-        {"pairs", directions.size()},
-        {"direction_rad", mean ? ordered_json(mean->direction_rad) : ordered_json()},
-        {"resultant_length", mean ? mean->resultant_length : 0.0},
-        {"backward",
-         sideways}}.dump());
+    session.print(json_line(
+        ordered_json{{"dataset", wanted.dataset},
+                     {"ahead", ahead},
+                     {"pairs", directions.size()},
+                     {"direction_rad", mean ? ordered_json(mean->direction_rad) : ordered_json()},
+                     {"resultant_length", mean ? mean->resultant_length : 0.0},
+                     {"backward", sideways}}));
   } else if (mean) {
     const double degrees_left = degrees(mean->direction_rad);
     session.print("From each of " + std::to_string(directions.size()) + " views to the one " +
@@ -245,7 +244,7 @@ ExitCode catchment(const Arguments& arguments, const CatchmentArguments& wanted,
   }
   const auto result = survey_catchment(goals, places, settings, places_name, session);
   if (session.json()) {
-    session.print(as_json(wanted, goals, result).dump());
+    session.print(json_line(as_json(wanted, goals, result)));
   } else {
     print_text(wanted, result, session);
   }

@@ -198,7 +198,7 @@ ExitCode evaluate(const EvaluateArguments& wanted, Session& session) {
   if (session.json()) {
     ordered_json json = as_json(*error);
     json.update(as_json(figures));
-    session.print(json.dump());
+    session.print(json_line(json));
     return ExitCode::done;
   }
   session.print(std::to_string(error->pairs) + " poses compared, " +

@@ -94,7 +94,7 @@ ExitCode answer_all(const HomeArguments& wanted, const HomingGuide& guide, const
       [&](std::size_t, HomeAnswer&& answer) {
         progress.clear();
         pointing += points_home(answer.vector) ? 1 : 0;
-        session.print(session.json() ? as_json(goal.name, answer).dump()
+        session.print(session.json() ? json_line(as_json(goal.name, answer))
                                      : as_text(answer, session));
         answers.push_back(std::move(answer));
         progress.advance();

@@ -82,7 +82,7 @@ ExitCode show(const std::string& path, Session& session) {
   const auto memory = MemoryFile::open(path, Access::read_only);
   const auto info = memory.info();
   if (session.json()) {
-    session.print(as_json(memory, info).dump());
+    session.print(json_line(as_json(memory, info)));
     return ExitCode::done;
   }
   const auto& header = memory.header();

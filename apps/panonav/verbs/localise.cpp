@@ -1,8 +1,8 @@
 #include <cmath>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "cli/json.hpp"
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
@@ -15,8 +15,6 @@
 namespace panonav::command {
 
 namespace {
-
-using nlohmann::ordered_json;
 
 struct LocaliseArguments {
   std::string memory;
@@ -157,7 +155,7 @@ ExitCode localise(const Arguments& arguments, const LocaliseArguments& wanted, S
     progress.clear();
     for (const auto& given : answers) {
       known += given->place.known ? 1 : 0;
-      session.print(session.json() ? as_json(*given, wanted.areas).dump()
+      session.print(session.json() ? json_line(as_json(*given, wanted.areas))
                                    : as_text(*given, session));
     }
     progress.advance(count);

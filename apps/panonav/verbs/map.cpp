@@ -123,7 +123,7 @@ void print_result(const MapArguments& wanted, const Dataset& recording, const Ma
 #ifdef PANONAV_COMMAND_SIMULATES
     if (comparison) json["ground_truth"] = as_json(*comparison);
 #endif
-    session.print(json.dump());
+    session.print(json_line(json));
     return;
   }
   session.print(session.strong(std::to_string(nodes)) + " places from " +

@@ -1,9 +1,9 @@
 #include <exception>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <vector>
 
+#include "cli/json.hpp"
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
@@ -131,17 +131,16 @@ ExitCode memorise(const Arguments& arguments, const MemoriseArguments& wanted, S
   const MemoryFile* const memory = memoriser.file();
   const auto info = memory->info();
   if (session.json()) {
-    auto skipped_json = nlohmann::ordered_json::array();
+    auto skipped_json = ordered_json::array();
     for (const Skipped& one : skipped) {
-      skipped_json.push_back({{"file", readable_line(one.file)}, {"why", readable_line(one.why)}});
+      skipped_json.push_back({{"file", one.file}, {"why", one.why}});
     }
-    session.print(nlohmann::ordered_json{{"memory", wanted.memory},
+    session.print(json_line(ordered_json{{"memory", wanted.memory},
                                          {"appended", counts.appended},
                                          {"known_before", known_before},
                                          {"skipped", std::move(skipped_json)},
                                          {"views", info.views},
-                                         {"file_bytes", info.file_bytes}}
-                      .dump());
+                                         {"file_bytes", info.file_bytes}}));
     return ExitCode::done;
   }
   session.print(

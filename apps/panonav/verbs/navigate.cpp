@@ -239,7 +239,7 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
       run_mission(place, remembered, robot.navigator(), mission, wanted.mission, seed,
                   [&](const NavigationDecision& decision, const Pose2& pose) {
                     if (session.json()) {
-                      session.print(as_json(decision, pose, robot).dump());
+                      session.print(json_line(as_json(decision, pose, robot)));
                     } else if (!decision.events.empty()) {
                       session.print(as_text(decision, robot));
                     }
@@ -252,7 +252,7 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
         remembered, wanted.mission.planner, robot.goal(), run);
   }
   if (session.json()) {
-    session.print(summary_json(wanted, robot, goal_file, mission.start, run).dump());
+    session.print(json_line(summary_json(wanted, robot, goal_file, mission.start, run)));
   } else {
     print_summary(run, session);
   }

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <map>
 #include <memory>
 
@@ -28,6 +29,14 @@ ordered_json as_json(const std::optional<SparseLoss::Positions>& positions) {
           {"p95_after_m", positions->p95_after_m}};
 }
 
+/// What was selected must still be what is there.
+void require_unchanged(const MemoryFile& file, const VisualMemory& memory) {
+  const auto views = memory.views();
+  if (!std::ranges::equal(file.views(), views) || file.links().size() != memory.links().size()) {
+    throw FileError(file.path().string(), "was changed by another program meanwhile; try again");
+  }
+}
+
 ExitCode prune(const PruneArguments& wanted, Session& session) {
   auto file =
       MemoryFile::open(wanted.memory, wanted.dry_run ? Access::read_only : Access::read_write);
@@ -35,42 +44,52 @@ ExitCode prune(const PruneArguments& wanted, Session& session) {
   const SparseSelection selection = select_references(memory, wanted.options);
   const SparseLoss loss = measure_loss(memory, selection);
   std::vector<ViewId> dropped;
+  std::vector<std::string> names;
   std::size_t outdated = 0;
   for (const RedundantView& redundant : selection.redundant) {
     dropped.push_back(redundant.view);
+    names.push_back(memory.info(redundant.view).name);
     outdated += redundant.outdated ? 1 : 0;
   }
   if (!wanted.dry_run && !dropped.empty()) {
-    std::map<std::string, TopologicalMap> maps;
-    for (const std::string& name : file.map_names()) {
-      if (const auto map = file.map(name)) maps.emplace(name, contract_map(*map, selection));
-    }
-    forget_recordings(file);
-    file.remove(dropped);
-    file.link(contract_links(memory.links(), selection));
-    for (const auto& [name, map] : maps) file.save_map(name, map);
-    keep_models(file);
+    file.change(
+        [&] {
+          require_unchanged(file, memory);
+          std::map<std::string, TopologicalMap> maps;
+          for (const std::string& name : file.map_names()) {
+            if (const auto map = file.map(name)) maps.emplace(name, contract_map(*map, selection));
+          }
+          forget_recordings(file);
+          file.remove(dropped);
+          file.link(contract_links(memory.links(), selection));
+          for (const auto& [name, map] : maps) file.save_map(name, map);
+          keep_models(file);
+        },
+        "prune: " + std::to_string(dropped.size()) + " views dropped");
   }
   const double factor = selection.kept.empty() ? 1.0
                                                : static_cast<double>(memory.size()) /
                                                      static_cast<double>(selection.kept.size());
   if (session.json()) {
-    session.print(ordered_json{{"memory", wanted.memory},
-                               {"dry_run", wanted.dry_run},
-                               {"views_before", memory.size()},
-                               {"views", selection.kept.size()},
-                               {"outdated", outdated},
-                               {"factor", factor},
-                               {"median_difference", loss.median_difference},
-                               {"asked", loss.asked},
-                               {"position_error", as_json(loss.positions)}}
-                      .dump());
+    session.print(json_line(ordered_json{{"memory", wanted.memory},
+                                         {"dry_run", wanted.dry_run},
+                                         {"views_before", memory.size()},
+                                         {"views", selection.kept.size()},
+                                         {"dropped", names},
+                                         {"outdated", outdated},
+                                         {"factor", factor},
+                                         {"median_difference", loss.median_difference},
+                                         {"asked", loss.asked},
+                                         {"position_error", as_json(loss.positions)}}));
     return ExitCode::done;
   }
   session.print(std::string(wanted.dry_run ? "would keep " : "kept ") +
                 session.strong(std::to_string(selection.kept.size())) + " of " +
                 std::to_string(memory.size()) + " views: " + fixed(factor, 1) + " times fewer" +
                 (outdated > 0 ? "; " + std::to_string(outdated) + " were outdated" : ""));
+  if (wanted.dry_run) {
+    for (const std::string& name : names) session.print("  would drop  " + name);
+  }
   if (loss.positions) {
     session.print("nearest reference of a dropped view  median " +
                   fixed(loss.positions->median_after_m, 3) + " m (before " +
@@ -80,6 +99,9 @@ ExitCode prune(const PruneArguments& wanted, Session& session) {
   } else if (loss.asked > 0) {
     session.print("dropped views differ from those that stand for them by " +
                   fixed(loss.median_difference, 3) + " (median)");
+  }
+  if (!wanted.dry_run && !dropped.empty()) {
+    session.print("To bring them back: panonav undo " + wanted.memory);
   }
   return ExitCode::done;
 }
@@ -99,7 +121,9 @@ Verb prune_verb() {
           "A view is dropped when a newer one that is kept differs from it by no more than\n"
           "--max-difference and was taken near it. Says by how much the memory shrinks and how "
           "far the\n"
-          "reference that is found for a dropped view is from it, before and after.",
+          "reference that is found for a dropped view is from it, before and after. panonav undo "
+          "brings\n"
+          "dropped views back.",
           "  panonav prune office.panonav --dry-run\n"
           "  panonav prune office.panonav --max-difference 0.02\n"
           "  panonav prune office.panonav --outdated-within-m 0.3",

@@ -150,7 +150,8 @@ ExitCode follow_run(const FollowArguments& wanted, Session& session) {
   Progress progress("following", (run.entries.size() - 1) / wanted.every + 1);
   follow(follower, run, truth, wanted.every, session.executor(), [&](FollowedImage&& image) {
     progress.clear();
-    session.print(session.json() ? as_json(image, headings_known).dump() : as_text(image, session));
+    session.print(session.json() ? json_line(as_json(image, headings_known))
+                                 : as_text(image, session));
     images.push_back(std::move(image));
     progress.advance();
   });

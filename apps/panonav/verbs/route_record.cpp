@@ -95,7 +95,11 @@ std::vector<Pose2> recorded_poses(const RecordArguments& wanted, const Dataset& 
 RecordedRoute record_lines(const RecordArguments& wanted, const Dataset& dataset,
                            const std::vector<Pose2>& poses, bool from_odometry,
                            RouteRecorder& recorder, Session& session) {
-  const auto chosen = chosen_entries(poses, wanted.every, wanted.every_m.value_or(0.1));
+  auto chosen = chosen_entries(poses, wanted.every, wanted.every_m.value_or(0.1));
+  std::vector<Pose2> drive;
+  for (const std::size_t entry : chosen) drive.push_back(poses[entry]);
+  const std::size_t recorded = recorder.skip_recorded(drive);
+  chosen.erase(chosen.begin(), chosen.begin() + static_cast<std::ptrdiff_t>(recorded));
   Progress progress("recording", chosen.size());
   make_in_order(
       chosen.size(), session.executor(),
@@ -138,16 +142,15 @@ ExitCode record(const Arguments& arguments, const RecordArguments& wanted, Sessi
   if (wanted.report) write_record_report(*wanted.report, wanted.name, recorded.route, bytes_per_km);
 #endif
   if (session.json()) {
-    session.print(ordered_json{{"memory", wanted.memory},
-                               {"route", wanted.name},
-                               {"appended", recorded.appended},
-                               {"lines", recorded.route.size()},
-                               {"columns", recorded.route.columns()},
-                               {"length_m", length_m},
-                               {"bytes", recorded.bytes},
-                               {"bytes_per_km", bytes_per_km},
-                               {"file_bytes", recorder.memory().info().file_bytes}}
-                      .dump());
+    session.print(json_line(ordered_json{{"memory", wanted.memory},
+                                         {"route", wanted.name},
+                                         {"appended", recorded.appended},
+                                         {"lines", recorded.route.size()},
+                                         {"columns", recorded.route.columns()},
+                                         {"length_m", length_m},
+                                         {"bytes", recorded.bytes},
+                                         {"bytes_per_km", bytes_per_km},
+                                         {"file_bytes", recorder.memory().info().file_bytes}}));
     return ExitCode::done;
   }
   session.print(session.strong(std::to_string(recorded.appended)) + " lines recorded; route '" +
@@ -191,16 +194,18 @@ Run declare(Arguments& arguments) {
 }  // namespace
 
 Verb route_record_verb() {
-  return {"route record", "Remember a route as one line of pixels a step",
-          "What the camera sees at its own height, a byte a degree, from every place of the way: a "
-          "few\n"
-          "megabytes a kilometre. Lines are on the disk batch by batch; a drive that goes on where "
-          "the\n"
-          "route ends makes it longer.",
-          "  panonav route record teach_run office.panonav\n"
-          "  panonav route record teach_run office.panonav --name corridor --odometry --report "
-          "corridor",
-          declare};
+  return {
+      "route record", "Remember a route as one line of pixels a step",
+      "What the camera sees at its own height, a byte a degree, from every place of the way: a "
+      "few\n"
+      "megabytes a kilometre. Lines are on the disk batch by batch; after an interruption the "
+      "same\n"
+      "command goes on where it stopped, and a drive that goes on where the route ends makes it "
+      "longer.",
+      "  panonav route record teach_run office.panonav\n"
+      "  panonav route record teach_run office.panonav --name corridor --odometry --report "
+      "corridor",
+      declare};
 }
 
 }  // namespace panonav::command

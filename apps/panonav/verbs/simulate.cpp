@@ -108,11 +108,10 @@ ExitCode simulate(const Arguments& arguments, SimulateArguments wanted, Session&
                                       [&] { progress.advance(); });
   progress.clear();
   if (session.json()) {
-    session.print(ordered_json{{"dataset", wanted.out},
-                               {"scene", world.scene().name},
-                               {"views", dataset.entries.size()},
-                               {"free_area_m2", world.free_space().area_m2()}}
-                      .dump());
+    session.print(json_line(ordered_json{{"dataset", wanted.out},
+                                         {"scene", world.scene().name},
+                                         {"views", dataset.entries.size()},
+                                         {"free_area_m2", world.free_space().area_m2()}}));
   } else {
     session.print(session.strong(std::to_string(dataset.entries.size())) + " views of " +
                   world.scene().name + " in " + wanted.out);

@@ -18,8 +18,10 @@ void store_lattice(const Lattice& lattice, const VisualMemory& memory, MemoryFil
     if (edge.weight < min_spring_weight || known.contains(std::minmax(edge.a, edge.b))) continue;
     links.push_back({edge.a, edge.b, edge.kind});
   }
-  file.link(links);
-  file.save_map("lattice", map);
+  file.change([&] {
+    file.link(links);
+    file.save_map("lattice", map);
+  });
 }
 
 }  // namespace panonav::command

@@ -2,9 +2,9 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "cli/arguments.hpp"
+#include "cli/json.hpp"
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
@@ -20,8 +20,6 @@
 namespace panonav::command {
 
 namespace {
-
-using nlohmann::ordered_json;
 
 /// How sure a start pose is. The defaults are those of a robot put down by hand on a mark.
 struct StartOptions {
@@ -244,7 +242,7 @@ ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Ses
   Progress progress("tracking", (run.entries.size() - 1) / settings.every + 1);
   track(tracker, run, settings, session.executor(), [&](TrackedImage&& image) {
     progress.clear();
-    session.print(session.json() ? as_json(image).dump() : as_text(image, session));
+    session.print(session.json() ? json_line(as_json(image)) : as_text(image, session));
     images.push_back(std::move(image));
     progress.advance();
   });

@@ -39,7 +39,7 @@ ExitCode unwrap(const UnwrapArguments& wanted, Session& session) {
                       {"elevations_rad", nullptr}, {"horizon_row", nullptr}};
     if (band) json["elevations_rad"] = {band->bottom_rad, band->top_rad};
     if (horizon) json["horizon_row"] = *horizon;
-    session.print(json.dump());
+    session.print(json_line(json));
     return ExitCode::done;
   }
   std::string line = wanted.out + ": " + std::to_string(panorama.columns()) + " x " +

@@ -21,7 +21,7 @@ ExitCode verify(const std::string& path, Session& session) {
                         {"what", fault.what}});
     }
     session.print(
-        ordered_json{{"memory", path}, {"intact", faults.empty()}, {"faults", listed}}.dump());
+        json_line(ordered_json{{"memory", path}, {"intact", faults.empty()}, {"faults", listed}}));
   } else if (faults.empty()) {
     session.print(path + ": " + session.good("intact") + ", " +
                   std::to_string(memory.info().views) + " views");

@@ -189,6 +189,7 @@ TopologicalMap contract_map(const TopologicalMap& map, const SparseSelection& se
     if (moved.a != edge.a || moved.b != edge.b) moved.a_from_b = inverse(a->pose) * b->pose;
     left.edges.push_back(moved);
   }
+  renumber_components(left);
   return left;
 }
 

@@ -51,6 +51,10 @@ void validate(const TopologicalMap& map) {
     if (!is_finite(node.pose)) {
       throw ContractError("node " + std::to_string(i), "not finite", "a finite pose");
     }
+    if (node.component >= map.nodes.size()) {
+      throw ContractError("connected component of node " + std::to_string(i),
+                          static_cast<double>(node.component), "less than the number of nodes");
+    }
   }
   for (std::size_t i = 0; i < map.edges.size(); ++i) {
     const MapEdge& edge = map.edges[i];
@@ -66,6 +70,14 @@ void validate(const TopologicalMap& map) {
     if (!is_finite(edge.a_from_b)) throw ContractError(name, "not finite", "a finite pose");
     require(edge.weight >= 0.0 && edge.weight <= 1.0, name + ": weight", edge.weight, "0 .. 1");
   }
+}
+
+void renumber_components(TopologicalMap& map) {
+  std::map<std::size_t, std::size_t> numbers;
+  for (const MapNode& node : map.nodes) numbers.emplace(node.component, 0);
+  std::size_t next = 0;
+  for (auto& [component, number] : numbers) number = next++;
+  for (MapNode& node : map.nodes) node.component = numbers.at(node.component);
 }
 
 std::size_t number_of_components(const TopologicalMap& map) {

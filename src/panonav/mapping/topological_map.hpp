@@ -39,9 +39,13 @@ struct TopologicalMap {
   friend bool operator==(const TopologicalMap&, const TopologicalMap&) = default;
 };
 
-/// Throws ContractError unless nodes ascend by view, edges join two different nodes of the map, all
+/// Throws ContractError unless nodes ascend by view, their components have numbers below the number
+/// of nodes, edges join two different nodes of the map, all
 /// poses are finite and weights lie in 0 .. 1.
 void validate(const TopologicalMap& map);
+
+/// Gives the connected components the numbers from 0 on, in their order: some may be gone.
+void renumber_components(TopologicalMap& map);
 
 /// The number of connected components.
 [[nodiscard]] std::size_t number_of_components(const TopologicalMap& map);

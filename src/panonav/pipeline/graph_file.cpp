@@ -3,6 +3,7 @@
 #include <string_view>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/io/atomic_file.hpp"
 
 namespace panonav {
@@ -23,7 +24,7 @@ std::string_view name_of(LinkKind kind) {
 
 std::string escaped(std::string_view text) {
   std::string safe;
-  for (const char c : text) {
+  for (const char c : readable_line(text)) {
     switch (c) {
       case '&':
         safe += "&amp;";
@@ -38,8 +39,7 @@ std::string escaped(std::string_view text) {
         safe += "&quot;";
         break;
       default:
-        // Other control characters have no place in XML.
-        safe += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+        safe += c;
     }
   }
   return safe;

@@ -91,16 +91,19 @@ MappedRun Mapper::finish() {
   run_.wheels = options_.mapping.wheel_lengths && all_odometry_;
   std::vector<Link> links;
   for (const MapEdge& edge : run_.map.edges) links.push_back({edge.a, edge.b, edge.kind});
-  file_.link(links);
-  file_.save_map(map_name, run_.map);
-  if (!any_pose_) {
-    const std::size_t component = largest_component(run_.map);
-    for (const MapNode& node : run_.map.nodes) {
-      if (node.component != component) continue;
-      file_.set_pose(node.view, ReferencePose{node.pose.x_m, node.pose.y_m, node.pose.heading_rad});
+  file_.change([&] {
+    file_.link(links);
+    file_.save_map(map_name, run_.map);
+    if (!any_pose_) {
+      const std::size_t component = largest_component(run_.map);
+      for (const MapNode& node : run_.map.nodes) {
+        if (node.component != component) continue;
+        file_.set_pose(node.view,
+                       ReferencePose{node.pose.x_m, node.pose.y_m, node.pose.heading_rad});
+      }
     }
-  }
-  keep_models(file_);
+    keep_models(file_);
+  });
   return run_;
 }
 

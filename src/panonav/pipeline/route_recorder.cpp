@@ -62,8 +62,28 @@ RouteRecorder::RouteRecorder(MemoryFile memory, const std::optional<PictureSourc
       file_(std::move(memory)),
       source_(source_for(file_, options)),
       encoder_(source.value_or(file_.header().source), source_),
-      end_(end_of(file_, options.name)) {
-  remember_route_source(file_, options_.name, source_);
+      end_(end_of(file_, options.name)) {}
+
+std::size_t RouteRecorder::skip_recorded(std::span<const Pose2> drive) {
+  const auto route = file_.route(options_.name);
+  if (!route || last_) return 0;
+  const std::span<const Pose2> known = route->poses();
+  // As `RoutePanorama::append` leaves lines out.
+  const auto same_place = [](const Pose2& a, const Pose2& b) {
+    return distance(a.position(), b.position()) < RoutePanorama::min_step_m;
+  };
+  std::size_t found = 0;
+  std::size_t skipped = 0;
+  for (; skipped < drive.size(); ++skipped) {
+    if (found < known.size() && same_place(known[found], drive[skipped])) {
+      ++found;
+    } else if (found == 0 || !same_place(known[found - 1], drive[skipped])) {
+      break;
+    }
+  }
+  if (found < known.size()) return 0;
+  last_ = end_;
+  return skipped;
 }
 
 bool RouteRecorder::is_due(const std::optional<Pose2>& last, const Pose2& next, double every_m) {
@@ -114,7 +134,11 @@ void RouteRecorder::flush() {
     static_cast<void>(more.append(line.pose, std::span<const float>(line.line)));
   }
   waiting_.clear();
-  appended_ += file_.append_route(options_.name, more);
+  file_.change([&] {
+    if (!source_kept_) remember_route_source(file_, options_.name, source_);
+    appended_ += file_.append_route(options_.name, more);
+  });
+  source_kept_ = true;
 }
 
 RecordedRoute RouteRecorder::finish() {

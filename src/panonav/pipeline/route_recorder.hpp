@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -58,6 +59,9 @@ class RouteRecorder {
   /// The part of `add` that several threads may do beside each other for observations to come.
   /// Throws as `LineEncoder::line`, ContractError on an observation with neither pose nor odometry.
   [[nodiscard]] EncodedLine encode(const Observation& observation) const;
+  /// How many lines at the beginning of a drive the route holds already, when it holds nothing
+  /// else: a drive whose recording was interrupted goes on behind them. 0 for any other route.
+  [[nodiscard]] std::size_t skip_recorded(std::span<const Pose2> drive);
   /// Whatever its distance from the line before. Throws FileError; at the first line also when the
   /// route is there and ends farther than a metre from it.
   void add(EncodedLine line);
@@ -76,6 +80,7 @@ class RouteRecorder {
   RouteRecorderOptions options_;
   MemoryFile file_;
   RouteSource source_;
+  bool source_kept_ = false;
   LineEncoder encoder_;
   std::optional<Pose2> end_;   // of the route that was there
   std::optional<Pose2> last_;  // of the lines added

@@ -35,8 +35,7 @@ bool RoutePanorama::append(const Pose2& pose, std::span<const std::uint8_t> line
   if (!is_finite(pose)) {
     throw ContractError("pose", "not finite", "finite numbers");
   }
-  constexpr double min_m = 1e-3;
-  if (!poses_.empty() && distance(poses_.back().position(), pose.position()) < min_m) {
+  if (!poses_.empty() && distance(poses_.back().position(), pose.position()) < min_step_m) {
     return false;
   }
   poses_.push_back({pose.x_m, pose.y_m, wrap_angle(pose.heading_rad)});

@@ -16,11 +16,14 @@ namespace panonav {
 /// Invariant: all poses finite, no two neighbours at the same place, all lines of one length.
 class RoutePanorama {
  public:
+  /// Lines nearer to the last one than this are left out.
+  static constexpr double min_step_m = 1e-3;
+
   /// Throws ContractError unless columns is 16 .. 16384.
   explicit RoutePanorama(int columns = 360);
 
   /// `line` as from `horizon_scanline`, 0 .. 1, clamped and rounded to bytes. False, and nothing is
-  /// stored, where the robot has not moved by a millimetre since the last line. Throws
+  /// stored, where the robot has not moved by `min_step_m` since the last line. Throws
   /// ContractError on a wrong length or a value that is not finite.
   bool append(const Pose2& pose, std::span<const float> line);
   /// The same for a line that is bytes already.

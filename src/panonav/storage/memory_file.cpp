@@ -128,7 +128,6 @@ MemoryFile::Implementation::Implementation(std::filesystem::path path_, Database
       insert_view(database,
                   "INSERT INTO views(id, name, x_m, y_m, heading_rad, stamp_s, signature, "
                   "checksum) VALUES(?, ?, ?, ?, ?, ?, ?, ?)"),
-      next_id(database, "SELECT seq FROM sqlite_sequence WHERE name = 'views'"),
       insert_thumbnail(database, "INSERT INTO thumbnails(view, picture, checksum) VALUES(?, ?, ?)"),
       find_name(database, "SELECT id FROM views WHERE name = ?") {}
 
@@ -163,13 +162,28 @@ void MemoryFile::Implementation::append_row(const Statement& row, VisualMemory& 
   memory.append_as(view.id, packed, std::move(view.info));
 }
 
-ViewId MemoryFile::Implementation::insert(const NewView& view) {
-  const std::int64_t last = next_id.step() ? next_id.integer(0) : 0;
-  next_id.reset();
-  if (last < 0 || last >= std::int64_t{UINT32_MAX}) {
-    database.fail_damaged("the last view id is out of range");
+std::uint32_t MemoryFile::Implementation::last_id() {
+  // SQLite keeps it in a table without types, in which anything can stand.
+  Statement rows(database, "SELECT name, seq FROM sqlite_sequence");
+  std::int64_t last = 0;
+  for (int count = 0; rows.step(); ++count) {
+    if (rows.text(0) != "views" || count > 0) {
+      database.fail_damaged("table sqlite_sequence holds more than the last view id");
+    }
+    last = rows.integer(1);
   }
-  const ViewId id{static_cast<std::uint32_t>(last + 1)};
+  Statement largest(database, "SELECT id FROM views ORDER BY id DESC LIMIT 1");
+  const std::int64_t id = largest.step() ? largest.integer(0) : 0;
+  largest.reset();
+  if (last < 0 || last >= std::int64_t{UINT32_MAX} || id > last) {
+    database.fail_damaged("the last view id is " + std::to_string(last) + ", the largest " +
+                          std::to_string(id) + "; allowed: 0 .. 2^32 - 2, not below the largest");
+  }
+  return static_cast<std::uint32_t>(last);
+}
+
+void MemoryFile::Implementation::insert(ViewId id, const NewView& view) {
+  if (id.value == UINT32_MAX) database.fail_damaged("there is no id left for another view");
   signature.assign(view.signature.magnitudes.begin(), view.signature.magnitudes.end());
   signature.insert(signature.end(), view.signature.phases.begin(), view.signature.phases.end());
   insert_view.bind(1, std::int64_t{id.value}).bind(2, std::string_view(view.info.name));
@@ -190,7 +204,6 @@ ViewId MemoryFile::Implementation::insert(const NewView& view) {
         .bind(3, thumbnail_checksum(id, view.thumbnail));
     if (insert_thumbnail.run() != 0) database.fail_damaged("a thumbnail without a view");
   }
-  return id;
 }
 
 bool MemoryFile::Implementation::contains(ViewId view) {
@@ -203,6 +216,10 @@ Link MemoryFile::Implementation::link_in(const Statement& row) {
   const std::int64_t kind = row.integer(2);
   if (kind < 0 || kind > static_cast<int>(LinkKind::closure)) {
     database.fail_damaged("a link of unknown kind");
+  }
+  if (link.b <= link.a) {
+    database.fail_damaged("a link of views " + std::to_string(link.a.value) + " and " +
+                          std::to_string(link.b.value) + "; allowed: the smaller id first");
   }
   link.kind = static_cast<LinkKind>(kind);
   if (row.integer(3) != link_checksum(link)) {
@@ -259,7 +276,10 @@ std::vector<ViewId> MemoryFile::append(std::span<const NewView> views) {
   std::vector<ViewId> ids;
   ids.reserve(views.size());
   Transaction transaction(implementation_->database, Transaction::Kind::writing);
-  for (const NewView& view : views) ids.push_back(implementation_->insert(view));
+  std::uint32_t last = implementation_->last_id();
+  for (const NewView& view : views) {
+    implementation_->insert(ids.emplace_back(ViewId{++last}), view);
+  }
   transaction.commit();
   return ids;
 }
@@ -344,8 +364,13 @@ std::optional<ViewId> MemoryFile::find(std::string_view name) const {
 
 std::vector<std::string> MemoryFile::names() const {
   std::vector<std::string> names;
-  Statement rows(implementation_->database, "SELECT name FROM views ORDER BY id");
-  while (rows.step()) names.emplace_back(rows.text(0));
+  Statement rows(implementation_->database, "SELECT name, id FROM views ORDER BY id");
+  std::int64_t before = 0;
+  while (rows.step()) {
+    if (rows.integer(1) <= before) implementation_->database.fail_damaged("views are out of order");
+    before = rows.integer(1);
+    names.emplace_back(rows.text(0));
+  }
   return names;
 }
 
@@ -388,8 +413,8 @@ VisualMemory MemoryFile::load() const {
     while (rows.step()) implementation_->append_row(rows, memory);
     // A page that lost its cells loses views without a fault of their own; the index of the names,
     // which lies on other pages, still counts them.
-    const std::int64_t count =
-        database.integer("SELECT count(*) FROM views INDEXED BY sqlite_autoindex_views_1");
+    const std::int64_t count = database.integer(
+        "SELECT count(*) FROM views INDEXED BY sqlite_autoindex_views_1 WHERE name > ''");
     if (count != static_cast<std::int64_t>(memory.size())) {
       database.fail_damaged("it holds " + std::to_string(memory.size()) + " of " +
                             std::to_string(count) + " views");
@@ -462,16 +487,22 @@ std::vector<MemoryFault> MemoryFile::verify() const {
     }
   };
   const Transaction reading(database, Transaction::Kind::reading);
-  check(std::nullopt, [&] {
-    Statement rows(database, "PRAGMA integrity_check");
-    while (rows.step()) {
-      std::string line(rows.text(0));
-      std::ranges::replace(line, '\n', ' ');
-      if (line != "ok") faults.push_back({std::nullopt, std::move(line)});
-    }
-  });
+  // The full check counts the entries of indexes, which has no end where pages refer to each other:
+  // the quick one finds such pages.
+  for (const char* sql : {"PRAGMA quick_check", "PRAGMA integrity_check"}) {
+    if (!faults.empty()) break;
+    check(std::nullopt, [&] {
+      Statement rows(database, sql);
+      while (rows.step()) {
+        std::string line(rows.text(0));
+        std::ranges::replace(line, '\n', ' ');
+        if (line != "ok") faults.push_back({std::nullopt, std::move(line)});
+      }
+    });
+  }
   check(std::nullopt, [&] { static_cast<void>(header_from(read_settings(database))); });
 
+  check(std::nullopt, [&] { static_cast<void>(implementation_->last_id()); });
   // From the table and from the index of the names: a view that either has lost is found in the
   // other.
   std::set<ViewId> views;
@@ -495,8 +526,10 @@ std::vector<MemoryFault> MemoryFile::verify() const {
   });
   check(std::nullopt, [&] {
     Statement ids(database, "SELECT view FROM thumbnails ORDER BY view");
+    ViewId before{0};
     while (ids.step()) {
       const ViewId view = implementation_->id_in(ids, 0);
+      if (view <= std::exchange(before, view)) database.fail_damaged("thumbnails are out of order");
       check(view, [&] {
         if (!views.contains(view)) database.fail_damaged("a thumbnail without a view");
         static_cast<void>(thumbnail(view));
@@ -505,7 +538,10 @@ std::vector<MemoryFault> MemoryFile::verify() const {
   });
   check(std::nullopt, [&] {
     Statement links(database, "SELECT a, b, kind, checksum FROM links ORDER BY a, b");
+    std::pair<std::int64_t, std::int64_t> before{0, 0};
     while (links.step()) {
+      const std::pair ends(links.integer(0), links.integer(1));
+      if (ends <= std::exchange(before, ends)) database.fail_damaged("links are out of order");
       check(std::nullopt, [&] {
         const Link link = implementation_->link_in(links);
         if (!views.contains(link.a) || !views.contains(link.b)) {
@@ -536,16 +572,19 @@ MemoryFileInfo MemoryFile::info() const {
     return static_cast<std::uint64_t>(database.integer(sql));
   };
   MemoryFileInfo info;
-  info.views = count("SELECT count(*) FROM views");
-  info.views_with_position = count("SELECT count(x_m) FROM views");
-  info.views_with_heading = count("SELECT count(heading_rad) FROM views");
-  info.links = count("SELECT count(*) FROM links");
-  info.thumbnails = count("SELECT count(*) FROM thumbnails");
+  // A condition makes SQLite step through the rows, which is bounded, instead of counting the
+  // entries of pages, which is not.
+  info.views = count("SELECT count(*) FROM views WHERE id > 0");
+  info.views_with_position = count("SELECT count(x_m) FROM views WHERE id > 0");
+  info.views_with_heading = count("SELECT count(heading_rad) FROM views WHERE id > 0");
+  info.links = count("SELECT count(*) FROM links WHERE a > 0");
+  info.thumbnails = count("SELECT count(*) FROM thumbnails WHERE view > 0");
   if (has_chain_tables(database)) {
     info.unused_chains = count("SELECT count(*) FROM (SELECT 1 FROM chains LIMIT 1000000)");
   }
-  if (has_map_table(database)) info.maps = count("SELECT count(*) FROM maps");
-  if (has_route_tables(database)) info.routes = count("SELECT count(*) FROM routes");
+  if (has_map_table(database)) info.maps = count("SELECT count(*) FROM maps WHERE name > ''");
+  if (has_route_tables(database))
+    info.routes = count("SELECT count(*) FROM routes WHERE name > ''");
   info.format_version = static_cast<int>(database.integer("PRAGMA user_version"));
   for (const char* suffix : {"", "-wal"}) {
     std::filesystem::path file = database.path();

@@ -39,6 +39,20 @@ void require_band(const std::optional<ElevationBand>& band, std::string_view fie
   }
 }
 
+// What a picture file may have: more than any picture of the memory could be made from.
+void require_picture(int rows, int columns, std::string_view rows_name,
+                     std::string_view columns_name) {
+  constexpr int max_side = 32768;
+  constexpr std::int64_t max_pixels = 134'217'728;
+  require(rows >= 1 && rows <= max_side, rows_name, rows, "1 .. 32768");
+  require(columns >= 1 && columns <= max_side, columns_name, columns, "1 .. 32768");
+  const std::int64_t pixels = std::int64_t{rows} * columns;
+  if (pixels > max_pixels) {
+    throw ContractError(std::string(rows_name) + " x " + std::string(columns_name),
+                        static_cast<double>(pixels), "up to 134217728 pixels");
+  }
+}
+
 // Doubles as little-endian bytes.
 std::vector<std::uint8_t> bytes_of(const std::vector<double>& values) {
   std::vector<std::uint8_t> bytes;
@@ -236,9 +250,10 @@ Camera camera_from(SettingsReader& reader) {
 }  // namespace
 
 void validate(const MemoryHeader& header) {
+  require_picture(header.shape.rows, header.panorama_columns, "rows", "panorama_columns");
   // The memory itself knows what shapes and scales it takes.
   static_cast<void>(VisualMemory(header.shape, header.full_scale, header.elevations));
-  require(header.panorama_columns >= 2 * header.shape.components, "panorama_columns",
+  require(header.panorama_columns / 2 >= header.shape.components, "panorama_columns",
           header.panorama_columns, ">= 2 x components");
   require_band(header.elevations, "elevations");
   validate(header.preprocessing);
@@ -255,11 +270,16 @@ void validate(const MemoryHeader& header) {
     if (source.kind != PictureKind::panorama) {
       throw ContractError("picture_shape", "there", "there for panoramas only");
     }
-    require(header.picture_shape->rows >= 1, "picture rows", header.picture_shape->rows, ">= 1");
+    require_picture(header.picture_shape->rows, header.picture_shape->columns, "picture rows",
+                    "picture columns");
     require(header.picture_shape->columns >= 4, "picture columns", header.picture_shape->columns,
             ">= 4");
   }
-  if (source.camera) validate(*source.camera);
+  if (source.camera) {
+    require_picture(source.camera->image_size.height, source.camera->image_size.width, "height_px",
+                    "width_px");
+    validate(*source.camera);
+  }
   if (source.mask && (!source.camera || source.mask->channels() != 1 ||
                       source.mask->size() != source.camera->image_size)) {
     throw ContractError(
@@ -325,6 +345,8 @@ MemoryHeader header_from(const Settings& settings) {
   }
   if (source.kind == PictureKind::mirror) {
     source.camera = camera_from(reader);
+    require_picture(source.camera->image_size.height, source.camera->image_size.width, "height_px",
+                    "width_px");
     validate(*source.camera);
     if (const auto* mask = reader.find<std::vector<std::uint8_t>>("source.mask")) {
       source.mask = mask_of(*mask, source.camera->image_size);

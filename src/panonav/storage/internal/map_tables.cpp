@@ -166,6 +166,7 @@ void forget_in_maps(Database& database, std::span<const ViewId> views) {
     std::erase_if(map->edges, [&](const MapEdge& edge) {
       return forgotten.contains(edge.a) || forgotten.contains(edge.b);
     });
+    renumber_components(*map);
     write_map(database, name, *map);
   }
 }

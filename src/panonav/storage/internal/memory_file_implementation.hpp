@@ -29,7 +29,9 @@ struct MemoryFile::Implementation {
   [[nodiscard]] StoredView view_in(const Statement& row);
   /// Appends such a row to a memory.
   void append_row(const Statement& row, VisualMemory& memory);
-  ViewId insert(const NewView& view);
+  /// The largest id that was ever given to a view; 0: none.
+  [[nodiscard]] std::uint32_t last_id();
+  void insert(ViewId id, const NewView& view);
   [[nodiscard]] bool contains(ViewId view);
   [[nodiscard]] Link link_in(const Statement& row);
   /// Passes each link to `take`, ascending.
@@ -49,7 +51,6 @@ struct MemoryFile::Implementation {
   std::vector<std::uint8_t> signature;
   PackedSignature packed;
   Statement insert_view;
-  Statement next_id;
   Statement insert_thumbnail;
   Statement find_name;
 };

@@ -37,6 +37,26 @@ int guess(std::span<const std::uint8_t> before, std::size_t turn,
   return (above + (column == 0 ? above : line[column - 1])) / 2;
 }
 
+std::vector<std::uint8_t> compressed(std::span<const std::uint8_t> plain, int strategy) {
+  z_stream stream{};
+  constexpr int window_bits = 15;
+  constexpr int memory_level = 8;
+  if (deflateInit2(&stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, window_bits, memory_level,
+                   strategy) != Z_OK) {
+    throw std::bad_alloc();
+  }
+  std::vector<std::uint8_t> packed(deflateBound(&stream, static_cast<uLong>(plain.size())));
+  stream.next_in = const_cast<Bytef*>(plain.data());
+  stream.avail_in = static_cast<uInt>(plain.size());
+  stream.next_out = packed.data();
+  stream.avail_out = static_cast<uInt>(packed.size());
+  const int code = deflate(&stream, Z_FINISH);
+  packed.resize(stream.total_out);
+  deflateEnd(&stream);
+  if (code != Z_STREAM_END) throw std::bad_alloc();  // the bound leaves room for anything
+  return packed;
+}
+
 }  // namespace
 
 std::vector<std::uint8_t> pack_route_lines(const RoutePanorama& route, std::size_t first,
@@ -65,19 +85,17 @@ std::vector<std::uint8_t> pack_route_lines(const RoutePanorama& route, std::size
       to[c] = static_cast<std::uint8_t>((line[c] - guess(before, turn, line, c)) & 255);
     }
   }
-  uLongf size = compressBound(static_cast<uLong>(plain.size()));
-  std::vector<std::uint8_t> packed(size);
-  if (compress2(packed.data(), &size, plain.data(), static_cast<uLong>(plain.size()),
-                Z_DEFAULT_COMPRESSION) != Z_OK) {
-    throw std::bad_alloc();  // the bound leaves room for anything
+  std::vector<std::uint8_t> packed = compressed(plain, Z_DEFAULT_STRATEGY);
+  if (plain.size() > max_unpacked_for_each_byte * packed.size()) {
+    packed = compressed(plain, Z_HUFFMAN_ONLY);  // a bit a byte at least
   }
-  packed.resize(size);
   return packed;
 }
 
 bool unpack_route_lines(std::span<const std::uint8_t> bytes, std::size_t count,
                         RoutePanorama& route) {
   const auto columns = static_cast<std::size_t>(route.columns());
+  if (count * (head_bytes + columns) > max_unpacked_for_each_byte * bytes.size()) return false;
   std::vector<std::uint8_t> plain(count * (head_bytes + columns));
   auto size = static_cast<uLongf>(plain.size());
   auto read = static_cast<uLong>(bytes.size());

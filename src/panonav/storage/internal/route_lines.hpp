@@ -16,6 +16,10 @@ namespace panonav {
 [[nodiscard]] std::vector<std::uint8_t> pack_route_lines(const RoutePanorama& route,
                                                          std::size_t first, std::size_t count);
 
+/// Lines unpack to no more than this for each byte, so that what a file unpacks to is bounded by
+/// its size. Pictures of a real place come nowhere near it.
+inline constexpr std::size_t max_unpacked_for_each_byte = 100;
+
 /// Appends `count` lines that `pack_route_lines` packed. False where `bytes` are anything else; the
 /// route may then hold some of them.
 [[nodiscard]] bool unpack_route_lines(std::span<const std::uint8_t> bytes, std::size_t count,

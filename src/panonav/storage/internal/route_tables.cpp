@@ -27,9 +27,7 @@ struct RouteRow {
     record.add(lines);
     return static_cast<std::int64_t>(checksum(record.bytes()));
   }
-  [[nodiscard]] std::int64_t blocks() const {
-    return (lines + lines_of_block - 1) / lines_of_block;
-  }
+  [[nodiscard]] std::int64_t blocks() const { return (lines - 1) / lines_of_block + 1; }
   // Lines of block `number`: all are full but the last.
   [[nodiscard]] std::int64_t lines_of(std::int64_t number) const {
     return std::min(lines_of_block, lines - number * lines_of_block);
@@ -60,6 +58,12 @@ std::optional<RouteRow> read_row(Database& database, std::string_view name) {
   const RouteRow route{static_cast<int>(columns), row.integer(1)};
   if (route.lines < 1 || row.integer(2) != route.checksum_of(name)) {
     fail_route(database, name, "does not match its checksum");
+  }
+  // Its last block must be there: a count that the file has no room for is found at once.
+  Statement last(database, "SELECT 1 FROM route_blocks WHERE route = ? AND number = ?");
+  if (!last.bind(1, name).bind(2, route.blocks() - 1).step()) {
+    fail_route(database, name,
+               "its last block of " + std::to_string(route.blocks()) + " is missing");
   }
   return route;
 }

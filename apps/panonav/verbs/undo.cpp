@@ -1,0 +1,61 @@
+#include <memory>
+
+#include "cli/arguments.hpp"
+#include "cli/json.hpp"
+#include "cli/session.hpp"
+#include "cli/verbs.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/storage/memory_file.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+struct UndoArguments {
+  std::string memory;
+  bool dry_run = false;
+};
+
+ExitCode undo(const UndoArguments& wanted, Session& session) {
+  auto memory =
+      MemoryFile::open(wanted.memory, wanted.dry_run ? Access::read_only : Access::read_write);
+  const auto what = memory.undoable();
+  if (!what) {
+    throw FileError(wanted.memory, "has nothing to undo; allowed: once after each forget or prune");
+  }
+  if (!wanted.dry_run) memory.undo();
+  const auto views = memory.info().views;
+  if (session.json()) {
+    session.print(json_line(ordered_json{{"memory", wanted.memory},
+                                         {"dry_run", wanted.dry_run},
+                                         {"undone", *what},
+                                         {"views", views}}));
+    return ExitCode::done;
+  }
+  session.print((wanted.dry_run ? "would undo \"" : "undone \"") + *what + "\"; " + wanted.memory +
+                " holds " + std::to_string(views) + " views");
+  return ExitCode::done;
+}
+
+Run declare(Arguments& arguments) {
+  auto wanted = std::make_shared<UndoArguments>();
+  arguments.positional("MEMORY", wanted->memory, "Memory file");
+  arguments.flag("--dry-run", wanted->dry_run, "Say what would be undone, and change nothing");
+  return [wanted](Session& session) { return undo(*wanted, session); };
+}
+
+}  // namespace
+
+Verb undo_verb() {
+  return {
+      "undo", "Bring back what the last forget or prune dropped",
+      "Views, their small pictures and links, and what they were in maps. Views that were added "
+      "since\n"
+      "stay. Refused when one of them has the name of a dropped one, or when a map was made "
+      "anew.",
+      "  panonav undo office.panonav --dry-run\n"
+      "  panonav undo office.panonav",
+      declare};
+}
+
+}  // namespace panonav::command
