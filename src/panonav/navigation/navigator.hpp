@@ -39,7 +39,7 @@ struct NavigatorOptions {
   int edge_patience = 8;
   /// Of the way along a recorded route that is worth a leg: three steps.
   double min_leg_m = 0.75;
-  int attempts = 3;      ///< times that closed edges, or the last stretch, are tried
+  int attempts = 3;          ///< times that closed edges, or the last stretch, are tried
   int max_run_steps = 5000;  ///< after which a run ends as blocked
 };
 void visit_options(NavigatorOptions& options, OptionVisitor& visitor);
