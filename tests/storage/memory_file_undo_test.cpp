@@ -67,6 +67,54 @@ TEST_F(MemoryFileUndo, BringsBackTheSameMemory) {
   EXPECT_TRUE(file->verify().empty());
 }
 
+TEST_F(MemoryFileUndo, BringsBackNames) {
+  RoutePanorama route(16);
+  for (int i = 0; i < 600; ++i) {
+    (void)route.append({0.1 * i, 0.0, 0.0},
+                       std::vector<std::uint8_t>(16, static_cast<std::uint8_t>(i)));
+  }
+  file->append_route("way", route);
+  file->set_parameter("route.way", "half_band_rad 0.1");
+  file->change(
+      [&] {
+        file->rename(ids[4], "door");
+        file->rename_route("way", "path");
+      },
+      "rename");
+  EXPECT_EQ(file->find("door"), ids[4]);
+  EXPECT_FALSE(file->find("view_4.png"));
+  EXPECT_EQ(file->load().info(ids[4]).pose, before->info(ids[4]).pose);
+  EXPECT_EQ(file->route("path"), route);
+  EXPECT_FALSE(file->route("way"));
+  EXPECT_EQ(file->parameter("route.path"), "half_band_rad 0.1");
+  EXPECT_FALSE(file->parameter("route.way"));
+  EXPECT_TRUE(file->verify().empty());
+  file->undo();
+  EXPECT_TRUE(same_content(file->load(), *before));
+  EXPECT_EQ(file->route("way"), route);
+  EXPECT_EQ(file->parameter("route.way"), "half_band_rad 0.1");
+  EXPECT_TRUE(file->verify().empty());
+}
+
+TEST_F(MemoryFileUndo, NamesAreRefusedThatAreTakenOrNone) {
+  RoutePanorama route(16);
+  (void)route.append({}, std::vector<std::uint8_t>(16, 7));
+  file->append_route("way", route);
+  file->append_route("path", route);
+  const auto refused = [&](const auto& body, const std::string& word) {
+    EXPECT_TRUE(contains(message_of<ContractError>(body), word));
+  };
+  refused([&] { file->rename(ids[4], "view_5.png"); }, "already holds");
+  refused([&] { file->rename(ids[4], ""); }, "view name is empty");
+  refused([&] { file->rename(ids[4], std::string("a\0b", 3)); }, "control characters");
+  refused([&] { file->rename(ViewId{99}, "x"); }, "view is 99");
+  refused([&] { file->rename_route("way", "path"); }, "route name is \"path\", which");
+  refused([&] { file->rename_route("nobody", "x"); }, "a route of the memory file");
+  file->rename(ids[4], "view_4.png");  // its own name
+  EXPECT_TRUE(same_content(file->load(), *before));
+  EXPECT_EQ(file->route_names(), (std::vector<std::string>{"path", "way"}));
+}
+
 TEST_F(MemoryFileUndo, LeavesWhatWasAddedSince) {
   forget({ids[4]});
   Random random(6);

@@ -21,7 +21,8 @@ ExitCode undo(const UndoArguments& wanted, Session& session) {
       MemoryFile::open(wanted.memory, wanted.dry_run ? Access::read_only : Access::read_write);
   const auto what = memory.undoable();
   if (!what) {
-    throw FileError(wanted.memory, "has nothing to undo; allowed: once after each forget or prune");
+    throw FileError(wanted.memory,
+                    "has nothing to undo; allowed: once after each forget, prune or rename");
   }
   if (!wanted.dry_run) memory.undo();
   const auto views = memory.info().views;
@@ -47,15 +48,15 @@ Run declare(Arguments& arguments) {
 }  // namespace
 
 Verb undo_verb() {
-  return {
-      "undo", "Bring back what the last forget or prune dropped",
-      "Views, their small pictures and links, and what they were in maps. Views that were added "
-      "since\n"
-      "stay. Refused when one of them has the name of a dropped one, or when a map was made "
-      "anew.",
-      "  panonav undo office.panonav --dry-run\n"
-      "  panonav undo office.panonav",
-      declare};
+  return {"undo", "Take back the last forget, prune or rename",
+          "Brings back views, their small pictures and links, what they were in maps, and former "
+          "names.\n"
+          "Views that were added since stay. Refused when one of them has the name of a view that "
+          "comes\n"
+          "back, or when a map was made anew.",
+          "  panonav undo office.panonav --dry-run\n"
+          "  panonav undo office.panonav",
+          declare};
 }
 
 }  // namespace panonav::command

@@ -120,6 +120,25 @@ void refuse_view(ViewId view) {
   throw ContractError("view", std::to_string(view.value), "a view of the memory file");
 }
 
+void refuse_taken_name(std::string_view what, std::string_view name,
+                       const std::filesystem::path& file) {
+  throw ContractError(std::string(what) + " name",
+                      "\"" + std::string(name) + "\", which " + file.string() + " already holds",
+                      "a name that is unique");
+}
+
+void require_name(std::string_view what, std::string_view name) {
+  constexpr std::size_t max_bytes = 4096;
+  const bool control = std::ranges::any_of(
+      name, [](char c) { return static_cast<unsigned char>(c) < 0x20U || c == 0x7F; });
+  if (!name.empty() && !control && name.size() <= max_bytes) return;
+  throw ContractError(std::string(what) + " name",
+                      name.empty() ? "empty"
+                      : control    ? "a text with control characters"
+                                   : std::to_string(name.size()) + " bytes long",
+                      "1 to " + std::to_string(max_bytes) + " bytes, no control characters");
+}
+
 MemoryFile::Implementation::Implementation(std::filesystem::path path_, Database database_,
                                            MemoryHeader header_)
     : path(std::move(path_)),
@@ -193,9 +212,7 @@ void MemoryFile::Implementation::insert(ViewId id, const NewView& view) {
       .bind(8, view_checksum(scratch, id, view.info, signature));
   const int constraint = insert_view.run();
   if (constraint == SQLITE_CONSTRAINT_UNIQUE) {
-    throw ContractError("view name",
-                        "\"" + view.info.name + "\", which " + path.string() + " already holds",
-                        "a name that is unique");
+    refuse_taken_name("view", view.info.name, path);
   }
   if (constraint != 0) database.fail_damaged("the id of a new view is taken");
   if (!view.thumbnail.empty()) {
@@ -209,6 +226,16 @@ void MemoryFile::Implementation::insert(ViewId id, const NewView& view) {
 bool MemoryFile::Implementation::contains(ViewId view) {
   Statement statement(database, "SELECT 1 FROM views WHERE id = ?");
   return statement.bind(1, std::int64_t{view.value}).step();
+}
+
+std::int64_t MemoryFile::Implementation::checksum_with(
+    ViewId view, const std::function<void(ReferenceInfo&)>& change) {
+  const std::string sql = std::string("SELECT ") + view_columns + " FROM views WHERE id = ?";
+  Statement read(database, sql.c_str());
+  if (!read.bind(1, std::int64_t{view.value}).step()) refuse_view(view);
+  StoredView stored = view_in(read);
+  change(stored.info);
+  return view_checksum(scratch, view, stored.info, stored.signature);
 }
 
 Link MemoryFile::Implementation::link_in(const Statement& row) {
@@ -304,19 +331,24 @@ void MemoryFile::set_pose(ViewId view, const std::optional<ReferencePose>& pose)
   require_finite(pose);
   Database& database = implementation_->database;
   Transaction transaction(database, Transaction::Kind::writing);
-  std::int64_t new_checksum = 0;
-  {
-    const std::string sql = std::string("SELECT ") + view_columns + " FROM views WHERE id = ?";
-    Statement read(database, sql.c_str());
-    if (!read.bind(1, std::int64_t{view.value}).step()) refuse_view(view);
-    StoredView stored = implementation_->view_in(read);
-    stored.info.pose = pose;
-    new_checksum = view_checksum(implementation_->scratch, view, stored.info, stored.signature);
-  }
+  const std::int64_t new_checksum =
+      implementation_->checksum_with(view, [&](ReferenceInfo& info) { info.pose = pose; });
   Statement write(database,
                   "UPDATE views SET x_m = ?, y_m = ?, heading_rad = ?, checksum = ? WHERE id = ?");
   bind_pose(write, 1, pose);
   static_cast<void>(write.bind(4, new_checksum).bind(5, std::int64_t{view.value}).run());
+  transaction.commit();
+}
+
+void MemoryFile::rename(ViewId view, std::string_view name) {
+  require_name("view", name);
+  Database& database = implementation_->database;
+  Transaction transaction(database, Transaction::Kind::writing);
+  const std::int64_t new_checksum =
+      implementation_->checksum_with(view, [&](ReferenceInfo& info) { info.name = name; });
+  Statement write(database, "UPDATE views SET name = ?, checksum = ? WHERE id = ?");
+  write.bind(1, name).bind(2, new_checksum).bind(3, std::int64_t{view.value});
+  if (write.run() != 0) refuse_taken_name("view", name, path());
   transaction.commit();
 }
 
@@ -372,6 +404,19 @@ std::vector<std::string> MemoryFile::names() const {
     names.emplace_back(rows.text(0));
   }
   return names;
+}
+
+std::vector<ViewId> MemoryFile::views_with_thumbnail() const {
+  std::vector<ViewId> views;
+  Statement rows(implementation_->database, "SELECT view FROM thumbnails ORDER BY view");
+  while (rows.step()) {
+    const ViewId view = implementation_->id_in(rows, 0);
+    if (!views.empty() && view <= views.back()) {
+      implementation_->database.fail_damaged("thumbnails are out of order");
+    }
+    views.push_back(view);
+  }
+  return views;
 }
 
 std::optional<std::vector<std::uint8_t>> MemoryFile::thumbnail(ViewId view) const {

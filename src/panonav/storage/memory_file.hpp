@@ -112,6 +112,9 @@ class MemoryFile {
   /// Throws ContractError when there is no such view; then nothing is removed.
   void remove(std::span<const ViewId> views);
   void set_pose(ViewId view, const std::optional<ReferencePose>& pose);
+  /// Gives a view another name. Throws ContractError when there is no such view, and on a name that
+  /// another view has, is empty, has control characters or more than 4096 bytes.
+  void rename(ViewId view, std::string_view name);
   /// A second link of the same two views replaces the first. All links in one transaction.
   void link(std::span<const Link> links);
   void unlink(ViewId a, ViewId b);
@@ -119,6 +122,8 @@ class MemoryFile {
   [[nodiscard]] std::optional<ViewId> find(std::string_view name) const;
   /// Names of all views, by ascending id: what a resumed recording need not add again.
   [[nodiscard]] std::vector<std::string> names() const;
+  /// Views that a picture file was stored with, ascending.
+  [[nodiscard]] std::vector<ViewId> views_with_thumbnail() const;
   /// The picture file that was stored with the view; empty where there is none.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> thumbnail(ViewId view) const;
 
@@ -150,6 +155,9 @@ class MemoryFile {
   [[nodiscard]] std::uint64_t route_bytes(std::string_view name) const;
   /// Throws ContractError when there is no such route.
   void remove_route(std::string_view name);
+  /// Gives a route another name. Throws ContractError when there is no such route, and on a new
+  /// name as `rename`. Cost: every line is written anew.
+  void rename_route(std::string_view name, std::string_view new_name);
   /// Ascending.
   [[nodiscard]] std::vector<std::string> route_names() const;
 

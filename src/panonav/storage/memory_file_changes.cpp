@@ -22,7 +22,8 @@ namespace {
 constexpr int max_undo_bytes = 200 << 20;  // SQLite takes fields of 256 MiB
 
 // Tables whose rows `undo` brings back.
-constexpr std::array<const char*, 5> tables{"views", "thumbnails", "links", "maps", "settings"};
+constexpr std::array<const char*, 7> tables{"views",    "thumbnails", "links",       "maps",
+                                            "settings", "routes",     "route_blocks"};
 
 struct EndSession {
   void operator()(sqlite3_session* session) const noexcept { sqlite3session_delete(session); }
@@ -125,7 +126,7 @@ void MemoryFile::undo() {
   {
     Statement row(database, select_undo);
     if (!find_undo(database, row)) {
-      throw ContractError("undo", "not possible", "after views were forgotten or pruned");
+      throw ContractError("undo", "not possible", "after a change that was kept for it");
     }
     const auto changes = row.blob(1);
     SqliteBytes inverse;

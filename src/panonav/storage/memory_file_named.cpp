@@ -1,5 +1,7 @@
 // Maps and routes of a memory file, each under a name.
 
+#include <algorithm>
+
 #include "panonav/core/error.hpp"
 #include "panonav/storage/internal/map_tables.hpp"
 #include "panonav/storage/internal/memory_file_implementation.hpp"
@@ -69,6 +71,29 @@ void MemoryFile::remove_route(std::string_view name) {
   Transaction transaction(database, Transaction::Kind::writing);
   if (!has_route_tables(database) || !erase_route(database, name)) {
     throw ContractError("route", std::string(name), "a route of the memory file");
+  }
+  transaction.commit();
+}
+
+void MemoryFile::rename_route(std::string_view name, std::string_view new_name) {
+  require_name("route", new_name);
+  Database& database = implementation_->database;
+  Transaction transaction(database, Transaction::Kind::writing);
+  const auto names = route_names();
+  if (std::ranges::find(names, name) == names.end()) {
+    throw ContractError("route", std::string(name), "a route of the memory file");
+  }
+  if (std::ranges::find(names, new_name) != names.end()) {
+    refuse_taken_name("route", new_name, path());
+  }
+  panonav::rename_route(database, name, new_name);
+  // How its pictures became lines goes with it.
+  const std::string from = "route." + std::string(name);
+  if (const auto lines = parameter(from)) {
+    set_parameter("route." + std::string(new_name), *lines);
+    Statement erase(database, "DELETE FROM settings WHERE key = ?");
+    const std::string key = "parameter." + from;
+    static_cast<void>(erase.bind(1, std::string_view(key)).run());
   }
   transaction.commit();
 }

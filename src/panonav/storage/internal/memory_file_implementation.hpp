@@ -2,7 +2,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "panonav/storage/checksum.hpp"
@@ -21,6 +23,13 @@ struct StoredView {
 /// Throws the ContractError for a view that is not in the file.
 [[noreturn]] void refuse_view(ViewId view);
 
+/// Throws the ContractError for a name that another `what` ("view", "route") of the file has.
+[[noreturn]] void refuse_taken_name(std::string_view what, std::string_view name,
+                                    const std::filesystem::path& file);
+
+/// Throws ContractError on a new name that people could not type or read.
+void require_name(std::string_view what, std::string_view name);
+
 struct MemoryFile::Implementation {
   Implementation(std::filesystem::path path_, Database database_, MemoryHeader header_);
 
@@ -33,6 +42,9 @@ struct MemoryFile::Implementation {
   [[nodiscard]] std::uint32_t last_id();
   void insert(ViewId id, const NewView& view);
   [[nodiscard]] bool contains(ViewId view);
+  /// The checksum of the view's row with its fields changed. Throws as `refuse_view`.
+  [[nodiscard]] std::int64_t checksum_with(ViewId view,
+                                           const std::function<void(ReferenceInfo&)>& change);
   [[nodiscard]] Link link_in(const Statement& row);
   /// Passes each link to `take`, ascending.
   template <class Take>

@@ -68,9 +68,32 @@ std::optional<RouteRow> read_row(Database& database, std::string_view name) {
   return route;
 }
 
-// Appends the lines of block `number` to `route`.
-void read_block(Database& database, std::string_view name, const RouteRow& row, std::int64_t number,
-                RoutePanorama& route) {
+// Replaces the block of that number.
+void write_block(Database& database, std::string_view name, std::int64_t number,
+                 std::span<const std::uint8_t> lines) {
+  Statement insert(database,
+                   "INSERT INTO route_blocks(route, number, lines, checksum) VALUES(?, ?, ?, ?) ON "
+                   "CONFLICT(route, number) DO UPDATE SET lines = excluded.lines, checksum = "
+                   "excluded.checksum");
+  insert.bind(1, name).bind(2, number).bind(3, lines).bind(4, block_checksum(name, number, lines));
+  if (insert.run() != 0) fail_route(database, name, "a block cannot be written");
+}
+
+void write_row(Database& database, std::string_view name, const RouteRow& row) {
+  Statement head(database,
+                 "INSERT INTO routes(name, columns, lines, checksum) VALUES(?, ?, ?, ?) ON "
+                 "CONFLICT(name) DO UPDATE SET lines = excluded.lines, checksum = "
+                 "excluded.checksum");
+  head.bind(1, name)
+      .bind(2, std::int64_t{row.columns})
+      .bind(3, row.lines)
+      .bind(4, row.checksum_of(name));
+  if (head.run() != 0) fail_route(database, name, "cannot be written");
+}
+
+// Passes the packed lines of block `number` to `use`, checked.
+template <class Use>
+void with_block(Database& database, std::string_view name, std::int64_t number, const Use& use) {
   const std::string block = "block " + std::to_string(number);
   Statement rows(database,
                  "SELECT lines, checksum FROM route_blocks WHERE route = ? AND number = ?");
@@ -81,9 +104,17 @@ void read_block(Database& database, std::string_view name, const RouteRow& row, 
   if (rows.integer(1) != block_checksum(name, number, bytes)) {
     fail_route(database, name, block + " does not match its checksum");
   }
-  if (!unpack_route_lines(bytes, static_cast<std::size_t>(row.lines_of(number)), route)) {
-    fail_route(database, name, block + " cannot be unpacked");
-  }
+  use(bytes);
+}
+
+// Appends the lines of block `number` to `route`.
+void read_block(Database& database, std::string_view name, const RouteRow& row, std::int64_t number,
+                RoutePanorama& route) {
+  with_block(database, name, number, [&](std::span<const std::uint8_t> bytes) {
+    if (!unpack_route_lines(bytes, static_cast<std::size_t>(row.lines_of(number)), route)) {
+      fail_route(database, name, "block " + std::to_string(number) + " cannot be unpacked");
+    }
+  });
 }
 
 }  // namespace
@@ -107,30 +138,14 @@ std::size_t append_to_route(Database& database, std::string_view name, const Rou
   const std::size_t appended = open.size() - known;
   if (appended == 0) return 0;
 
-  Statement insert(database,
-                   "INSERT INTO route_blocks(route, number, lines, checksum) VALUES(?, ?, ?, ?) ON "
-                   "CONFLICT(route, number) DO UPDATE SET lines = excluded.lines, checksum = "
-                   "excluded.checksum");
   constexpr auto full = static_cast<std::size_t>(lines_of_block);
   for (std::size_t first = known == full ? full : 0; first < open.size(); first += full) {
     const auto bytes = pack_route_lines(open, first, std::min(full, open.size() - first));
     const std::int64_t block = number + static_cast<std::int64_t>(first / full);
-    insert.bind(1, name)
-        .bind(2, block)
-        .bind(3, std::span<const std::uint8_t>(bytes))
-        .bind(4, block_checksum(name, block, bytes));
-    if (insert.run() != 0) fail_route(database, name, "a block cannot be written");
+    write_block(database, name, block, bytes);
   }
   row.lines += static_cast<std::int64_t>(appended);
-  Statement head(database,
-                 "INSERT INTO routes(name, columns, lines, checksum) VALUES(?, ?, ?, ?) ON "
-                 "CONFLICT(name) DO UPDATE SET lines = excluded.lines, checksum = "
-                 "excluded.checksum");
-  head.bind(1, name)
-      .bind(2, std::int64_t{row.columns})
-      .bind(3, row.lines)
-      .bind(4, row.checksum_of(name));
-  if (head.run() != 0) fail_route(database, name, "cannot be written");
+  write_row(database, name, row);
   return appended;
 }
 
@@ -159,6 +174,18 @@ std::size_t route_bytes(Database& database, std::string_view name) {
   Statement sum(database,
                 "SELECT coalesce(sum(length(lines)), 0) FROM route_blocks WHERE route = ?");
   return sum.bind(1, name).step() ? static_cast<std::size_t>(sum.integer(0)) : 0;
+}
+
+void rename_route(Database& database, std::string_view name, std::string_view new_name) {
+  const auto row = read_row(database, name);
+  if (!row) fail_route(database, name, "is missing");
+  for (std::int64_t number = 0; number < row->blocks(); ++number) {
+    with_block(database, name, number, [&](std::span<const std::uint8_t> bytes) {
+      write_block(database, new_name, number, bytes);
+    });
+  }
+  write_row(database, new_name, *row);
+  erase_route(database, name);
 }
 
 bool erase_route(Database& database, std::string_view name) {

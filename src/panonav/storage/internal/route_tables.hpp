@@ -24,6 +24,8 @@ std::size_t append_to_route(Database& database, std::string_view name, const Rou
 [[nodiscard]] std::optional<RoutePanorama> read_route(Database& database, std::string_view name);
 /// Bytes of the lines and poses as they are kept; 0 when there is no such route.
 [[nodiscard]] std::size_t route_bytes(Database& database, std::string_view name);
+/// There must be a route of the one name and none of the other.
+void rename_route(Database& database, std::string_view name, std::string_view new_name);
 /// Whether there was one.
 bool erase_route(Database& database, std::string_view name);
 /// All names, ascending.
