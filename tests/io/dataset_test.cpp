@@ -10,8 +10,8 @@
 #include <string>
 
 #include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
-#include "panonav/io/internal/written_degrees.hpp"
 #include "panonav/io/panorama_reader.hpp"
 #include "support/temporary_folder.hpp"
 

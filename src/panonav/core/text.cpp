@@ -74,6 +74,19 @@ std::string readable_line(std::string_view text) {
   return line;
 }
 
+std::string csv_field(std::string_view text) {
+  const auto blank = [](char c) { return c == ' ' || c == '\t'; };
+  const bool quoted = text.empty() || text.find_first_of(",\"#\r\n") != std::string_view::npos ||
+                      blank(text.front()) || blank(text.back());
+  if (!quoted) return std::string(text);
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"') result += '"';
+    result += c;
+  }
+  return result + "\"";
+}
+
 std::string shortened(std::string_view text, std::size_t max_characters) {
   const auto characters =
       static_cast<std::size_t>(std::ranges::count_if(text, [](char c) { return !continues(c); }));

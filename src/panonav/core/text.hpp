@@ -16,6 +16,10 @@ namespace panonav {
 /// characters become spaces, bytes that are not UTF-8 the replacement character U+FFFD.
 [[nodiscard]] std::string readable_line(std::string_view text);
 
+/// The field as a CSV file needs it: in quotes where it holds a comma, a quote, a `#` or a line
+/// break, is empty or has a blank at an end.
+[[nodiscard]] std::string csv_field(std::string_view text);
+
 /// Valid UTF-8 with its middle left out ("...") where it has more than `max_characters` (>= 8).
 [[nodiscard]] std::string shortened(std::string_view text, std::size_t max_characters);
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <numbers>
 #include <optional>
 #include <span>
@@ -22,6 +23,15 @@ namespace panonav {
 }
 [[nodiscard]] constexpr double degrees(double radians) {
   return radians * 57.29577951308232;
+}
+
+/// The angle in degrees as files show it: 30 rather than 29.999999999999996 where both are read
+/// back as the same radians.
+[[nodiscard]] inline double written_degrees(double angle_rad) {
+  const double exact = degrees(angle_rad);
+  constexpr double steps = 1e9;
+  const double rounded = std::round(exact * steps) / steps;
+  return radians(rounded) == angle_rad ? rounded : exact;
 }
 
 /// Mean direction of angles, and how well they agree.

@@ -10,7 +10,6 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/io/image_file.hpp"
-#include "panonav/io/internal/written_degrees.hpp"
 #include "panonav/io/toml_fields.hpp"
 
 namespace panonav {

@@ -7,11 +7,11 @@
 #include <unordered_set>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/io/camera_file.hpp"
 #include "panonav/io/internal/csv_table.hpp"
-#include "panonav/io/internal/written_degrees.hpp"
 #include "panonav/io/toml_fields.hpp"
 
 namespace panonav {

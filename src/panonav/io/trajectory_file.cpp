@@ -11,7 +11,6 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/io/internal/csv_table.hpp"
-#include "panonav/io/internal/written_degrees.hpp"
 
 namespace panonav {
 

@@ -53,6 +53,12 @@ bool same_band(const std::optional<ElevationBand>& a, const std::optional<Elevat
 
 constexpr std::string_view as_remembered = ", as in the views of the memory";
 
+/// Pixels of a panorama that become one pixel of its thumbnail, in each direction.
+int thumbnail_step(int columns) {
+  constexpr int max_columns = 256;
+  return (columns + max_columns - 1) / max_columns;
+}
+
 void require_same(std::string_view field, int value, int remembered) {
   if (value != remembered) {
     throw ContractError(field, value, std::to_string(remembered) + std::string(as_remembered));
@@ -229,9 +235,8 @@ float largest_structure(const FourierSignature& signature) {
 }
 
 std::vector<std::uint8_t> thumbnail_png(const Panorama& panorama) {
-  constexpr int max_columns = 256;
   const Image picture = to_picture(panorama);
-  const int step = (picture.width() + max_columns - 1) / max_columns;
+  const int step = thumbnail_step(picture.width());
   if (step == 1) return encode_png(picture.view());
   Image small(picture.width() / step, std::max(1, picture.height() / step));
   const int rows_averaged = std::min(step, picture.height());
@@ -245,6 +250,27 @@ std::vector<std::uint8_t> thumbnail_png(const Panorama& panorama) {
     }
   }
   return encode_png(small.view());
+}
+
+std::optional<Panorama> thumbnail_panorama(std::span<const std::uint8_t> thumbnail,
+                                           const MemoryHeader& header) {
+  const PanoramaShape shape{header.shape.rows, header.panorama_columns};
+  const int step = thumbnail_step(shape.columns);
+  const int width = shape.columns / step;
+  try {
+    const Image picture = decode_image(thumbnail, "thumbnail", {.side_px = 4096});
+    if (picture.width() != width || picture.height() != std::max(1, shape.rows / step)) return {};
+    const double forward = picture_forward_column(shape.columns) * shape.columns / (step * width);
+    return panorama_from_picture(
+        picture.view(), {.forward_column = std::min(forward, 1.0), .elevations = header.elevations},
+        shape);
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
+int thumbnail_columns(const MemoryHeader& header) noexcept {
+  return header.panorama_columns / thumbnail_step(header.panorama_columns);
 }
 
 void for_each_entry(Executor& executor, std::size_t count,

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "panonav/core/executor.hpp"
@@ -77,6 +78,15 @@ class ViewEncoder {
 
 /// A small picture of the view for people, as PNG.
 [[nodiscard]] std::vector<std::uint8_t> thumbnail_png(const Panorama& panorama);
+
+/// The panorama that `thumbnail_png` made a thumbnail of, as far as that kept it: of the memory's
+/// size, enlarged where the thumbnail is smaller. Columns and rows that do not fill a pixel of the
+/// thumbnail are missing there; what is left is stretched over them, by less than one pixel. Empty
+/// when the picture cannot be decoded or is of another size than thumbnails of this memory.
+[[nodiscard]] std::optional<Panorama> thumbnail_panorama(std::span<const std::uint8_t> thumbnail,
+                                                         const MemoryHeader& header);
+/// Columns of a memory's thumbnails: its own up to 256.
+[[nodiscard]] int thumbnail_columns(const MemoryHeader& header) noexcept;
 
 /// Calls body(i) for 0 .. count - 1 on all threads.
 void for_each_entry(Executor& executor, std::size_t count,

@@ -125,16 +125,4 @@ void CsvTable::fail(std::size_t row, std::string_view column, std::string_view f
                                       "; allowed: " + std::string(allowed));
 }
 
-std::string csv_field(std::string_view text) {
-  const bool quoted = text.empty() || text.find_first_of(",\"#") != std::string_view::npos ||
-                      trimmed(text).size() != text.size();
-  if (!quoted) return std::string(text);
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"') result += '"';
-    result += c;
-  }
-  return result + "\"";
-}
-
 }  // namespace panonav

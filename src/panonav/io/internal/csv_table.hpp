@@ -36,8 +36,4 @@ class CsvTable {
   std::vector<std::size_t> lines_;  // line of the file of each row
 };
 
-/// The field as a CSV file needs it: in quotes where it holds a comma, a quote or a blank at an
-/// end.
-[[nodiscard]] std::string csv_field(std::string_view text);
-
 }  // namespace panonav

@@ -1,0 +1,230 @@
+#include "panonav/pipeline/memory_export.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/temporary_file.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav/io/atomic_file.hpp"
+#include "panonav/io/camera_file.hpp"
+#include "panonav/io/dataset.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
+#include "panonav/pipeline/view_list.hpp"
+
+namespace panonav {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A folder that gets its name when it is whole, and is gone if it never is.
+class UnfinishedFolder {
+ public:
+  explicit UnfinishedFolder(const fs::path& wanted) : target_(behind_links(wanted)) {
+    std::error_code error;
+    fs::create_directories(target_.parent_path(), error);
+    if (error) throw FileError(wanted.string(), "cannot be made: " + error.message());
+    mark_.emplace(target_);
+    path_ = mark_->path().string() + ".d";
+    fs::remove_all(path_, error);  // of a process that was killed: the mark's name was free
+    if (!fs::create_directory(path_, error)) {
+      throw FileError(wanted.string(), "cannot be made: " + error.message());
+    }
+  }
+  ~UnfinishedFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  UnfinishedFolder(const UnfinishedFolder&) = delete;
+  UnfinishedFolder& operator=(const UnfinishedFolder&) = delete;
+
+  [[nodiscard]] const fs::path& path() const noexcept { return path_; }
+  void finish() {
+    std::error_code error;
+    fs::rename(path_, target_, error);
+    if (error) throw FileError(target_.string(), "cannot be made: " + error.message());
+  }
+
+ private:
+  static fs::path behind_links(const fs::path& wanted) {
+    std::error_code error;
+    if (fs::exists(fs::symlink_status(wanted, error)) &&
+        (!fs::is_directory(wanted, error) || !fs::is_empty(wanted, error))) {
+      throw FileError(wanted.string(), "is there already and not empty; allowed: a new folder");
+    }
+    fs::path target = fs::weakly_canonical(fs::absolute(wanted), error);
+    if (error) throw FileError(wanted.string(), "cannot be made: " + error.message());
+    return target.has_filename() ? target : target.parent_path();
+  }
+
+  fs::path target_;
+  fs::path path_;
+  std::optional<TemporaryFile> mark_;  // tells living processes apart
+};
+
+/// A file within the folder that no other file or folder of the export is in the way of.
+bool names_a_file(const std::string& name) {
+  constexpr std::array<std::string_view, 8> own{"dataset.toml", "poses.csv",      "images.csv",
+                                                "views.csv",    "signatures.npy", "memorise.toml",
+                                                "camera.toml",  "camera_mask.png"};
+  constexpr std::size_t max_part_bytes = 200;
+  constexpr std::size_t max_bytes = 1000;
+  const fs::path path(name);
+  if (readable_line(name) != name || name.size() > max_bytes || path.is_absolute() ||
+      path.lexically_normal() != path || !path.has_filename() ||
+      std::ranges::find(own, path.begin()->string()) != own.end()) {
+    return false;
+  }
+  return std::ranges::none_of(path, [](const fs::path& part) {
+    return part == ".." || part == "." || part.string().size() > max_part_bytes;
+  });
+}
+
+/// The file of each view's picture: its name wherever that can be one.
+std::vector<std::string> picture_files(const std::vector<ViewRecord>& views) {
+  std::set<std::string> files;
+  std::set<std::string> folders;
+  const auto take = [&](const std::string& name) {
+    std::set<std::string> above;
+    for (fs::path folder = fs::path(name).parent_path(); !folder.empty();
+         folder = folder.parent_path()) {
+      above.insert(folder.string());
+      if (files.contains(folder.string())) return false;
+    }
+    if (folders.contains(name) || !files.insert(name).second) return false;
+    folders.merge(above);
+    return true;
+  };
+  std::vector<std::string> names(views.size());
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const std::string& name = views[i].info.name;
+    if (names_a_file(name) && take(name)) names[i] = name;
+  }
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (!names[i].empty()) continue;
+    names[i] = "view_" + std::to_string(views[i].view.value) + ".png";
+    while (!take(names[i])) names[i].insert(0, "_");
+  }
+  return names;
+}
+
+/// Options as the sections of a --config file.
+class OptionText final : public OptionVisitor {
+ public:
+  void visit(const OptionInfo& info, int& value) override { add(info, std::to_string(value)); }
+  void visit(const OptionInfo& info, double& value) override { add(info, to_text(value)); }
+  void visit(const OptionInfo& info, bool& value) override { add(info, value ? "true" : "false"); }
+  void visit(const OptionInfo& info, std::span<const std::string_view> choices,
+             int& value) override {
+    add(info, "\"" + std::string(choices[static_cast<std::size_t>(value)]) + "\"");
+  }
+  template <class Options>
+  void section(const std::string& name, Options options) {
+    text += "[" + name + "]\n";
+    visit_options(options, *this);
+  }
+  std::string text;
+
+ private:
+  void add(const OptionInfo& info, const std::string& value) {
+    text += std::string(info.name) + " = " + value + "\n";
+  }
+};
+
+/// NumPy's format 1.0: whole numbers of 8 bit, views x (magnitudes, phases) x components x rows.
+std::vector<std::uint8_t> signature_array(const VisualMemory& memory) {
+  const SignatureShape shape = memory.shape();
+  std::string head = "{'descr': '|u1', 'fortran_order': False, 'shape': (" +
+                     std::to_string(memory.size()) + ", 2, " + std::to_string(shape.components) +
+                     ", " + std::to_string(shape.rows) + "), }";
+  constexpr std::size_t before = 10;
+  head.append(63 - (before + head.size()) % 64, ' ').push_back('\n');
+  std::vector<std::uint8_t> bytes{0x93, 'N', 'U', 'M', 'P', 'Y', 1, 0};
+  bytes.push_back(static_cast<std::uint8_t>(head.size() & 255U));
+  bytes.push_back(static_cast<std::uint8_t>(head.size() >> 8U));
+  bytes.insert(bytes.end(), head.begin(), head.end());
+  for (const ViewId view : memory.views()) {
+    const PackedSignature signature = memory.packed(view);
+    bytes.insert(bytes.end(), signature.magnitudes.begin(), signature.magnitudes.end());
+    bytes.insert(bytes.end(), signature.phases.begin(), signature.phases.end());
+  }
+  return bytes;
+}
+
+/// Leaves only what all pictures have, as a data set does.
+void write_dataset_of(Dataset dataset, MemoryExport& done) {
+  const auto all = [&](const auto& has) { return std::ranges::all_of(dataset.entries, has); };
+  done.positions = all([](const auto& e) { return e.pose.has_value(); });
+  done.headings =
+      done.positions && all([](const auto& e) { return e.pose->heading_rad.has_value(); });
+  done.stamps = all([](const auto& e) { return e.stamp_s.has_value(); });
+  for (DatasetEntry& entry : dataset.entries) {
+    if (!done.positions) entry.pose.reset();
+    if (entry.pose && !done.headings) entry.pose->heading_rad.reset();
+    if (!done.stamps) entry.stamp_s.reset();
+  }
+  write_dataset(dataset);
+}
+
+}  // namespace
+
+MemoryExport export_memory(const MemoryFile& memory, const fs::path& folder,
+                           const std::function<void()>& advance) {
+  const MemoryHeader& header = memory.header();
+  const auto views = list_views(memory);
+  if (views.empty()) throw FileError(memory.path().string(), "holds no view to export");
+  UnfinishedFolder unfinished(folder);
+  const fs::path& out = unfinished.path();
+  MemoryExport done{.views = views.size()};
+  done.enlarged = thumbnail_columns(header) < header.panorama_columns;
+
+  Dataset dataset;
+  dataset.folder = out;
+  dataset.source.layout = {.forward_column = picture_forward_column(header.panorama_columns),
+                           .elevations = header.elevations};
+  // Sampled too coarsely for the highest component, a picture would show another one.
+  const bool large_enough = thumbnail_columns(header) >= 2 * header.shape.components;
+  std::vector<std::string> files = picture_files(views);
+  std::vector<ViewId> ids;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const auto& [view, info, links, thumbnail, component] = views[i];
+    ids.push_back(view);
+    const auto picture = thumbnail && large_enough ? memory.thumbnail(view) : std::nullopt;
+    if (const auto panorama = picture ? thumbnail_panorama(*picture, header) : std::nullopt) {
+      const fs::path path = out / files[i];
+      std::error_code error;
+      fs::create_directories(path.parent_path(), error);
+      const Image enlarged = to_picture(*panorama);
+      write_png(path, enlarged.view());
+      dataset.entries.push_back({files[i], path, info.stamp_s, info.pose, std::nullopt});
+      if (files[i] != info.name) ++done.renamed;
+    } else {
+      files[i].clear();
+    }
+    if (advance) advance();
+  }
+  done.pictures = dataset.entries.size();
+
+  write_file(out / "views.csv", std::string_view(view_table(views, files)));
+  write_file(out / "signatures.npy", signature_array(memory.load(ids)));
+  OptionText options;
+  options.section("signature", SignatureOptions{.components = header.shape.components});
+  options.section("preprocessing", header.preprocessing);
+  write_file(out / "memorise.toml", std::string_view(options.text));
+  if (header.source.camera) {
+    write_camera(out / "camera.toml", {*header.source.camera, header.source.mask});
+  }
+  if (done.pictures > 0) write_dataset_of(std::move(dataset), done);
+  unfinished.finish();
+  return done;
+}
+
+}  // namespace panonav

@@ -1,0 +1,67 @@
+#include "panonav/pipeline/view_list.hpp"
+
+#include <algorithm>
+#include <map>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav/geometry/angles.hpp"
+
+namespace panonav {
+
+namespace {
+
+std::map<ViewId, std::size_t> components_of(const MemoryFile& file) {
+  const auto names = file.map_names();
+  if (names.empty()) return {};
+  const bool driven = std::ranges::find(names, "map") != names.end();
+  const auto map = file.map(driven ? "map" : names.front());
+  std::map<ViewId, std::size_t> components;
+  for (const MapNode& node : map->nodes) components[node.view] = node.component;
+  return components;
+}
+
+}  // namespace
+
+std::vector<ViewRecord> list_views(const MemoryFile& file) {
+  const VisualMemory memory = file.load();
+  const auto components = components_of(file);
+  const auto pictured = file.views_with_thumbnail();
+  std::map<ViewId, std::size_t> links;
+  for (const Link& link : memory.links()) {
+    ++links[link.a];
+    ++links[link.b];
+  }
+  std::vector<ViewRecord> views;
+  views.reserve(memory.size());
+  for (const ViewId view : memory.views()) {
+    ViewRecord& record = views.emplace_back(ViewRecord{view, memory.info(view)});
+    if (const auto found = links.find(view); found != links.end()) record.links = found->second;
+    record.thumbnail = std::ranges::binary_search(pictured, view);
+    if (const auto found = components.find(view); found != components.end()) {
+      record.component = found->second;
+    }
+  }
+  return views;
+}
+
+std::string view_table(std::span<const ViewRecord> views, std::span<const std::string> pictures) {
+  require(pictures.empty() || pictures.size() == views.size(), "pictures",
+          static_cast<double>(pictures.size()), "none, or as many as views");
+  std::string table = "id,name,x_m,y_m,heading_deg,stamp_s,links,component,thumbnail";
+  table += pictures.empty() ? "\n" : ",picture\n";
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const auto& [view, info, links, thumbnail, component] = views[i];
+    const auto& pose = info.pose;
+    table += std::to_string(view.value) + "," + csv_field(info.name) + ",";
+    table += pose ? to_text(pose->x_m) + "," + to_text(pose->y_m) + "," : ",,";
+    if (pose && pose->heading_rad) table += to_text(written_degrees(*pose->heading_rad));
+    table += "," + (info.stamp_s ? to_text(*info.stamp_s) : "") + "," + std::to_string(links) +
+             "," + (component ? std::to_string(*component) : "") + "," + (thumbnail ? "1" : "0");
+    if (!pictures.empty()) table += "," + (pictures[i].empty() ? "" : csv_field(pictures[i]));
+    table += "\n";
+  }
+  return table;
+}
+
+}  // namespace panonav

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "panonav/storage/memory_file.hpp"
+
+namespace panonav {
+
+/// What a memory file knows of a view besides its signature.
+struct ViewRecord {
+  ViewId view;
+  ReferenceInfo info;
+  std::size_t links = 0;
+  bool thumbnail = false;  ///< a picture is stored with it
+  /// The connected component of the file's map (that called `map`, else its first) that it belongs
+  /// to; empty without a map, and for views that are not in it.
+  std::optional<std::size_t> component;
+  friend bool operator==(const ViewRecord&, const ViewRecord&) = default;
+};
+
+/// All views of the file, ascending. Throws FileError on damage. Cost: that of `MemoryFile::load`.
+[[nodiscard]] std::vector<ViewRecord> list_views(const MemoryFile& file);
+
+/// The table of docs/formats.md, section "Tables of views": a header and one line for each view.
+/// `pictures`: empty, or for each view the file that holds its picture, empty where none does.
+[[nodiscard]] std::string view_table(std::span<const ViewRecord> views,
+                                     std::span<const std::string> pictures = {});
+
+}  // namespace panonav
