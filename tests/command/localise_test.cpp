@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "panonav/core/random.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
 #include "support/command_runner.hpp"
@@ -203,6 +204,86 @@ TEST_F(Localise, OneImageAsksToo) {
   EXPECT_EQ(all[0]["file"], view_name(3));
   EXPECT_EQ(all[0]["matches"], answers({memory(), asked()})[3]["matches"]);
 }
+
+TEST_F(Localise, SeveralPicturesAndATable) {
+  const std::filesystem::path folder = asked();
+  const std::string gone = folder / "gone.png";
+  const std::string broken = *folder_ / "a, \"broken\".png";
+  std::ofstream(broken) << "no picture";
+  const std::string table = *folder_ / "answers.csv";
+  const std::vector<std::string> pictures{gone, folder / view_name(3), broken,
+                                          folder / view_name(7)};
+  const auto result =
+      run_panonav(with(with({"localise", memory()}, pictures), {"-o", table, "--json"}));
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(lines(result.err).size(), 2U) << result.err;
+  EXPECT_TRUE(contains(result.err, "skipped: " + gone));
+  EXPECT_TRUE(contains(result.err, "skipped: " + broken));
+  const auto said = lines(result.out);
+  ASSERT_EQ(said.size(), 4U);
+  EXPECT_EQ(keys_of(json::parse(said[0])), (std::set<std::string>{"error", "file"}));
+  const json one = answers({memory(), pictures[1]})[0];
+  EXPECT_EQ(json::parse(said[1])["matches"], one["matches"]);
+  const auto rows = lines(bytes_of(table));
+  ASSERT_EQ(rows.size(), 5U);
+  EXPECT_EQ(rows[0],
+            "file,answer,x_m,y_m,radius_m,heading_deg,best,dissimilarity,column_difference,"
+            "turn_deg,next,next_dissimilarity,next_column_difference,error");
+  EXPECT_EQ(rows[1].find(gone + ",unreadable,,,,,,,,,,,,"), 0U) << rows[1];
+  EXPECT_EQ(rows[2].find(pictures[1] + ",known," + to_text(one["position"]["x_m"].get<double>())),
+            0U)
+      << rows[2];
+  EXPECT_TRUE(contains(rows[2], "," + one["matches"][1]["file"].get<std::string>() + ","));
+  EXPECT_TRUE(contains(rows[3], "\"\"broken\"\".png\",unreadable"));
+
+  EXPECT_TRUE(contains(refusal({"localise", memory(), gone, broken}), gone));
+  EXPECT_TRUE(contains(refusal({"localise", memory(), gone, asked()}), "is a folder"));
+}
+
+#ifdef PANONAV_COMMAND_SIMULATES
+TEST_F(Localise, TheReportShowsEachPictureAboveItsBestMatch) {
+  const std::filesystem::path report = *folder_ / "report";
+  run_well({"localise", memory(), asked(), "--report", report, "--turn-randomly", "5"});
+  const std::string page = bytes_of(report / "index.html");
+  const auto told = answers({memory(), asked(), "--turn-randomly", "5"});
+  std::size_t known = 0;
+  for (std::size_t i = 0; i < told.size(); ++i) {
+    const json& best = told[i]["matches"][0];
+    const bool is_known = told[i]["known"];
+    known += is_known ? 1 : 0;
+    const std::string title =
+        view_name(i) + ": " +
+        (is_known ? "near " + best["file"].get<std::string>() : "unknown place");
+    EXPECT_TRUE(contains(page, "<h2>" + title + "</h2>"));
+    EXPECT_TRUE(contains(page, fixed(best["column_difference"], 3)));
+    const Image picture = read_image(report / ("query_" + std::to_string(i + 1) + ".png"));
+    const int height = picture.height() / 2;
+    ASSERT_EQ(picture.height(), 2 * height);
+    if (!is_known) continue;
+    // Turned alike, both show the same things: as no other turn does.
+    const auto difference = [&](int turned) {
+      double sum = 0.0;
+      for (int v = 40; v < height; ++v) {
+        for (int u = 0; u < picture.width(); ++u) {
+          sum += std::abs(picture.at(u, v, 0) -
+                          picture.at((u + turned) % picture.width(), height + v, 0));
+        }
+      }
+      return sum;
+    };
+    for (const int turned : {150, 300, 512, 700, 870}) EXPECT_LT(difference(0), difference(turned));
+  }
+  EXPECT_GT(known, 10U);
+  EXPECT_TRUE(contains(page, "<b>" + std::to_string(known) + " of 20</b>"));
+
+  // More than are shown, and a memory that keeps no thumbnails.
+  run_well({"memorise", grid(), *folder_ / "bare.panonav", "--no-thumbnails"});
+  run_well({"localise", *folder_ / "bare.panonav", grid(), "--report", report});
+  const std::string bare = bytes_of(report / "index.html");
+  EXPECT_TRUE(contains(bare, "Shown are 20 of 25 pictures"));
+  EXPECT_TRUE(contains(bare, "the memory holds no thumbnail of the best match"));
+}
+#endif
 
 TEST_F(Localise, TextForPeopleNamesEachImage) {
   const auto result = run_panonav({"localise", memory(), asked()});

@@ -90,4 +90,18 @@ Image picture_of_homing(const std::optional<Panorama>& home, const Panorama& cur
   return image;
 }
 
+Image picture_of_views(const std::vector<Panorama>& views) {
+  int height = 0;
+  for (const Panorama& view : views) height += band_px + height_of(view);
+  Image image(width, height, 3);
+  std::fill(image.pixels().begin(), image.pixels().end(), std::uint8_t{255});
+  int top = 0;
+  for (const Panorama& view : views) {
+    paste(image, view, top + band_px);
+    mark(image, 0.0, top, grey);
+    top += band_px + height_of(view);
+  }
+  return image;
+}
+
 }  // namespace panonav::command

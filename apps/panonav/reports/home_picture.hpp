@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "panonav/core/image.hpp"
 #include "panonav/panorama/panorama.hpp"
@@ -14,5 +15,8 @@ namespace panonav::command {
 /// home panorama the current one alone.
 [[nodiscard]] Image picture_of_homing(const std::optional<Panorama>& home, const Panorama& current,
                                       const HomeVector& found, bool points);
+
+/// Panoramas one above the other, each with a grey mark straight ahead.
+[[nodiscard]] Image picture_of_views(const std::vector<Panorama>& views);
 
 }  // namespace panonav::command

@@ -1,4 +1,6 @@
 #include <cmath>
+#include <exception>
+#include <filesystem>
 #include <memory>
 #include <numbers>
 
@@ -8,9 +10,13 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/io/atomic_file.hpp"
 #include "panonav/pipeline/observation_source.hpp"
-#include "panonav/pipeline/place_recogniser.hpp"
+#include "reports/localise_report.hpp"
 #include "verbs/recording.hpp"
+#ifdef PANONAV_COMMAND_SIMULATES
+#include "reports/report_page.hpp"
+#endif
 
 namespace panonav::command {
 
@@ -18,27 +24,23 @@ namespace {
 
 struct LocaliseArguments {
   std::string memory;
-  std::string input;
+  std::vector<std::string> inputs;
   PictureArguments pictures;
   LocaliserOptions localiser;
   WantedAccuracy accuracy;
   std::optional<std::uint64_t> turn_seed;
   bool exclude_same_file = false;
   bool areas = false;
-};
-
-/// One query with everything that is said about it.
-struct Answer {
-  std::string file;
-  double turned_rad = 0.0;
-  Place place;
+  std::optional<std::string> out;
+  std::optional<std::string> report;
 };
 
 ordered_json optional_number(const std::optional<double>& value) {
   return value ? ordered_json(*value) : ordered_json();
 }
 
-ordered_json as_json(const Answer& answer, bool areas) {
+ordered_json as_json(const LocalisedQuery& answer, bool areas) {
+  if (!answer.error.empty()) return {{"file", answer.file}, {"error", answer.error}};
   const Place& found = answer.place;
   auto matches = ordered_json::array();
   for (const PlaceMatch& match : found.matches) {
@@ -75,7 +77,37 @@ ordered_json as_json(const Answer& answer, bool areas) {
   return json;
 }
 
-std::string as_text(const Answer& answer, Session& session) {
+/// One line for each picture, with the header of docs/formats.md; unknown values are empty.
+std::string as_csv(const std::vector<LocalisedQuery>& answers) {
+  std::string table =
+      "file,answer,x_m,y_m,radius_m,heading_deg,best,dissimilarity,column_difference,turn_deg,next,"
+      "next_dissimilarity,next_column_difference,error\n";
+  const auto number = [](const auto& value) { return value ? to_text(*value) : std::string(); };
+  const auto angle = [](const std::optional<double>& angle_rad) {
+    return angle_rad ? to_text(written_degrees(*angle_rad)) : std::string();
+  };
+  for (const LocalisedQuery& answer : answers) {
+    const auto& [known, matches, position, heading_rad, components, read, areas] = answer.place;
+    table += csv_field(answer.file) + (!answer.error.empty() ? ",unreadable,"
+                                       : known               ? ",known,"
+                                                             : ",unknown,");
+    table += position ? to_text(position->x_m) + "," + to_text(position->y_m) + "," +
+                            number(position->radius_m)
+                      : ",,";
+    table += "," + angle(heading_rad);
+    for (std::size_t i = 0; i < 2; ++i) {
+      const PlaceMatch* const match = i < matches.size() ? &matches[i] : nullptr;
+      table += match ? "," + csv_field(match->name) + "," + std::to_string(match->dissimilarity) +
+                           "," + to_text(match->column_difference)
+                     : ",,,";
+      if (i == 0) table += "," + (match ? angle(match->heading_rad) : "");
+    }
+    table += "," + (answer.error.empty() ? "" : csv_field(readable_line(answer.error))) + "\n";
+  }
+  return table;
+}
+
+std::string as_text(const LocalisedQuery& answer, Session& session) {
   const Place& found = answer.place;
   std::string line = answer.file + "  ";
   if (found.matches.empty()) return line + session.bad("nothing to compare with");
@@ -105,21 +137,56 @@ std::string as_text(const Answer& answer, Session& session) {
   return line;
 }
 
-Answer answer(const PlaceRecogniser& recogniser, const LocaliseArguments& wanted,
-              const DatasetEntry& entry, std::size_t index) {
-  Answer answer{entry.file, 0.0, {}};
-  Observation seen = read_observation(entry);
-  if (wanted.turn_seed) {
-    const Panorama panorama = recogniser.encoder().panorama(seen);
-    Random random(*wanted.turn_seed, index);
-    const auto columns = static_cast<std::uint64_t>(panorama.columns());
-    const auto turned = static_cast<int>(random.index(columns));
-    seen.picture = turn_columns(panorama, turned);
-    answer.turned_rad = wrap_angle(2.0 * std::numbers::pi * turned / static_cast<double>(columns));
-  }
+/// The picture as the robot sees it once it has turned, and by how much it has.
+std::pair<Observation, double> seen(const PlaceRecogniser& recogniser,
+                                    const LocaliseArguments& wanted, const DatasetEntry& entry,
+                                    std::size_t index) {
+  Observation observation = read_observation(entry);
+  if (!wanted.turn_seed) return {std::move(observation), 0.0};
+  const Panorama panorama = recogniser.encoder().panorama(observation);
+  Random random(*wanted.turn_seed, index);
+  const auto columns = static_cast<std::uint64_t>(panorama.columns());
+  const auto turned = static_cast<int>(random.index(columns));
+  observation.picture = turn_columns(panorama, turned);
+  return {std::move(observation),
+          wrap_angle(2.0 * std::numbers::pi * turned / static_cast<double>(columns))};
+}
+
+LocalisedQuery answer(const PlaceRecogniser& recogniser, const LocaliseArguments& wanted,
+                      const DatasetEntry& entry, std::size_t index) {
+  const auto [observation, turned_rad] = seen(recogniser, wanted, entry, index);
+  // Several pictures are called as they were typed.
+  const std::string name = wanted.inputs.size() > 1 ? entry.path.filename().string() : entry.file;
+  LocalisedQuery answer{entry.file, turned_rad, {}, entry.pose, ""};
   answer.place =
-      recogniser.localise(seen, std::span(&entry.file, wanted.exclude_same_file ? 1 : 0));
+      recogniser.localise(observation, std::span(&name, wanted.exclude_same_file ? 1 : 0));
   return answer;
+}
+
+/// A recording, or several pictures, of which some may be missing.
+Dataset open_queries(const LocaliseArguments& wanted, const MemoryFile& file, Session& session) {
+  const auto open = [&](const std::string& input) {
+    return open_recording(input, wanted.pictures, file.header().source, session);
+  };
+  if (wanted.inputs.size() == 1) return open(wanted.inputs.front());
+  std::error_code ignored;
+  std::optional<Dataset> queries;
+  for (const std::string& input : wanted.inputs) {
+    if (std::filesystem::is_directory(input, ignored)) {
+      throw UsageError(input +
+                       " is a folder; allowed: one data set or folder, or several pictures");
+    }
+    if (!queries && std::filesystem::exists(input, ignored)) queries = open(input);
+  }
+  if (!queries) queries = open(wanted.inputs.front());  // says that it is missing
+  queries->entries.clear();
+  for (const std::string& input : wanted.inputs) {
+    DatasetEntry entry;
+    entry.file = input;
+    entry.path = input;
+    queries->entries.push_back(std::move(entry));
+  }
+  return std::move(*queries);
 }
 
 void check(const Arguments& arguments, const LocaliseArguments& wanted,
@@ -132,46 +199,93 @@ void check(const Arguments& arguments, const LocaliseArguments& wanted,
   }
 }
 
+/// All answers, told as they come. What cannot be read is named; throws where nothing can.
+std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
+                                       const LocaliseArguments& wanted, const Dataset& recording,
+                                       Session& session) {
+  const std::size_t total = recording.entries.size();
+  Progress progress("localising", total);
+  std::vector<LocalisedQuery> answers;
+  std::size_t told = 0;
+  std::exception_ptr failure;
+  make_in_order(
+      total, session.executor(),
+      [&](std::size_t i) -> std::pair<LocalisedQuery, std::exception_ptr> {
+        const DatasetEntry& entry = recording.entries[i];
+        try {
+          return {answer(recogniser, wanted, entry, i), nullptr};
+        } catch (const FileError& error) {
+          return {{entry.file, 0.0, {}, entry.pose, error.what()}, std::current_exception()};
+        }
+      },
+      [&](std::size_t, std::pair<LocalisedQuery, std::exception_ptr>&& made) {
+        answers.push_back(std::move(made.first));
+        if (made.second && !failure) failure = made.second;
+        progress.advance();
+        if (told == 0 && made.second) return;  // it may be all that there is to say
+        progress.clear();
+        for (; told < answers.size(); ++told) {
+          const LocalisedQuery& given = answers[told];
+          if (!given.error.empty()) session.note("skipped: " + readable_line(given.error));
+          if (session.json()) {
+            session.print(json_line(as_json(given, wanted.areas)));
+          } else if (given.error.empty()) {
+            session.print(as_text(given, session));
+          }
+        }
+      });
+  if (told == 0 && failure) std::rethrow_exception(failure);
+  return answers;
+}
+
 ExitCode localise(const Arguments& arguments, const LocaliseArguments& wanted, Session& session) {
   const auto file = MemoryFile::open(wanted.memory, Access::read_only);
   check(arguments, wanted, file.header());
-  const auto recording =
-      open_recording(wanted.input, wanted.pictures, file.header().source, session);
+#ifdef PANONAV_COMMAND_SIMULATES
+  if (wanted.report) prepare_localise_report(*wanted.report);
+#endif
+  const auto recording = open_queries(wanted, file, session);
   const PlaceRecogniser recogniser(
       file, {.localiser = wanted.localiser,
              .source = recording.source,
              .areas = wanted.areas ? std::optional(wanted.accuracy) : std::nullopt});
-
-  const std::size_t total = recording.entries.size();
-  Progress progress("localising", total);
-  std::size_t known = 0;
-  constexpr std::size_t batch = 32;
-  for (std::size_t begin = 0; begin < total; begin += batch) {
-    const std::size_t count = std::min(batch, total - begin);
-    std::vector<std::optional<Answer>> answers(count);
-    for_each_entry(session.executor(), count, [&](std::size_t i) {
-      answers[i] = answer(recogniser, wanted, recording.entries[begin + i], begin + i);
+  const auto answers = answer_all(recogniser, wanted, recording, session);
+  const auto count = [&](const auto& holds) {
+    return static_cast<std::size_t>(std::ranges::count_if(answers, holds));
+  };
+  const std::size_t known = count([](const LocalisedQuery& query) { return query.place.known; });
+  const std::size_t unread =
+      count([](const LocalisedQuery& query) { return !query.error.empty(); });
+  if (wanted.out) write_file(*wanted.out, std::string_view(as_csv(answers)));
+  if (!session.json() && answers.size() > 1) {
+    session.print(
+        session.strong(std::to_string(known) + " of " + std::to_string(answers.size() - unread)) +
+        " views show a place of " + wanted.memory +
+        (unread > 0 ? "; " + std::to_string(unread) + " could not be read" : ""));
+  }
+#ifdef PANONAV_COMMAND_SIMULATES
+  if (wanted.report) {
+    write_localise_report(*wanted.report, file, recogniser, answers, [&](std::size_t i) {
+      return recogniser.encoder().panorama(seen(recogniser, wanted, recording.entries[i], i).first);
     });
-    progress.clear();
-    for (const auto& given : answers) {
-      known += given->place.known ? 1 : 0;
-      session.print(session.json() ? json_line(as_json(*given, wanted.areas))
-                                   : as_text(*given, session));
-    }
-    progress.advance(count);
+    tell_report(*wanted.report, session);
   }
-  if (!session.json() && total > 1) {
-    session.print(session.strong(std::to_string(known) + " of " + std::to_string(total)) +
-                  " views show a place of " + wanted.memory);
-  }
+#endif
   return known > 0 ? ExitCode::done : ExitCode::no_answer;
 }
 
 Run declare(Arguments& arguments) {
   auto wanted = std::make_shared<LocaliseArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file");
-  arguments.positional("INPUT", wanted->input, "Data set, folder of pictures, or one picture");
+  arguments.positionals("INPUT", wanted->inputs,
+                        "Data set, folder of pictures, or one or more pictures");
   declare_pictures(arguments, wanted->pictures);
+  arguments.option("-o,--out", wanted->out, "Write a CSV table, one line for each picture");
+#ifdef PANONAV_COMMAND_SIMULATES
+  arguments.option("--report", wanted->report,
+                   "Write a page with each picture above its best match, turned alike, into this "
+                   "folder: a new one, or that of an earlier report");
+#endif
   arguments.flag("--exclude-same-file", wanted->exclude_same_file,
                  "Leave out the reference view of the same file name (leave-one-out)");
   arguments.option("--turn-randomly", wanted->turn_seed,
@@ -189,10 +303,12 @@ Run declare(Arguments& arguments) {
 Verb localise_verb() {
   return {
       "localise", "Tell where pictures were taken and which way the robot faced",
-      "Pictures without a dataset.toml are read as those that the memory was made from. Ends with "
-      "1\n"
-      "when no picture shows a place of the memory.",
-      "  panonav localise office.panonav query_run\n"
+      "Pictures without a dataset.toml are read as those that the memory was made from. Pictures "
+      "that\n"
+      "cannot be read are named and skipped. Ends with 1 when no picture shows a place of the "
+      "memory.",
+      "  panonav localise office.panonav query_run --report answers\n"
+      "  panonav localise office.panonav one.png two.png -o answers.csv\n"
       "  panonav localise office.panonav view.png --json\n"
       "  panonav localise office.panonav office_run --exclude-same-file --turn-randomly 7 --json",
       declare};
