@@ -107,6 +107,32 @@ TEST_F(HostileNames, CatchmentReportShowsThem) {
   EXPECT_TRUE(fs::exists(report / "field.png"));
 }
 
+TEST_F(HostileNames, GalleryExportAndAnswersShowThem) {
+  const fs::path memory = folder / "m`touch run`<b>.panonav";
+  run_well({"memorise", run, memory});
+  run_well({"rename", memory, "25", "../../outside.png"});
+  const fs::path gallery = folder / "g`touch run`";
+  run_well({"gallery", memory, "-o", gallery});
+  const std::string text = text_of(gallery / "gallery.html");
+  for (std::size_t i = 0; i < 24; ++i) EXPECT_TRUE(contains(text, ": " + names[i] + ", x "));
+
+  const fs::path out = folder / "e`touch run`\n'\"<i>";
+  const auto said = answer_of({"export", memory, "-o", out, "--json"});
+  EXPECT_EQ(said["pictures"], 25);
+  EXPECT_FALSE(fs::exists(folder / "outside.png"));
+  EXPECT_FALSE(fs::exists(out.parent_path().parent_path() / "outside.png"));
+  EXPECT_EQ(said["renamed"], 2) << "the long name and the one that leads outside";
+  const fs::path again = folder / "again.panonav";
+  run_well({"memorise", out, again, "--config", out / "memorise.toml"});
+  const auto list = answer_of({"list", again, "--json"})["views"];
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(list[i]["name"], names[i]);
+
+  const fs::path report = folder / "l`touch run`";
+  run_well({"localise", memory, run, "--report", report, "-o", folder / "answers.csv"});
+  const std::string page = text_of(report / "index.html");
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_TRUE(contains(page, "<td>" + names[i] + "</td>"));
+}
+
 TEST_F(HostileNames, PicturesAndTheTrackedRunOfThem) {
   const fs::path memory = folder / "m`touch run`.panonav";
   run_well({"memorise", run, memory});

@@ -226,6 +226,10 @@ TEST_F(Kill, Forget) {
                  true);
 }
 
+TEST_F(Kill, Rename) {
+  kill_at_random({"rename"}, {view_name(3), "door"}, mapped(), true);
+}
+
 TEST_F(Kill, Prune) {
   kill_at_random({"prune"}, {"--max-difference", "0.05"}, mapped(), true);
 }

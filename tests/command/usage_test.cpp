@@ -10,10 +10,11 @@ namespace {
 std::vector<std::string> verbs() {
   return {
 #ifdef PANONAV_COMMAND_SIMULATES
-      "simulate",  "demo",     "reproduce", "evaluate", "catchment",
+      "simulate",  "demo",   "reproduce", "evaluate",     "catchment",
 #endif
-      "calibrate", "unwrap",   "memorise",  "info",     "verify",       "forget",
-      "undo",      "localise", "track",     "home",     "route record", "route follow"};
+      "calibrate", "unwrap", "memorise",  "info",         "verify",      "forget",
+      "undo",      "list",   "show",      "gallery",      "export",      "rename",
+      "localise",  "track",  "home",      "route record", "route follow"};
 }
 
 /// A verb may have two words.

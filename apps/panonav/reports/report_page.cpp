@@ -62,8 +62,7 @@ void prepare_report_folder(const std::filesystem::path& folder, std::string_view
   if (there && (!fs::is_directory(folder, error) || (!ours && !fs::is_empty(folder, error)))) {
     throw FileError(folder.string(), "is there already and was not made by panonav " +
                                          std::string(verb) +
-                                         "; allowed for --report: a new folder, or that of an "
-                                         "earlier report");
+                                         "; allowed: a new folder, or that of an earlier one");
   }
   fs::create_directories(folder, error);
   if (error) throw FileError(folder.string(), "cannot be made: " + error.message());
@@ -120,6 +119,16 @@ void ReportPage::pictures(const std::vector<ReportPicture>& pictures) {
   body_ += "</div>\n";
 }
 
+void ReportPage::thumbnails(const std::vector<ReportPicture>& pictures) {
+  body_ += "<div class=\"pictures small\">\n";
+  for (const auto& [file, caption] : pictures) {
+    const std::string image =
+        file.empty() ? "" : "<img src=\"" + escaped(file) + "\" alt=\"" + escaped(caption) + "\">";
+    body_ += "<figure>" + image + element("figcaption", caption) + "</figure>\n";
+  }
+  body_ += "</div>\n";
+}
+
 void ReportPage::link(std::string_view file, std::string_view text) {
   body_ += "<p class=\"link\"><a href=\"" + escaped(file) + "\">" + escaped(text) + "</a></p>\n";
 }
@@ -130,7 +139,7 @@ void ReportPage::commands(const std::vector<std::string>& command_lines) {
   body_ += "</pre>\n";
 }
 
-void ReportPage::write(const std::filesystem::path& folder) const {
+void ReportPage::write(const std::filesystem::path& folder, std::string_view file) const {
   std::string page = "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
   page += "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n";
   page += element("title", title_) + "\n<style>\n";
@@ -140,7 +149,7 @@ void ReportPage::write(const std::filesystem::path& folder) const {
       .append("\n<p class=\"lead\">" + escaped(lead_) + "</p>\n");
   if (!overview_.empty()) page += "<nav class=\"figures\">\n" + overview_ + "</nav>\n";
   page.append(body_).append("</body>\n</html>\n");
-  write_file(folder / "index.html", std::string_view(page));
+  write_file(folder / file, std::string_view(page));
 }
 
 void tell_report(const std::filesystem::path& folder, Session& session) {

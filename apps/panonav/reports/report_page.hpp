@@ -41,13 +41,16 @@ class ReportPage {
              const std::vector<std::vector<std::string>>& rows);
   /// Side by side where the window is wide enough.
   void pictures(const std::vector<ReportPicture>& pictures);
+  /// The same, small and with pictures in the page itself ("data:image/png;base64,..."); those
+  /// without a picture have their caption alone.
+  void thumbnails(const std::vector<ReportPicture>& pictures);
   /// A file beside the page to open: "track.html" "Play the run".
   void link(std::string_view file, std::string_view text);
   /// Command lines as typed.
   void commands(const std::vector<std::string>& command_lines);
 
-  /// Writes `folder`/index.html, whole or not at all. Throws FileError.
-  void write(const std::filesystem::path& folder) const;
+  /// Writes the page into `folder`, whole or not at all. Throws FileError.
+  void write(const std::filesystem::path& folder, std::string_view file = "index.html") const;
 
  private:
   std::string title_;

@@ -1,0 +1,109 @@
+#include <memory>
+
+#include "cli/arguments.hpp"
+#include "cli/json.hpp"
+#include "cli/session.hpp"
+#include "cli/verbs.hpp"
+#include "panonav/pipeline/memory_export.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+struct ExportArguments {
+  std::string memory;
+  std::string out;
+};
+
+std::string lost_columns(const MemoryExport& done) {
+  std::string lost;
+  for (const auto& [is_there, what] : {std::pair{done.positions, "positions"},
+                                       {done.headings, "headings"},
+                                       {done.stamps, "stamps"}}) {
+    if (!is_there) lost += (lost.empty() ? "" : ", ") + std::string(what);
+  }
+  return lost;
+}
+
+void tell(const MemoryExport& done, const MemoryFile& memory, const std::string& out,
+          Session& session) {
+  const auto info = memory.info();
+  session.print(session.strong(std::to_string(done.views)) + " views of " + memory.path().string() +
+                " in " + out +
+                ": names, poses and stamps in views.csv, signatures in signatures.npy");
+  if (done.pictures == 0) {
+    session.print(
+        info.thumbnails == 0
+            ? "No pictures: the memory holds no thumbnails. memorise cannot take this back."
+            : "No pictures: the thumbnails are too small for the memory's " +
+                  std::to_string(memory.header().shape.components) +
+                  " components, or are not panonav's. memorise cannot take this back.");
+    return;
+  }
+  session.print("A data set of " + std::to_string(done.pictures) + " pictures, the thumbnails" +
+                (done.enlarged ? ", enlarged to the size of the memory's panoramas: fine detail is "
+                                 "lost, and signatures differ a little from the memory's"
+                               : "") +
+                ".");
+  if (done.pictures < done.views) {
+    session.print(std::to_string(done.views - done.pictures) +
+                  " views without a thumbnail are not in it.");
+  }
+  if (done.renamed > 0) {
+    session.print(std::to_string(done.renamed) +
+                  " pictures are not named as their views, whose names cannot be those of files; "
+                  "views.csv has both.");
+  }
+  const std::string lost = lost_columns(done);
+  if (!lost.empty()) {
+    session.print("Not in the data set, as not every view has them: " + lost +
+                  "; those that are known are in views.csv.");
+  }
+  const bool more = info.links + info.maps + info.routes > 0;
+  if (more) session.print("Links, maps and routes are not exported.");
+  session.print("Back again: panonav memorise " + out + " NEW.panonav --config " + out +
+                "/memorise.toml");
+}
+
+ExitCode export_all(const ExportArguments& wanted, Session& session) {
+  const auto memory = MemoryFile::open(wanted.memory, Access::read_only);
+  Progress progress("exporting", static_cast<std::size_t>(memory.info().views));
+  const MemoryExport done = export_memory(memory, wanted.out, [&] { progress.advance(); });
+  progress.clear();
+  if (!session.json()) {
+    tell(done, memory, wanted.out, session);
+    return ExitCode::done;
+  }
+  session.print(json_line(ordered_json{{"memory", wanted.memory},
+                                       {"folder", wanted.out},
+                                       {"views", done.views},
+                                       {"pictures", done.pictures},
+                                       {"renamed", done.renamed},
+                                       {"enlarged", done.enlarged},
+                                       {"positions", done.positions},
+                                       {"headings", done.headings},
+                                       {"stamps", done.stamps}}));
+  return ExitCode::done;
+}
+
+Run declare(Arguments& arguments) {
+  auto wanted = std::make_shared<ExportArguments>();
+  arguments.positional("MEMORY", wanted->memory, "Memory file");
+  arguments.required_option("-o,--out", wanted->out, "Folder to write: a new or an empty one");
+  return [wanted](Session& session) { return export_all(*wanted, session); };
+}
+
+}  // namespace
+
+Verb export_verb() {
+  return {
+      "export", "Write views, poses, thumbnails and signatures of a memory as a data set",
+      "Thumbnails are all that a memory keeps of its pictures; they become panoramas of the\n"
+      "memory's size, which memorise takes back. views.csv and signatures.npy hold all views as\n"
+      "they are. Links, maps and routes are not exported. The folder appears whole or not at all.",
+      "  panonav export office.panonav -o office_views\n"
+      "  panonav memorise office_views again.panonav --config office_views/memorise.toml",
+      declare};
+}
+
+}  // namespace panonav::command

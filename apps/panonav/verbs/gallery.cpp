@@ -1,0 +1,202 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <memory>
+
+#include "cli/json.hpp"
+#include "cli/session.hpp"
+#include "cli/verbs.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/io/image_file.hpp"
+#include "reports/report_page.hpp"
+#include "verbs/view_selection.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* page_name = "gallery.html";
+/// A page with more pictures than these is slow to open; --name and --near choose others.
+constexpr std::size_t max_views = 2000;
+
+struct GalleryArguments {
+  std::string memory;
+  std::string out;
+  ViewSelection selection;
+};
+
+/// Views that are shown under one title.
+using Groups = std::vector<std::pair<std::string, std::vector<ViewRecord>>>;
+
+std::string span_text(double index, double side_m) {
+  return short_number(index * side_m) + " to " + short_number((index + 1.0) * side_m) + " m";
+}
+
+/// Squares of the plane with eight views each or more in the mean, row by row from the upper left
+/// as on a map.
+Groups squares_of(const std::vector<ViewRecord>& views, const std::string& prefix) {
+  std::map<std::pair<double, double>, std::vector<ViewRecord>> squares;
+  double side_m = 0.0;
+  for (const double wanted_m : {0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0, 1e6, 1e300}) {
+    squares.clear();
+    side_m = wanted_m;
+    for (const ViewRecord& view : views) {
+      const auto& pose = *view.info.pose;
+      squares[{-std::floor(pose.y_m / side_m), std::floor(pose.x_m / side_m)}].push_back(view);
+    }
+    if (views.size() >= 8 * squares.size() || squares.size() == 1) break;
+  }
+  Groups groups;
+  for (auto& [place, members] : squares) {
+    groups.emplace_back(
+        prefix + "x " + span_text(place.second, side_m) + ", y " + span_text(-place.first, side_m),
+        std::move(members));
+  }
+  return groups;
+}
+
+/// By the folder in their names, by the component of the map, then by place.
+Groups grouped(const std::vector<ViewRecord>& views) {
+  std::map<std::string, std::pair<std::vector<ViewRecord>, std::vector<ViewRecord>>> areas;
+  const bool parts = std::ranges::any_of(views, [](const auto& v) { return v.component > 0U; });
+  for (const ViewRecord& view : views) {
+    const std::size_t slash = view.info.name.rfind('/');
+    std::string title = slash == std::string::npos ? "" : view.info.name.substr(0, slash) + ": ";
+    if (parts && view.component) title += "component " + std::to_string(*view.component) + ": ";
+    auto& [placed, others] = areas[title];
+    (view.info.pose ? placed : others).push_back(view);
+  }
+  Groups groups;
+  for (auto& [title, members] : areas) {
+    auto& [placed, others] = members;
+    if (!placed.empty()) std::ranges::move(squares_of(placed, title), std::back_inserter(groups));
+    if (!others.empty()) groups.emplace_back(title + "position not known", std::move(others));
+  }
+  return groups;
+}
+
+std::string base64(const std::vector<std::uint8_t>& bytes) {
+  constexpr std::string_view letters =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t three = 0;
+    for (std::size_t j = i; j < i + 3; ++j)
+      three = three << 8U | (j < bytes.size() ? bytes[j] : 0U);
+    for (std::size_t j = 0; j < 4; ++j) {
+      text += i + j <= bytes.size() ? letters[three >> (18 - 6 * j) & 63U] : '=';
+    }
+  }
+  return text;
+}
+
+/// Empty without a picture. It is decoded and written anew: a browser gets nothing else of the
+/// file.
+std::string picture_of(const MemoryFile& memory, const ViewRecord& view) {
+  const auto bytes = view.thumbnail ? memory.thumbnail(view.view) : std::nullopt;
+  if (!bytes) return "";
+  try {
+    const Image picture = decode_image(*bytes, "thumbnail", {.side_px = 4096});
+    return "data:image/png;base64," + base64(encode_png(picture.view()));
+  } catch (const FileError&) {
+    return "";
+  }
+}
+
+std::string caption_of(const ViewRecord& view, bool pictured) {
+  std::string text = std::to_string(view.view.value) + ": " + view.info.name;
+  if (const auto& pose = view.info.pose) {
+    text += ", x " + fixed(pose->x_m, 2) + " y " + fixed(pose->y_m, 2) + " m";
+    if (pose->heading_rad) text += ", " + fixed(degrees(*pose->heading_rad), 0) + "\u00b0";
+  }
+  return pictured ? text : text + "; no thumbnail";
+}
+
+ExitCode gallery(const GalleryArguments& wanted, Session& session) {
+  const auto memory = MemoryFile::open(wanted.memory, Access::read_only);
+  auto views = selected(list_views(memory), wanted.selection);
+  if (views.empty()) throw FileError(wanted.memory, "holds no such view");
+  const std::size_t found = views.size();
+  const auto pictured =
+      static_cast<std::size_t>(std::ranges::count_if(views, &ViewRecord::thumbnail));
+  if (pictured == 0) {
+    throw FileError(wanted.memory,
+                    "holds no thumbnails of these " + std::to_string(found) +
+                        " views; to get them, memorise the recording into a new memory without "
+                        "--no-thumbnails");
+  }
+  prepare_report_folder(wanted.out, page_name, "gallery");
+  views.resize(std::min(found, max_views));
+
+  ReportPage page(
+      "What " + fs::path(wanted.memory).filename().string() + " remembers",
+      "The reference views of the memory, each as the small picture that is stored "
+      "with it: all around the robot, straight ahead in the middle, left and right as "
+      "the robot sees them, the edges behind it. Below each: the view's id and name, where it was "
+      "taken and the heading.");
+  const auto placed = std::ranges::count_if(
+      views, [](const ViewRecord& view) { return view.info.pose.has_value(); });
+  page.figures({{std::to_string(views.size()), "views"},
+                {std::to_string(placed), "with a position"},
+                {std::to_string(std::min(pictured, views.size())), "with a thumbnail"}});
+  if (views.size() < found) {
+    page.text("The first " + std::to_string(views.size()) + " of " + std::to_string(found) +
+              " views; --name and --near of panonav gallery choose others.");
+  }
+  Progress progress("drawing", views.size());
+  for (const auto& [title, members] : grouped(views)) {
+    page.section(title + " (" + std::to_string(members.size()) +
+                 (members.size() == 1 ? " view)" : " views)"));
+    std::vector<ReportPicture> pictures;
+    for (const ViewRecord& view : members) {
+      std::string picture = picture_of(memory, view);
+      std::string caption = caption_of(view, !picture.empty());
+      pictures.push_back({std::move(picture), std::move(caption)});
+      progress.advance();
+    }
+    page.thumbnails(pictures);
+  }
+  page.write(wanted.out, page_name);
+  progress.clear();
+  const std::string path = (fs::path(wanted.out) / page_name).string();
+  if (session.json()) {
+    session.print(json_line(ordered_json{{"memory", wanted.memory},
+                                         {"page", path},
+                                         {"views", found},
+                                         {"shown", views.size()},
+                                         {"thumbnails", pictured}}));
+    return ExitCode::done;
+  }
+  session.print(session.strong(std::to_string(views.size())) + " of " + std::to_string(found) +
+                " views, " + std::to_string(pictured) + " with a thumbnail");
+  session.print("Open " + session.strong(path) + " in a browser.");
+  return ExitCode::done;
+}
+
+Run declare(Arguments& arguments) {
+  auto wanted = std::make_shared<GalleryArguments>();
+  arguments.positional("MEMORY", wanted->memory, "Memory file");
+  arguments.required_option("-o,--out", wanted->out,
+                            "Folder to write: a new one, or that of an earlier gallery");
+  declare_selection(arguments, wanted->selection);
+  return [wanted](Session& session) { return gallery(*wanted, session); };
+}
+
+}  // namespace
+
+Verb gallery_verb() {
+  return {
+      "gallery", "Write a page with the thumbnails of a memory",
+      "One page, gallery.html, with everything in it; it needs no network and no script. Views\n"
+      "are grouped by the folder in their names, by the component of the map and by place.\n"
+      "2000 views at most; --name and --near choose which.",
+      "  panonav gallery office.panonav -o gallery\n"
+      "  panonav gallery office.panonav -o corner --near 1,1,0.8",
+      declare};
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,146 @@
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "cli/json.hpp"
+#include "cli/session.hpp"
+#include "cli/verbs.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "verbs/view_selection.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+struct ListArguments {
+  std::string memory;
+  ViewSelection selection;
+  bool csv = false;
+};
+
+ordered_json as_json(const ViewRecord& record) {
+  const auto& [view, info, links, thumbnail, component] = record;
+  ordered_json json{{"id", view.value},      {"name", info.name},
+                    {"pose", nullptr},       {"stamp_s", or_null(info.stamp_s)},
+                    {"links", links},        {"connected_component", or_null(component)},
+                    {"thumbnail", thumbnail}};
+  if (info.pose) {
+    json["pose"] = {{"x_m", info.pose->x_m},
+                    {"y_m", info.pose->y_m},
+                    {"heading_rad", or_null(info.pose->heading_rad)}};
+  }
+  return json;
+}
+
+/// A title and what it shows of a view; empty: nothing.
+struct Column {
+  std::string title;
+  std::string (*cell)(const ViewRecord&);
+  bool text = false;  // stands at the left
+};
+
+std::size_t width_of(const std::string& text) {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
+}
+
+/// Columns in which no view has anything are left out.
+std::vector<std::string> table_of(const std::vector<ViewRecord>& views) {
+  const std::vector<Column> columns{
+      {"id", [](const ViewRecord& v) { return std::to_string(v.view.value); }},
+      {"name", [](const ViewRecord& v) { return shortened(readable_line(v.info.name), 60); }, true},
+      {"x [m]", [](const ViewRecord& v) { return v.info.pose ? fixed(v.info.pose->x_m, 2) : ""; }},
+      {"y [m]", [](const ViewRecord& v) { return v.info.pose ? fixed(v.info.pose->y_m, 2) : ""; }},
+      {"heading [deg]",
+       [](const ViewRecord& v) {
+         const auto& pose = v.info.pose;
+         return pose && pose->heading_rad ? fixed(degrees(*pose->heading_rad), 1) : "";
+       }},
+      {"stamp [s]",
+       [](const ViewRecord& v) { return v.info.stamp_s ? fixed(*v.info.stamp_s, 3) : ""; }},
+      {"links", [](const ViewRecord& v) { return v.links > 0 ? std::to_string(v.links) : ""; }},
+      {"component",
+       [](const ViewRecord& v) { return v.component ? std::to_string(*v.component) : ""; }},
+      {"thumbnail", [](const ViewRecord& v) -> std::string { return v.thumbnail ? "yes" : ""; }}};
+  std::vector<std::string> lines(views.size() + 1);
+  for (const Column& column : columns) {
+    std::vector<std::string> cells;
+    std::size_t width = 0;
+    for (const ViewRecord& view : views) {
+      width = std::max(width, width_of(cells.emplace_back(column.cell(view))));
+    }
+    if (width == 0) continue;
+    cells.insert(cells.begin(), column.title);
+    width = std::max(width, column.title.size());
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      const std::string blanks(width - width_of(cells[i]), ' ');
+      lines[i] +=
+          (lines[i].empty() ? "" : "  ") + (column.text ? cells[i] + blanks : blanks + cells[i]);
+    }
+  }
+  for (std::string& line : lines) line.erase(line.find_last_not_of(' ') + 1);
+  return lines;
+}
+
+std::string named(const std::string& what, const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + readable_line(name);
+  return names.empty() ? "" : "; " + what + ": " + text;
+}
+
+ExitCode list(const ListArguments& wanted, Session& session) {
+  if (wanted.csv && session.json()) throw UsageError("--csv and --json exclude each other");
+  const auto memory = MemoryFile::open(wanted.memory, Access::read_only);
+  const auto all = list_views(memory);
+  const auto views = selected(all, wanted.selection);
+  const ExitCode code = views.empty() ? ExitCode::no_answer : ExitCode::done;
+  if (wanted.csv) {
+    std::string table = view_table(views);
+    table.pop_back();
+    session.print(table);
+    return code;
+  }
+  const auto routes = memory.route_names();
+  const auto maps = memory.map_names();
+  if (session.json()) {
+    auto list = ordered_json::array();
+    for (const ViewRecord& view : views) list.push_back(as_json(view));
+    session.print(json_line(ordered_json{{"memory", wanted.memory},
+                                         {"views", std::move(list)},
+                                         {"routes", routes},
+                                         {"maps", maps}}));
+    return code;
+  }
+  if (!views.empty()) {
+    const auto lines = table_of(views);
+    session.print(session.strong(lines.front()));
+    for (std::size_t i = 1; i < lines.size(); ++i) session.print(lines[i]);
+  }
+  session.print(std::to_string(views.size()) +
+                (views.size() < all.size() ? " of " + std::to_string(all.size()) : "") + " views" +
+                named("routes", routes) + named("maps", maps));
+  return code;
+}
+
+Run declare(Arguments& arguments) {
+  auto wanted = std::make_shared<ListArguments>();
+  arguments.positional("MEMORY", wanted->memory, "Memory file");
+  declare_selection(arguments, wanted->selection);
+  arguments.flag("--csv", wanted->csv, "Print a table for other programs");
+  return [wanted](Session& session) { return list(*wanted, session); };
+}
+
+}  // namespace
+
+Verb list_verb() {
+  return {"list", "List the views of a memory, and its routes and maps",
+          "What the file knows of each view: id, name, position, heading, stamp, number of links,\n"
+          "connected component of its map, whether a thumbnail is stored. Ends with 1 when there\n"
+          "is no such view.",
+          "  panonav list office.panonav\n"
+          "  panonav list office.panonav --near 1,1,0.5\n"
+          "  panonav list office.panonav --name 'view_0001*' --csv",
+          declare};
+}
+
+}  // namespace panonav::command
