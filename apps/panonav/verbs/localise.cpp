@@ -137,27 +137,24 @@ std::string as_text(const LocalisedQuery& answer, Session& session) {
   return line;
 }
 
-/// The picture as the robot sees it once it has turned, and by how much it has.
-std::pair<Observation, double> seen(const PlaceRecogniser& recogniser,
-                                    const LocaliseArguments& wanted, const DatasetEntry& entry,
-                                    std::size_t index) {
-  Observation observation = read_observation(entry);
-  if (!wanted.turn_seed) return {std::move(observation), 0.0};
+/// Turns the robot as it is asked for; gives by how much.
+double turn(Observation& observation, const PlaceRecogniser& recogniser,
+            const LocaliseArguments& wanted, std::size_t index) {
+  if (!wanted.turn_seed) return 0.0;
   const Panorama panorama = recogniser.encoder().panorama(observation);
   Random random(*wanted.turn_seed, index);
   const auto columns = static_cast<std::uint64_t>(panorama.columns());
   const auto turned = static_cast<int>(random.index(columns));
   observation.picture = turn_columns(panorama, turned);
-  return {std::move(observation),
-          wrap_angle(2.0 * std::numbers::pi * turned / static_cast<double>(columns))};
+  return wrap_angle(2.0 * std::numbers::pi * turned / static_cast<double>(columns));
 }
 
 LocalisedQuery answer(const PlaceRecogniser& recogniser, const LocaliseArguments& wanted,
-                      const DatasetEntry& entry, std::size_t index) {
-  const auto [observation, turned_rad] = seen(recogniser, wanted, entry, index);
+                      const DatasetEntry& entry, Observation observation, std::size_t index) {
+  LocalisedQuery answer{
+      entry.file, turn(observation, recogniser, wanted, index), {}, entry.pose, ""};
   // Several pictures are called as they were typed.
   const std::string name = wanted.inputs.size() > 1 ? entry.path.filename().string() : entry.file;
-  LocalisedQuery answer{entry.file, turned_rad, {}, entry.pose, ""};
   answer.place =
       recogniser.localise(observation, std::span(&name, wanted.exclude_same_file ? 1 : 0));
   return answer;
@@ -212,11 +209,13 @@ std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
       total, session.executor(),
       [&](std::size_t i) -> std::pair<LocalisedQuery, std::exception_ptr> {
         const DatasetEntry& entry = recording.entries[i];
+        std::optional<Observation> seen;
         try {
-          return {answer(recogniser, wanted, entry, i), nullptr};
+          seen = read_observation(entry);
         } catch (const FileError& error) {
           return {{entry.file, 0.0, {}, entry.pose, error.what()}, std::current_exception()};
         }
+        return {answer(recogniser, wanted, entry, std::move(*seen), i), nullptr};
       },
       [&](std::size_t, std::pair<LocalisedQuery, std::exception_ptr>&& made) {
         answers.push_back(std::move(made.first));
@@ -266,7 +265,9 @@ ExitCode localise(const Arguments& arguments, const LocaliseArguments& wanted, S
 #ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) {
     write_localise_report(*wanted.report, file, recogniser, answers, [&](std::size_t i) {
-      return recogniser.encoder().panorama(seen(recogniser, wanted, recording.entries[i], i).first);
+      Observation seen = read_observation(recording.entries[i]);
+      (void)turn(seen, recogniser, wanted, i);
+      return recogniser.encoder().panorama(seen);
     });
     tell_report(*wanted.report, session);
   }
