@@ -82,27 +82,30 @@ std::string as_csv(const std::vector<LocalisedQuery>& answers) {
   std::string table =
       "file,answer,x_m,y_m,radius_m,heading_deg,best,dissimilarity,column_difference,turn_deg,next,"
       "next_dissimilarity,next_column_difference,error\n";
-  const auto number = [](const auto& value) { return value ? to_text(*value) : std::string(); };
-  const auto angle = [](const std::optional<double>& angle_rad) {
-    return angle_rad ? to_text(written_degrees(*angle_rad)) : std::string();
+  const auto add = [&table](const std::string& field) {
+    table += ',';
+    table += field;
+  };
+  const auto add_degrees = [&](const std::optional<double>& angle_rad) {
+    add(angle_rad ? to_text(written_degrees(*angle_rad)) : "");
   };
   for (const LocalisedQuery& answer : answers) {
     const auto& [known, matches, position, heading_rad, components, read, areas] = answer.place;
-    table += csv_field(answer.file) + (!answer.error.empty() ? ",unreadable,"
-                                       : known               ? ",known,"
-                                                             : ",unknown,");
-    table += position ? to_text(position->x_m) + "," + to_text(position->y_m) + "," +
-                            number(position->radius_m)
-                      : ",,";
-    table += "," + angle(heading_rad);
+    table += csv_field(answer.file);
+    add(!answer.error.empty() ? "unreadable" : known ? "known" : "unknown");
+    add(position ? to_text(position->x_m) : "");
+    add(position ? to_text(position->y_m) : "");
+    add(position && position->radius_m ? to_text(*position->radius_m) : "");
+    add_degrees(heading_rad);
     for (std::size_t i = 0; i < 2; ++i) {
       const PlaceMatch* const match = i < matches.size() ? &matches[i] : nullptr;
-      table += match ? "," + csv_field(match->name) + "," + std::to_string(match->dissimilarity) +
-                           "," + to_text(match->column_difference)
-                     : ",,,";
-      if (i == 0) table += "," + (match ? angle(match->heading_rad) : "");
+      add(match ? csv_field(match->name) : "");
+      add(match ? std::to_string(match->dissimilarity) : "");
+      add(match ? to_text(match->column_difference) : "");
+      if (i == 0) add_degrees(match ? match->heading_rad : std::nullopt);
     }
-    table += "," + (answer.error.empty() ? "" : csv_field(readable_line(answer.error))) + "\n";
+    add(answer.error.empty() ? "" : csv_field(readable_line(answer.error)));
+    table += '\n';
   }
   return table;
 }

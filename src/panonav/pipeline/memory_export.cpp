@@ -111,7 +111,7 @@ std::vector<std::string> picture_files(const std::vector<ViewRecord>& views) {
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (!names[i].empty()) continue;
     names[i] = "view_" + std::to_string(views[i].view.value) + ".png";
-    while (!take(names[i])) names[i].insert(0, "_");
+    while (!take(names[i])) names[i] += '_';
   }
   return names;
 }
@@ -124,7 +124,9 @@ class OptionText final : public OptionVisitor {
   void visit(const OptionInfo& info, bool& value) override { add(info, value ? "true" : "false"); }
   void visit(const OptionInfo& info, std::span<const std::string_view> choices,
              int& value) override {
-    add(info, "\"" + std::string(choices[static_cast<std::size_t>(value)]) + "\"");
+    std::string quoted = "\"";
+    quoted.append(choices[static_cast<std::size_t>(value)]).append("\"");
+    add(info, quoted);
   }
   template <class Options>
   void section(const std::string& name, Options options) {

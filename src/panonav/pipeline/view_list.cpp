@@ -50,16 +50,24 @@ std::string view_table(std::span<const ViewRecord> views, std::span<const std::s
           static_cast<double>(pictures.size()), "none, or as many as views");
   std::string table = "id,name,x_m,y_m,heading_deg,stamp_s,links,component,thumbnail";
   table += pictures.empty() ? "\n" : ",picture\n";
+  const auto add = [&table](const std::string& field) {
+    table += ',';
+    table += field;
+  };
   for (std::size_t i = 0; i < views.size(); ++i) {
     const auto& [view, info, links, thumbnail, component] = views[i];
     const auto& pose = info.pose;
-    table += std::to_string(view.value) + "," + csv_field(info.name) + ",";
-    table += pose ? to_text(pose->x_m) + "," + to_text(pose->y_m) + "," : ",,";
-    if (pose && pose->heading_rad) table += to_text(written_degrees(*pose->heading_rad));
-    table += "," + (info.stamp_s ? to_text(*info.stamp_s) : "") + "," + std::to_string(links) +
-             "," + (component ? std::to_string(*component) : "") + "," + (thumbnail ? "1" : "0");
-    if (!pictures.empty()) table += "," + (pictures[i].empty() ? "" : csv_field(pictures[i]));
-    table += "\n";
+    table += std::to_string(view.value);
+    add(csv_field(info.name));
+    add(pose ? to_text(pose->x_m) : "");
+    add(pose ? to_text(pose->y_m) : "");
+    add(pose && pose->heading_rad ? to_text(written_degrees(*pose->heading_rad)) : "");
+    add(info.stamp_s ? to_text(*info.stamp_s) : "");
+    add(std::to_string(links));
+    add(component ? std::to_string(*component) : "");
+    add(thumbnail ? "1" : "0");
+    if (!pictures.empty()) add(pictures[i].empty() ? "" : csv_field(pictures[i]));
+    table += '\n';
   }
   return table;
 }
