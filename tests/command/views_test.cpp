@@ -153,6 +153,30 @@ TEST_F(Views, GalleryIsOnePageWithAllThumbnails) {
   EXPECT_FALSE(fs::exists(folder / "none"));
 }
 
+TEST_F(Views, AThumbnailThatIsNoPictureReachesNoPage) {
+  {
+    auto file = MemoryFile::open(memory, Access::read_write);
+    const std::string evil = "<svg xmlns='http://www.w3.org/2000/svg' onload='alert(1)'/>";
+    const ViewId first = file.views().front();
+    file.append({.info = {.name = "</figure><script>alert(1)</script>"},
+                 .signature = file.load().packed(first),
+                 .thumbnail = {evil.begin(), evil.end()}});
+  }
+  run_well({"gallery", memory, "-o", folder / "gallery"});
+  const std::string page = bytes_of(folder / "gallery" / "gallery.html");
+  EXPECT_FALSE(contains(page, "<script"));
+  EXPECT_FALSE(contains(page, "svg"));
+  EXPECT_TRUE(contains(page, "17: &lt;/figure&gt;&lt;script&gt;alert(1)&lt;/script&gt;; no thumb"));
+  EXPECT_TRUE(contains(page, "position not known (1 view)"));
+  EXPECT_EQ(answer_of({"show", memory, "17", "--json"})["thumbnail"]["width_px"], 0);
+  EXPECT_TRUE(contains(refusal({"show", memory, "17", "-o", folder / "x.png"}), "thumbnail"));
+  const json said = answer_of({"export", memory, "-o", folder / "out", "--json"});
+  EXPECT_EQ(said["views"], 17);
+  EXPECT_EQ(said["pictures"], 16);
+  EXPECT_TRUE(contains(run_panonav({"export", memory, "-o", folder / "other"}).out,
+                       "1 views without a thumbnail are not in it."));
+}
+
 TEST_F(Views, ExportMemorisedAgainIsTheSameMemory) {
   const fs::path out = folder / "out";
   const fs::path again = folder / "again.panonav";

@@ -79,7 +79,7 @@ bool names_a_file(const std::string& name) {
   constexpr std::size_t max_bytes = 1000;
   const fs::path path(name);
   if (readable_line(name) != name || name.size() > max_bytes || path.is_absolute() ||
-      path.lexically_normal() != path || !path.has_filename() ||
+      path.lexically_normal().string() != name || !path.has_filename() ||
       std::ranges::find(own, path.begin()->string()) != own.end()) {
     return false;
   }
@@ -130,7 +130,7 @@ class OptionText final : public OptionVisitor {
   }
   template <class Options>
   void section(const std::string& name, Options options) {
-    text += "[" + name + "]\n";
+    text.append("[").append(name).append("]\n");
     visit_options(options, *this);
   }
   std::string text;
