@@ -185,10 +185,11 @@ void write_localise_report(const fs::path& folder, const MemoryFile& file,
     if (const auto error = error_m(queries[i])) errors.push_back(*error);
   }
   const double limit = recogniser.localiser().place_model().threshold;
-  ReportPage page("Where was this?",
-                  "What the robot saw, and the view of " + file.path().filename().string() +
-                      " that resembles it most, turned as the robot faced. Where both show the "
-                      "same things in the same directions, the answer is right.");
+  ReportPage page(
+      "Where was this?",
+      "What the robot saw, and the view of " + file.path().filename().string() +
+          " that resembles it most, turned as the robot faced. Where both show the "
+          "same things in the same directions, the answer is right. Grey marks: straight ahead.");
   std::vector<std::pair<std::string, std::string>> summary{
       {std::to_string(known) + " of " + std::to_string(readable.size()),
        "pictures show a known place"}};
@@ -204,8 +205,8 @@ void write_localise_report(const fs::path& folder, const MemoryFile& file,
       "0 where they are the same. A picture that differs by more than " +
       fixed(limit, 3) +
       " from all views of this memory shows an unknown place. An answer is safe where the "
-      "best match differs clearly less than that, and where the next ones lie beside it on "
-      "the map.");
+      "best match differs clearly less than that, and where the next ones were taken beside "
+      "it.");
   const std::size_t shown = std::min(max_shown, readable.size());
   if (shown < readable.size()) {
     page.text("Shown are " + std::to_string(shown) + " of " + std::to_string(readable.size()) +
