@@ -45,15 +45,13 @@ std::string answer_text(const LocalisedQuery& query) {
 }
 
 /// The picture above its best match, which is turned as the robot faced. Gives the caption.
-std::string draw_views(const fs::path& path, const MemoryFile& file, const PlaceRecogniser& asked,
-                       const Panorama& seen, const Place& place) {
+std::string draw_views(const fs::path& path, const MemoryFile& file, const Panorama& seen,
+                       const Place& place) {
   std::vector<Panorama> views{seen};
   std::string caption = "The picture.";
   if (!place.matches.empty()) {
     const PlaceMatch& best = place.matches.front();
-    const auto bytes = file.thumbnail(best.view);
-    auto remembered = bytes ? thumbnail_panorama(*bytes, asked.encoder().header()) : std::nullopt;
-    if (remembered) {
+    if (const auto remembered = thumbnail_panorama(file, best.view)) {
       const double turn_rad = best.heading_rad.value_or(0.0);
       const double columns = turn_rad / (2.0 * std::numbers::pi) * remembered->columns();
       views.push_back(turn_columns(*remembered, static_cast<int>(std::lround(columns))));
@@ -220,7 +218,7 @@ void write_localise_report(const fs::path& folder, const MemoryFile& file,
     page.figures(figures_of(query));
     std::vector<ReportPicture> pictures{
         {"query_" + number,
-         draw_views(folder / ("query_" + number), file, recogniser, panorama(i), query.place)}};
+         draw_views(folder / ("query_" + number), file, panorama(i), query.place)}};
     if (draw_map(folder / ("map_" + number), recogniser.memory(), query)) {
       pictures.push_back(
           {"map_" + number,

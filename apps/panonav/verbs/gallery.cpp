@@ -74,7 +74,9 @@ Groups grouped(const std::vector<ViewRecord>& views) {
   for (auto& [title, members] : areas) {
     auto& [placed, others] = members;
     if (!placed.empty()) std::ranges::move(squares_of(placed, title), std::back_inserter(groups));
-    if (!others.empty()) groups.emplace_back(title + "position not known", std::move(others));
+    if (!others.empty())
+      groups.emplace_back((title.empty() ? "Position" : title + "position") + " not known",
+                          std::move(others));
   }
   return groups;
 }

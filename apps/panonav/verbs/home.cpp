@@ -6,7 +6,6 @@
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
-#include "panonav/io/image_file.hpp"
 #include "panonav/pipeline/homing_guide.hpp"
 #include "panonav/pipeline/named_view.hpp"
 #include "panonav/pipeline/observation_source.hpp"
@@ -70,15 +69,6 @@ std::optional<PictureSource> source_beside(const std::string& picture) {
   return read_dataset(folder.empty() ? fs::path(".") : folder).source;
 }
 
-/// For people: the small picture that the memory keeps.
-std::optional<Panorama> thumbnail_of(const MemoryFile& file, ViewId view) {
-  const auto bytes = file.thumbnail(view);
-  if (!bytes) return std::nullopt;
-  const Image picture = decode_image(*bytes, file.path().string());
-  return panorama_from_picture(picture.view(),
-                               {.forward_column = picture_forward_column(picture.width())});
-}
-
 ExitCode answer_all(const HomeArguments& wanted, const HomingGuide& guide, const Goal& goal,
                     const Dataset& recording, Session& session) {
   const std::size_t total = recording.entries.size();
@@ -137,7 +127,7 @@ ExitCode home_from_memory(const Arguments& arguments, const HomeArguments& wante
                           homing_options(arguments, wanted.homing, components), components,
                           wanted.homing.views.horizon);
   const Goal goal{guide.goal_name(), file.load({&view, 1}).info(view).pose, guide.goal(),
-                  wanted.report ? thumbnail_of(file, view) : std::nullopt};
+                  wanted.report ? thumbnail_panorama(file, view) : std::nullopt};
   return answer_all(wanted, guide, goal, recording, session);
 }
 

@@ -199,8 +199,7 @@ MemoryExport export_memory(const MemoryFile& memory, const fs::path& folder,
   for (std::size_t i = 0; i < views.size(); ++i) {
     const auto& [view, info, links, thumbnail, component] = views[i];
     ids.push_back(view);
-    const auto picture = thumbnail && large_enough ? memory.thumbnail(view) : std::nullopt;
-    if (const auto panorama = picture ? thumbnail_panorama(*picture, header) : std::nullopt) {
+    if (const auto panorama = large_enough ? thumbnail_panorama(memory, view) : std::nullopt) {
       const fs::path path = out / files[i];
       std::error_code error;
       fs::create_directories(path.parent_path(), error);

@@ -269,6 +269,11 @@ std::optional<Panorama> thumbnail_panorama(std::span<const std::uint8_t> thumbna
   }
 }
 
+std::optional<Panorama> thumbnail_panorama(const MemoryFile& file, ViewId view) {
+  const auto thumbnail = file.thumbnail(view);
+  return thumbnail ? thumbnail_panorama(*thumbnail, file.header()) : std::nullopt;
+}
+
 int thumbnail_columns(const MemoryHeader& header) noexcept {
   return header.panorama_columns / thumbnail_step(header.panorama_columns);
 }

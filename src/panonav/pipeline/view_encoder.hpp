@@ -85,6 +85,8 @@ class ViewEncoder {
 /// when the picture cannot be decoded or is of another size than thumbnails of this memory.
 [[nodiscard]] std::optional<Panorama> thumbnail_panorama(std::span<const std::uint8_t> thumbnail,
                                                          const MemoryHeader& header);
+/// That of a view of the file; empty where it has none.
+[[nodiscard]] std::optional<Panorama> thumbnail_panorama(const MemoryFile& file, ViewId view);
 /// Columns of a memory's thumbnails: its own up to 256.
 [[nodiscard]] int thumbnail_columns(const MemoryHeader& header) noexcept;
 
