@@ -1,5 +1,5 @@
 #include <algorithm>
-#include <cmath>
+#include <array>
 #include <memory>
 
 #include "cli/arguments.hpp"
@@ -10,7 +10,6 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/pipeline/named_view.hpp"
-#include "panonav/pipeline/view_list.hpp"
 
 namespace panonav::command {
 
@@ -25,169 +24,114 @@ struct ShowArguments {
 };
 
 /// Another view as seen from the one that is shown.
-struct Neighbour {
-  ViewId view;
-  std::optional<std::uint32_t> dissimilarity;
-  std::optional<double> distance_m;
-  std::string how;  ///< the kind of link, or the map's edge
-};
-
-struct Shown {
-  ViewRecord record;
-  std::uint64_t signature_bytes = 0;
-  std::vector<std::uint8_t> thumbnail;
-  ImageSize thumbnail_size;
-  std::vector<Neighbour> links, similar, near;
-  struct Node {
-    std::string map;
-    MapNode node;
-    std::size_t edges = 0;
-  };
-  std::vector<Node> nodes;
-};
-
-std::string_view kind_name(LinkKind kind) {
-  switch (kind) {
-    case LinkKind::sequence:
-      return "sequence";
-    case LinkKind::neighbour:
-      return "neighbour";
-    case LinkKind::closure:
-      return "closure";
-  }
-  return "sequence";
+ordered_json neighbour(const VisualMemory& memory, ViewId view, ViewId other) {
+  const auto& here = memory.info(view).pose;
+  const auto& there = memory.info(other).pose;
+  ordered_json json{
+      {"id", other.value}, {"name", memory.info(other).name}, {"distance_m", nullptr}};
+  if (here && there) json["distance_m"] = distance(here->position(), there->position());
+  return json;
 }
 
-Shown gather(const MemoryFile& file, const VisualMemory& memory, ViewId view) {
-  Shown shown;
-  const auto records = list_views(file);
-  shown.record = *std::ranges::find(records, view, &ViewRecord::view);
-  shown.signature_bytes = 2 * file.header().shape.size();
-  if (auto bytes = file.thumbnail(view)) {
-    shown.thumbnail = std::move(*bytes);
-    try {
-      const Image picture = decode_image(shown.thumbnail, "thumbnail");
-      shown.thumbnail_size = {picture.width(), picture.height()};
-    } catch (const FileError&) {  // shown as 0 x 0; --thumbnail says what is wrong
-    }
-  }
-  const auto& pose = shown.record.info.pose;
-  const auto neighbour = [&](ViewId other, std::string how) {
-    Neighbour made{other, std::nullopt, std::nullopt, std::move(how)};
-    const auto& there = memory.info(other).pose;
-    if (pose && there) made.distance_m = distance(pose->position(), there->position());
-    return made;
-  };
+ordered_json links_of(const VisualMemory& memory, ViewId view) {
+  constexpr std::array<const char*, 3> kinds{"sequence", "neighbour", "closure"};
+  auto links = ordered_json::array();
   for (const Link& link : memory.links()) {
     if (link.a != view && link.b != view) continue;
-    shown.links.push_back(
-        neighbour(link.a == view ? link.b : link.a, std::string(kind_name(link.kind))));
+    links.push_back(neighbour(memory, view, link.a == view ? link.b : link.a));
+    links.back()["kind"] = kinds[static_cast<std::size_t>(link.kind)];
   }
+  return links;
+}
+
+ordered_json similar_to(const VisualMemory& memory, ViewId view) {
+  auto similar = ordered_json::array();
   const auto found =
       memory.search(memory.packed(view), {.top = nearest}, {.excluded_views = {&view, 1}});
   for (const Match& match : found.matches) {
-    shown.similar.push_back(neighbour(match.view, ""));
-    shown.similar.back().dissimilarity = match.dissimilarity;
+    similar.push_back(neighbour(memory, view, match.view));
+    similar.back()["dissimilarity"] = match.dissimilarity;
   }
-  if (pose) {
-    for (const ViewId other : memory.views()) {
-      if (other != view && memory.info(other).pose) shown.near.push_back(neighbour(other, ""));
+  return similar;
+}
+
+ordered_json near_to(const VisualMemory& memory, ViewId view) {
+  std::vector<std::pair<double, ViewId>> near;
+  const auto& pose = memory.info(view).pose;
+  for (const ViewId other : memory.views()) {
+    const auto& there = memory.info(other).pose;
+    if (pose && there && other != view) {
+      near.emplace_back(distance(pose->position(), there->position()), other);
     }
-    std::ranges::stable_sort(shown.near, {}, &Neighbour::distance_m);
-    shown.near.resize(std::min<std::size_t>(shown.near.size(), nearest));
   }
+  std::ranges::sort(near);
+  auto list = ordered_json::array();
+  for (std::size_t i = 0; i < std::min<std::size_t>(near.size(), nearest); ++i) {
+    list.push_back(neighbour(memory, view, near[i].second));
+  }
+  return list;
+}
+
+ordered_json maps_with(const MemoryFile& file, ViewId view) {
+  auto maps = ordered_json::array();
   for (const std::string& name : file.map_names()) {
     const auto map = file.map(name);
     const auto node = std::ranges::find(map->nodes, view, &MapNode::view);
     if (node == map->nodes.end()) continue;
     const auto edges = std::ranges::count_if(
         map->edges, [&](const MapEdge& edge) { return edge.a == view || edge.b == view; });
-    shown.nodes.push_back({name, *node, static_cast<std::size_t>(edges)});
+    maps.push_back({{"map", name},
+                    {"connected_component", node->component},
+                    {"pose", pose_json(node->pose)},
+                    {"edges", edges}});
   }
-  return shown;
+  return maps;
 }
 
-ordered_json as_json(const std::string& path, const Shown& shown, const VisualMemory& memory) {
-  const auto& info = shown.record.info;
-  const auto list = [&](const std::vector<Neighbour>& views) {
-    auto array = ordered_json::array();
-    for (const auto& [view, dissimilarity, distance_m, how] : views) {
-      ordered_json json{{"id", view.value}, {"name", memory.info(view).name}};
-      if (!how.empty()) json["kind"] = how;
-      if (dissimilarity) json["dissimilarity"] = *dissimilarity;
-      json["distance_m"] = or_null(distance_m);
-      array.push_back(std::move(json));
-    }
-    return array;
+void tell(const ordered_json& view, Session& session) {
+  const auto number = [](const ordered_json& value, int digits) {
+    return fixed(value.get<double>(), digits);
   };
-  ordered_json json{{"memory", path},
-                    {"id", shown.record.view.value},
-                    {"name", info.name},
-                    {"pose", nullptr},
-                    {"stamp_s", or_null(info.stamp_s)},
-                    {"signature_bytes", shown.signature_bytes},
-                    {"thumbnail", nullptr},
-                    {"links", list(shown.links)},
-                    {"similar", list(shown.similar)},
-                    {"near", list(shown.near)},
-                    {"maps", ordered_json::array()}};
-  if (info.pose) {
-    json["pose"] = {{"x_m", info.pose->x_m},
-                    {"y_m", info.pose->y_m},
-                    {"heading_rad", or_null(info.pose->heading_rad)}};
+  const auto name_in = [](const ordered_json& json, const char* key) {
+    return readable_line(json[key].get<std::string>());
+  };
+  session.print(session.strong(name_in(view, "name")) + ", view " + view["id"].dump());
+  std::string place = "not known";
+  if (const auto& pose = view["pose"]; !pose.is_null()) {
+    place = "x " + number(pose["x_m"], 2) + " m, y " + number(pose["y_m"], 2) + " m";
+    const auto& heading = pose["heading_rad"];
+    if (!heading.is_null()) place += ", heading " + fixed(degrees(heading), 1) + " degrees";
   }
-  if (!shown.thumbnail.empty()) {
-    json["thumbnail"] = {{"bytes", shown.thumbnail.size()},
-                         {"width_px", shown.thumbnail_size.width},
-                         {"height_px", shown.thumbnail_size.height}};
+  session.print("  pose          " + place);
+  if (!view["stamp_s"].is_null()) {
+    session.print("  stamp         " + number(view["stamp_s"], 3) + " s");
   }
-  for (const auto& [map, node, edges] : shown.nodes) {
-    json["maps"].push_back({{"map", map},
-                            {"connected_component", node.component},
-                            {"pose", pose_json(node.pose)},
-                            {"edges", edges}});
-  }
-  return json;
-}
-
-std::string pose_text(const std::optional<ReferencePose>& pose) {
-  if (!pose) return "not known";
-  std::string text = "x " + fixed(pose->x_m, 2) + " m, y " + fixed(pose->y_m, 2) + " m";
-  if (pose->heading_rad) text += ", heading " + fixed(degrees(*pose->heading_rad), 1) + " degrees";
-  return text;
-}
-
-void tell(const Shown& shown, const VisualMemory& memory, Session& session) {
-  const auto& info = shown.record.info;
-  session.print(session.strong(readable_line(info.name)) + ", view " +
-                std::to_string(shown.record.view.value));
-  session.print("  pose          " + pose_text(info.pose));
-  if (info.stamp_s) session.print("  stamp         " + fixed(*info.stamp_s, 3) + " s");
-  session.print("  signature     " + std::to_string(shown.signature_bytes) + " bytes");
+  session.print("  signature     " + view["signature_bytes"].dump() + " bytes");
+  const auto& picture = view["thumbnail"];
   session.print("  thumbnail     " +
-                (shown.thumbnail.empty()
-                     ? std::string("none")
-                     : std::to_string(shown.thumbnail_size.width) + " x " +
-                           std::to_string(shown.thumbnail_size.height) + " px, " +
-                           std::to_string(shown.thumbnail.size()) + " bytes"));
-  const auto tell_all = [&](std::string title, const std::vector<Neighbour>& views) {
-    for (const auto& [view, dissimilarity, distance_m, how] : views) {
-      title.resize(16, ' ');
-      std::string line = title + readable_line(memory.info(view).name);
-      if (!how.empty()) line += ", " + how;
-      if (dissimilarity) line += ", dissimilarity " + std::to_string(*dissimilarity);
-      if (distance_m) line += ", " + fixed(*distance_m, 2) + " m away";
+                (picture.is_null()
+                     ? "none"
+                     : picture["width_px"].dump() + " x " + picture["height_px"].dump() + " px, " +
+                           picture["bytes"].dump() + " bytes"));
+  for (const auto& [key, title] :
+       {std::pair{"links", "links to"}, {"similar", "most similar"}, {"near", "nearest"}}) {
+    std::string begin = title;
+    for (const auto& other : view[key]) {
+      begin.resize(14, ' ');
+      std::string line = "  " + begin + name_in(other, "name");
+      if (other.contains("kind")) line += ", " + name_in(other, "kind");
+      if (other.contains("dissimilarity")) {
+        line += ", dissimilarity " + other["dissimilarity"].dump();
+      }
+      if (!other["distance_m"].is_null()) line += ", " + number(other["distance_m"], 2) + " m away";
       session.print(line);
-      title.clear();
+      begin.clear();
     }
-  };
-  tell_all("  links to", shown.links);
-  tell_all("  most similar", shown.similar);
-  tell_all("  nearest", shown.near);
-  for (const auto& [map, node, edges] : shown.nodes) {
-    session.print("  in " + readable_line(map) + ", component " + std::to_string(node.component) +
-                  ": x " + fixed(node.pose.x_m, 2) + ", y " + fixed(node.pose.y_m, 2) + ", " +
-                  std::to_string(edges) + " edges");
+  }
+  for (const auto& map : view["maps"]) {
+    session.print("  in " + name_in(map, "map") + ", component " +
+                  map["connected_component"].dump() + ": x " + number(map["pose"]["x_m"], 2) +
+                  ", y " + number(map["pose"]["y_m"], 2) + ", " + map["edges"].dump() + " edges");
   }
 }
 
@@ -195,20 +139,44 @@ ExitCode show(const ShowArguments& wanted, Session& session) {
   const auto file = MemoryFile::open(wanted.memory, Access::read_only);
   const ViewId view = named_view(file, wanted.view);
   const VisualMemory memory = file.load();
-  const Shown shown = gather(file, memory, view);
-  if (wanted.thumbnail) {
-    if (shown.thumbnail.empty()) {
-      throw FileError(wanted.memory, "holds no thumbnail of " + readable_line(wanted.view) +
-                                         "; memorise keeps them unless told --no-thumbnails");
+  const ReferenceInfo& info = memory.info(view);
+  ordered_json shown{{"memory", wanted.memory},
+                     {"id", view.value},
+                     {"name", info.name},
+                     {"pose", nullptr},
+                     {"stamp_s", or_null(info.stamp_s)},
+                     {"signature_bytes", 2 * file.header().shape.size()},
+                     {"thumbnail", nullptr},
+                     {"links", links_of(memory, view)},
+                     {"similar", similar_to(memory, view)},
+                     {"near", near_to(memory, view)},
+                     {"maps", maps_with(file, view)}};
+  if (const auto& pose = info.pose) {
+    shown["pose"] = {
+        {"x_m", pose->x_m}, {"y_m", pose->y_m}, {"heading_rad", or_null(pose->heading_rad)}};
+  }
+  const auto bytes = file.thumbnail(view);
+  if (!bytes && wanted.thumbnail) {
+    throw FileError(wanted.memory, "holds no thumbnail of " + readable_line(wanted.view) +
+                                       "; memorise keeps them unless told --no-thumbnails");
+  }
+  if (bytes) {
+    std::optional<Image> picture;
+    try {
+      picture = decode_image(*bytes, "thumbnail of " + readable_line(info.name));
+    } catch (const FileError&) {
+      if (wanted.thumbnail) throw;
     }
-    const Image picture = decode_image(shown.thumbnail, "thumbnail");
-    write_png(*wanted.thumbnail, picture.view());
+    if (wanted.thumbnail) write_png(*wanted.thumbnail, picture->view());
+    shown["thumbnail"] = {{"bytes", bytes->size()},
+                          {"width_px", picture ? picture->width() : 0},
+                          {"height_px", picture ? picture->height() : 0}};
   }
   if (session.json()) {
-    session.print(json_line(as_json(wanted.memory, shown, memory)));
+    session.print(json_line(shown));
     return ExitCode::done;
   }
-  tell(shown, memory, session);
+  tell(shown, session);
   if (wanted.thumbnail) session.print("Thumbnail written to " + *wanted.thumbnail);
   return ExitCode::done;
 }
