@@ -79,9 +79,9 @@ void visit_options(HomingSurveyOptions& options, OptionVisitor& visitor) {
   constexpr OptionTable table{
       option<&T::typical_distance_m>("distance of things: what a home vector of length 1 is worth",
                                      1e-3, 1e3),
-      option<&T::max_step_m>("the robot takes a new view after this way at most", 1e-3, 1e3)
-          .formerly("longest_step_m"),
-      option<&T::obstacle_m>("a step that ends farther from all places stops the run", 1e-3, 1e3),
+      option<&T::max_step_m>("longest way between two views", 1e-3, 1e3).formerly("longest_step_m"),
+      option<&T::obstacle_m>("distance from all places beyond which a step stops the run", 1e-3,
+                             1e3),
       option<&T::max_steps>("steps after which a run stops", 1, 1e6).formerly("most_steps"),
   };
   table.visit(options, visitor);

@@ -274,7 +274,7 @@ TEST_F(RouteVerbs, WrongUseIsRefused) {
   EXPECT_TRUE(
       contains(refusal({"route", "record", folder_ / "teach", memory, "--horizon-rows", "2-1"}),
                "FIRST-LAST"));
-  const auto help = run_panonav({"route", "record", "--help"});
+  const auto help = run_panonav({"route", "record", "--help-all"});
   EXPECT_EQ(help.exit_code, 0);
   EXPECT_TRUE(contains(help.out, "--half-band-rad"));
   run_well({"route", "--help"});

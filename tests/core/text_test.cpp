@@ -30,5 +30,22 @@ TEST(Shortened, LeavesOutTheMiddleAndCutsNoCharacter) {
             "\xC3\xA4\xC3\xA4\xC3\xA4\xC3\xA4\xC3\xA4\xC3\xA4\xC3\xA4\xC3\xA4");
 }
 
+TEST(DidYouMean, ProposesTheNearestNameAndNothingFar) {
+  const std::vector<std::string_view> names{"--grid", "--random", "--random-turn"};
+  EXPECT_EQ(did_you_mean("--gird", names), " (did you mean '--grid'?)");
+  EXPECT_EQ(did_you_mean("--rnadom", names), " (did you mean '--random'?)");
+  EXPECT_EQ(did_you_mean("--rand", names), " (did you mean '--random'?)") << "its beginning";
+  EXPECT_EQ(did_you_mean("--xyzw", names), "");
+  EXPECT_EQ(did_you_mean("", names), "");
+  EXPECT_EQ(did_you_mean(std::string(100000, 'a'), names), "");
+}
+
+TEST(ShellQuoted, LeavesPlainWordsAndQuotesTheRest) {
+  EXPECT_EQ(shell_quoted("runs/a-1.png"), "runs/a-1.png");
+  EXPECT_EQ(shell_quoted(""), "''");
+  EXPECT_EQ(shell_quoted("a b"), "'a b'");
+  EXPECT_EQ(shell_quoted("it's $HOME"), "'it'\\''s $HOME'");
+}
+
 }  // namespace
 }  // namespace panonav::testing

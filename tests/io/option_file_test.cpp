@@ -87,7 +87,8 @@ TEST_F(OptionFiles, FaultsNameFileSectionFieldAndRange) {
     EXPECT_EQ(message.rfind(path.string() + ": ", 0), 0U) << message;
     EXPECT_TRUE(contains(message, part));
   };
-  expect_fault("counts = 7", "[sample] counts is not a known field; known: count, ");
+  expect_fault("counts = 7",
+               "[sample] counts is not a known field (did you mean 'count'?); known: count, ");
   expect_fault("count = 0", "[sample] count is 0; allowed: >= 1 and <= 10");
   expect_fault("count = 99999999999", "[sample] count is 99999999999; allowed: >= 1 and <= 10");
   expect_fault("count = 2.5", "[sample] count is 2.5; allowed: a whole number");
@@ -105,7 +106,7 @@ TEST_F(OptionFiles, FaultsNameFileSectionFieldAndRange) {
   EXPECT_TRUE(contains(message_of<FileError>([&] {
                          file.require_sections(std::array<std::string_view, 1>{"sample"});
                        }),
-                       "[smaple] is not a known section; known: sample"));
+                       "[smaple] is not a known section (did you mean 'sample'?); known: sample"));
 }
 
 }  // namespace

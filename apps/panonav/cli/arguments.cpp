@@ -1,23 +1,22 @@
 #include "cli/arguments.hpp"
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
 #include <deque>
+#include <filesystem>
 #include <iostream>
-#include <map>
-#include <numeric>
+#include <system_error>
 #include <utility>
 
+#include "cli/json.hpp"
 #include "cli/option_values.hpp"
+#include "cli/texts.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/io/option_file.hpp"
+#include "panonav/io/toml_fields.hpp"
 
 namespace panonav::command {
-
-struct Arguments::Parser {
-  CLI::App& app;
-};
 
 struct Arguments::Implementation {
   struct Section {
@@ -32,8 +31,9 @@ struct Arguments::Implementation {
     std::string now;
     bool value = false;
   };
-  CLI::App& app;
-  std::deque<Section> sections = {};  // a deque: the parser keeps references into it
+  std::vector<ArgumentInfo> infos = {};
+  std::vector<Take> takes = {};       ///< one for each of the infos
+  std::deque<Section> sections = {};  ///< a deque: takes keep references into it
   std::vector<Former> former = {};
 };
 
@@ -46,59 +46,9 @@ std::string flag_of(std::string_view name) {
   return flag;
 }
 
-/// Adds a flag for each member that it visits, and remembers what is typed as text.
-class FlagDeclarer final : public OptionVisitor {
- public:
-  FlagDeclarer(Arguments& arguments, CLI::App& app, std::string group, std::string prefix,
-               OptionEntries& entries)
-      : arguments_(arguments),
-        app_(app),
-        group_(std::move(group)),
-        prefix_(std::move(prefix)),
-        entries_(entries) {}
-
-  void visit(const OptionInfo& info, int& value) override {
-    declare(info, "INT", std::to_string(value), range_text(info));
-  }
-  void visit(const OptionInfo& info, double& value) override {
-    declare(info, "NUMBER", to_text(value), range_text(info));
-  }
-  void visit(const OptionInfo& info, bool& value) override {
-    declare(info, "BOOL", value ? "true" : "false", "true or false");
-  }
-  void visit(const OptionInfo& info, std::span<const std::string_view> choices,
-             int& value) override {
-    std::string all;
-    for (const auto choice : choices) all += (all.empty() ? "" : ", ") + std::string(choice);
-    declare(info, "NAME", std::string(choices[static_cast<std::size_t>(value)]), all);
-    for (std::size_t i = 0; i < info.former_choices.size(); ++i) {
-      if (info.former_choices[i].empty()) continue;
-      arguments_.formerly(flag_of(prefix_ + std::string(info.name)),
-                          std::string(info.former_choices[i]), std::string(choices[i]));
-    }
-  }
-
- private:
-  void declare(const OptionInfo& info, const std::string& type, const std::string& initial,
-               const std::string& range) {
-    auto& text = entries_[std::string(info.name)].text;
-    std::string help(info.help);
-    help += " (default " + initial;
-    if (range != "any finite number") help += "; " + range;
-    const std::string flag = flag_of(prefix_ + std::string(info.name));
-    app_.add_option(flag, text, help + ")")->type_name(type)->group(group_);
-    if (info.former.empty()) return;
-    arguments_.formerly(flag_of(prefix_ + std::string(info.former)), flag);
-  }
-  Arguments& arguments_;
-  CLI::App& app_;
-  std::string group_;
-  std::string prefix_;
-  OptionEntries& entries_;
-};
-
-int whole_number(const std::string& flag, const std::string& text, int low) {
-  int value = 0;
+template <class Number>
+Number whole_number(const std::string& flag, const std::string& text, Number low) {
+  Number value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || value < low) {
     throw UsageError(flag + " is '" + text + "'; allowed: whole numbers from " +
@@ -107,187 +57,196 @@ int whole_number(const std::string& flag, const std::string& text, int low) {
   return value;
 }
 
-/// The longest of a flag's forms, for messages.
-std::string long_form(const std::string& flag) {
-  return flag.substr(flag.rfind(',') + 1);
+/// The longest of a flag's forms: "--out" of "-o,--out FILE".
+std::string long_form(const std::string& declared) {
+  const std::string forms = declared.substr(0, declared.find(' '));
+  return forms.substr(forms.rfind(',') + 1);
 }
 
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i + 1;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t changed = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({changed, row[j] + 1, row[j + 1] + 1});
-    }
-  }
-  return row.back();
-}
-
-/// "route record": a verb of two words; the second one is empty where there is none.
-std::pair<std::string_view, std::string_view> words_of(const Verb& verb) {
-  const std::size_t blank = verb.name.find(' ');
-  if (blank == std::string_view::npos) return {verb.name, {}};
-  return {verb.name.substr(0, blank), verb.name.substr(blank + 1)};
-}
-
-/// All verbs of two words that begin with this one, with commas between.
-std::string verbs_beginning_with(std::span<const Verb> verbs, std::string_view first) {
+template <class Texts>
+std::string listed(const Texts& texts) {
   std::string all;
-  for (const auto& verb : verbs) {
-    const auto words = words_of(verb);
-    if (words.first != first || words.second.empty()) continue;
-    all += (all.empty() ? "" : ", ") + std::string(verb.name);
-  }
+  for (const auto& text : texts) all += (all.empty() ? "" : ", ") + std::string(text);
   return all;
 }
 
-std::string unknown_verb(std::span<const Verb> verbs, const std::string& typed) {
-  std::string message = "'" + typed + "' is no verb";
-  for (const auto& verb : verbs) {
-    if (edit_distance(typed, verb.name) <= 2) {
-      return message + "; did you mean '" + std::string(verb.name) + "'?";
-    }
-  }
-  return message;
+/// "route record": a verb of two words; the second one is empty where there is none.
+std::pair<std::string_view, std::string_view> words_of(std::string_view verb) {
+  const std::size_t blank = verb.find(' ');
+  if (blank == std::string_view::npos) return {verb, {}};
+  return {verb.substr(0, blank), verb.substr(blank + 1)};
 }
 
-/// With what was typed that is no option: the parser looks for missing arguments first, and a
-/// misspelt flag is often why one is missing.
-std::string one_line(const CLI::ParseError& error, const CLI::App& app) {
-  std::string text = error.what();
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  while (!text.empty() && (text.back() == ' ' || text.back() == '.')) text.pop_back();
-  if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) return text;
-  std::string unknown;
-  for (const auto& typed : app.remaining(true)) {
-    if (typed.starts_with("-")) unknown += (unknown.empty() ? "" : ", ") + typed;
+/// All verbs of two words that begin with this one.
+std::vector<std::string_view> verbs_beginning_with(std::span<const Verb> verbs,
+                                                   std::string_view first) {
+  std::vector<std::string_view> found;
+  for (const auto& verb : verbs) {
+    const auto words = words_of(verb.name);
+    if (words.first == first && !words.second.empty()) found.push_back(verb.name);
   }
-  return unknown.empty() ? text : "no such option: " + unknown + "; and " + text;
+  return found;
+}
+
+bool asks_for_help(std::string_view word) {
+  return word == "-h" || word == "--help" || word == "--help-all";
+}
+
+/// Neither a positional nor a number below 0.
+bool looks_like_flag(std::string_view word) {
+  return word.size() > 1 && word.front() == '-' && word != "--" &&
+         std::string_view("0123456789.").find(word[1]) == std::string_view::npos;
+}
+
+bool is_memory_file(const std::string& word) {
+  std::error_code ignored;
+  return word.ends_with(".panonav") && !std::filesystem::is_directory(word, ignored);
 }
 
 }  // namespace
 
-Arguments::Arguments(Parser& parser)
-    : implementation_(std::make_unique<Implementation>(Implementation{parser.app})) {}
+Arguments::Arguments() : implementation_(std::make_unique<Implementation>()) {}
 Arguments::~Arguments() = default;
 
-void Arguments::positional(const std::string& name, std::string& value, const std::string& help) {
-  implementation_->app.add_option(name, value, help)->required()->type_name("");
+ArgumentInfo& Arguments::add(const std::string& declared, const std::string& value,
+                             const std::string& help, Take take) {
+  ArgumentInfo info;
+  info.name = long_form(declared);
+  const std::size_t comma = declared.find(',');
+  if (comma < declared.find(' ')) info.short_form = declared.substr(0, comma);
+  const std::size_t blank = declared.find(' ');
+  info.value = blank == std::string::npos ? value : declared.substr(blank + 1);
+  info.help = help;
+  implementation_->takes.push_back(std::move(take));
+  return implementation_->infos.emplace_back(std::move(info));
+}
+
+void Arguments::positional(const std::string& name, std::string& value, const std::string& help,
+                           std::vector<std::string> choices) {
+  auto& info = add(name, "", help, [&value](auto words) { value = words.front(); });
+  info.required = true;
+  info.choices = std::move(choices);
 }
 
 void Arguments::positionals(const std::string& name, std::vector<std::string>& values,
                             const std::string& help) {
-  implementation_->app.add_option(name, values, help)->required()->type_name("");
+  optional_positionals(name, values, help);
+  implementation_->infos.back().required = true;
+}
+
+void Arguments::optional_positionals(const std::string& name, std::vector<std::string>& values,
+                                     const std::string& help, std::vector<std::string> choices) {
+  auto& info =
+      add(name, "", help, [&values](auto words) { values.assign(words.begin(), words.end()); });
+  info.repeated = true;
+  info.choices = std::move(choices);
 }
 
 void Arguments::option(const std::string& flag, std::string& value, const std::string& help) {
-  implementation_->app.add_option(flag, value, help)->type_name("TEXT");
+  add(flag, "TEXT", help, [&value](auto words) { value = words.front(); }).initial = value;
 }
 
 void Arguments::required_option(const std::string& flag, std::string& value,
                                 const std::string& help) {
-  implementation_->app.add_option(flag, value, help)->type_name("FILE")->required();
+  add(flag, "FILE", help, [&value](auto words) { value = words.front(); }).required = true;
 }
 
 void Arguments::option(const std::string& flag, std::optional<std::string>& value,
                        const std::string& help) {
-  implementation_->app.add_option(flag, value, help)->type_name("TEXT");
+  add(flag, "TEXT", help, [&value](auto words) { value = words.front(); });
 }
 
 void Arguments::option(const std::string& flag, std::optional<std::uint64_t>& value,
                        const std::string& help) {
-  const std::string name = long_form(flag);
-  implementation_->app
-      .add_option_function<std::string>(
-          flag,
-          [&value, name](const std::string& text) {
-            std::uint64_t number = 0;
-            const auto [end, error] =
-                std::from_chars(text.data(), text.data() + text.size(), number);
-            if (error != std::errc() || end != text.data() + text.size()) {
-              throw UsageError(name + " is '" + text + "'; allowed: whole numbers from 0");
-            }
-            value = number;
-          },
-          help)
-      ->type_name("INT");
+  add(flag, "INT", help, [&value, name = long_form(flag)](auto words) {
+    value = whole_number<std::uint64_t>(name, words.front(), 0);
+  }).range = "from 0";
 }
 
 void Arguments::option(const std::string& flag, std::optional<double>& value,
                        const std::string& help) {
-  const std::string name = long_form(flag);
-  implementation_->app
-      .add_option_function<std::string>(
-          flag, [&value, name](const std::string& text) { value = number_from_text(name, text); },
-          help)
-      ->type_name("NUMBER");
+  add(flag, "NUMBER", help, [&value, name = long_form(flag)](auto words) {
+    value = number_from_text(name, words.front());
+  });
 }
 
 void Arguments::option(const std::string& flag, std::optional<std::pair<double, double>>& value,
                        const std::string& help) {
-  const std::string name = long_form(flag);
-  implementation_->app
-      .add_option_function<std::vector<std::string>>(
-          flag,
-          [&value, name](const std::vector<std::string>& texts) {
-            value = {number_from_text(name, texts.at(0)), number_from_text(name, texts.at(1))};
-          },
-          help)
-      ->type_size(2)
-      ->expected(1)
-      ->type_name("LOW HIGH");
+  add(flag, "LOW HIGH", help, [&value, name = long_form(flag)](auto words) {
+    value = {number_from_text(name, words[0]), number_from_text(name, words[1])};
+  });
 }
-
-namespace {
-
-/// For an int and an optional one alike.
-template <class Value>
-void add_whole_number(CLI::App& app, const std::string& flag, Value& value, int low,
-                      const std::string& help) {
-  app.add_option_function<std::string>(
-         flag,
-         [&value, name = long_form(flag), low](const std::string& text) {
-           value = whole_number(name, text, low);
-         },
-         help)
-      ->type_name("INT");
-}
-
-}  // namespace
 
 void Arguments::option(const std::string& flag, int& value, int low, const std::string& help) {
-  add_whole_number(implementation_->app, flag, value, low, help);
+  auto& info = add(flag, "INT", help, [&value, low, name = long_form(flag)](auto words) {
+    value = whole_number(name, words.front(), low);
+  });
+  info.initial = std::to_string(value);
+  info.range = "from " + std::to_string(low);
 }
 
 void Arguments::option(const std::string& flag, std::optional<int>& value, int low,
                        const std::string& help) {
-  add_whole_number(implementation_->app, flag, value, low, help);
+  add(flag, "INT", help, [&value, low, name = long_form(flag)](auto words) {
+    value = whole_number(name, words.front(), low);
+  }).range = "from " + std::to_string(low);
 }
 
 void Arguments::choice(const std::string& flag, std::optional<std::string>& value,
                        std::vector<std::string> choices, const std::string& help) {
-  const std::string name = long_form(flag);
-  std::string all;
-  for (const auto& choice : choices) all += (all.empty() ? "" : ", ") + choice;
-  implementation_->app
-      .add_option_function<std::string>(
-          flag,
-          [&value, name, all, choices = std::move(choices)](const std::string& text) {
-            if (std::find(choices.begin(), choices.end(), text) == choices.end()) {
-              throw UsageError(name + " is '" + text + "'; allowed: " + all);
-            }
-            value = text;
-          },
-          help + " (" + all + ")")
-      ->type_name("NAME");
+  auto& info = add(flag, "NAME", help, [&value, name = long_form(flag), choices](auto words) {
+    const std::string& text = words.front();
+    if (std::ranges::find(choices, text) == choices.end()) {
+      throw UsageError(name + " is '" + text + "'; allowed: " + listed(choices));
+    }
+    value = text;
+  });
+  info.choices = std::move(choices);
 }
 
 void Arguments::flag(const std::string& flag, bool& value, const std::string& help) {
-  implementation_->app.add_flag(flag, value, help);
+  add(flag, "", help, [&value](auto) { value = true; });
+}
+
+void Arguments::add_section(const std::string& section, const std::string& prefix, Visit visit,
+                            std::function<void()> check) {
+  auto& added = implementation_->sections.emplace_back(
+      Implementation::Section{section, std::move(visit), std::move(check), {}});
+  const std::string before = prefix.empty() ? "" : prefix + "_";
+  OptionLister lister([&](const ListedOption& option) {
+    auto& text = added.entries[std::string(option.info.name)].text;
+    std::string help(option.info.help);
+    // A symbol stays as it is; a word begins a line.
+    if (help.size() > 1 && help[1] >= 'a' && help[1] <= 'z' && help[0] >= 'a' && help[0] <= 'z') {
+      help[0] = static_cast<char>(help[0] - 'a' + 'A');
+    }
+    const std::string flag = flag_of(before + std::string(option.info.name));
+    auto& info =
+        add(flag, std::string(option.type), help, [&text](auto words) { text = words.front(); });
+    info.initial = option.value;
+    info.range = option.range;
+    info.choices.assign(option.choices.begin(), option.choices.end());
+    info.section = section;
+    info.common = false;
+    if (!option.info.former.empty()) {
+      formerly(flag_of(before + std::string(option.info.former)), flag);
+    }
+    for (std::size_t i = 0; i < option.info.former_choices.size(); ++i) {
+      if (option.info.former_choices[i].empty()) continue;
+      formerly(flag, std::string(option.info.former_choices[i]), std::string(option.choices[i]));
+    }
+  });
+  added.visit(lister);
+}
+
+void Arguments::set_common(std::initializer_list<std::string_view> flags, bool common) {
+  for (const auto flag : flags) {
+    const auto found = std::ranges::find(implementation_->infos, flag, &ArgumentInfo::name);
+    if (found == implementation_->infos.end()) {
+      throw std::logic_error(std::string(flag) + " is not declared");
+    }
+    found->common = common;
+  }
 }
 
 void Arguments::formerly(const std::string& former, const std::string& now) {
@@ -299,7 +258,8 @@ void Arguments::formerly(const std::string& flag, const std::string& former,
   implementation_->former.push_back({flag, former, now, true});
 }
 
-std::vector<std::string> Arguments::renamed(std::vector<std::string> typed) const {
+std::vector<std::string> Arguments::rename(std::vector<std::string>& typed) const {
+  std::vector<std::string> warnings;
   /// Whether the word is this flag, alone or with its value behind "=".
   const auto is = [](const std::string& word, const std::string& flag) {
     return word.starts_with(flag) && (word.size() == flag.size() || word[flag.size()] == '=');
@@ -329,27 +289,118 @@ std::vector<std::string> Arguments::renamed(std::vector<std::string> typed) cons
       throw UsageError(former.name + " is the former name of " + former.now +
                        "; allowed: one of the two");
     }
-    std::cerr << (former.value ? former.flag + " " : "") << former.name << " is now " << former.now
-              << '\n';
+    warnings.push_back((former.value ? former.flag + " " : "") + former.name + " is now " +
+                       former.now);
   }
-  return typed;
+  return warnings;
 }
 
-void Arguments::add_section(const std::string& section, const std::string& prefix, Visit visit,
-                            std::function<void()> check) {
-  auto& added = implementation_->sections.emplace_back(
-      Implementation::Section{section, std::move(visit), std::move(check), {}});
-  FlagDeclarer declarer(*this, implementation_->app, "Options of [" + section + "]",
-                        prefix.empty() ? "" : prefix + "_", added.entries);
-  added.visit(declarer);
+std::string Arguments::unknown_flag(const std::string& typed) const {
+  std::vector<std::string_view> names;
+  for (const auto& info : infos()) {
+    if (!info.positional()) names.emplace_back(info.name);
+  }
+  return "no such option: " + typed + did_you_mean(typed, names);
 }
 
-void Arguments::resolve(const std::optional<std::string>& config,
-                        std::span<const std::string_view> known_sections) {
+std::vector<std::string> Arguments::read(std::vector<std::string> words, std::string_view verb,
+                                         bool may_miss) {
+  auto warnings = rename(words);
+  const auto& infos = implementation_->infos;
+  const auto find = [&infos](std::string_view name) {
+    return std::ranges::find_if(infos, [&](const ArgumentInfo& info) {
+      return !info.positional() && (info.name == name || info.short_form == name);
+    });
+  };
+  std::vector<std::string> loose;
+  std::vector<bool> seen(infos.size(), false);
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const std::string& word = words[i];
+    if (word == "--") {
+      loose.insert(loose.end(), words.begin() + static_cast<std::ptrdiff_t>(i) + 1, words.end());
+      break;
+    }
+    if (!looks_like_flag(word)) {
+      loose.push_back(word);
+      continue;
+    }
+    // "--out=FILE" and "-oFILE" hold their value.
+    const bool is_long = word.starts_with("--");
+    const std::string name = word.substr(0, is_long ? word.find('=') : 2);
+    const auto found = find(name);
+    if (found == infos.end()) throw UsageError(unknown_flag(is_long ? name : word));
+    std::vector<std::string> values;
+    if (name.size() < word.size()) values.push_back(word.substr(name.size() + (is_long ? 1 : 0)));
+    const auto wanted = static_cast<std::size_t>(
+        found->value.empty() ? 0 : 1 + std::ranges::count(found->value, ' '));
+    if (values.size() > wanted) throw UsageError(found->name + " takes no value");
+    while (values.size() < wanted) {
+      if (i + 1 == words.size() || find(words[i + 1]) != infos.end()) {
+        throw UsageError(found->name + " wants a value: " + found->value);
+      }
+      values.push_back(words[++i]);
+    }
+    const auto number = static_cast<std::size_t>(found - infos.begin());
+    if (seen[number] && wanted > 0) throw UsageError(found->name + " is given twice");
+    seen[number] = true;
+    implementation_->takes[number](values);
+  }
+  take_positionals(loose, verb, may_miss);
+  for (std::size_t i = 0; i < infos.size() && !may_miss; ++i) {
+    if (infos[i].required && !infos[i].positional() && !seen[i]) {
+      throw UsageError(infos[i].name + " is required");
+    }
+  }
+  return warnings;
+}
+
+void Arguments::take_positionals(std::span<const std::string> words, std::string_view verb,
+                                 bool may_miss) {
+  const auto& infos = implementation_->infos;
+  std::vector<std::size_t> wanted;
+  for (std::size_t i = 0; i < infos.size(); ++i) {
+    if (infos[i].positional()) wanted.push_back(i);
+  }
+  // A memory file where something else belongs, and no memory in its place.
+  for (std::size_t i = 0; i < std::min(wanted.size(), words.size()); ++i) {
+    if (infos[wanted[i]].name != "MEMORY" || words[i].ends_with(".panonav")) continue;
+    const auto other = std::ranges::find_if(words, is_memory_file);
+    const auto there = static_cast<std::size_t>(other - words.begin());
+    if (other == words.end()) continue;
+    std::vector<std::string> swapped(words.begin(), words.end());
+    std::swap(swapped[i], swapped[there]);
+    std::string command = "panonav " + std::string(verb);
+    for (const auto& word : swapped) command.append(" ").append(shell_quoted(word));
+    throw UsageError("MEMORY is '" + words[i] + "' and " +
+                     infos[wanted[std::min(there, wanted.size() - 1)]].name + " is '" + *other +
+                     "': they seem to be swapped (did you mean '" + command + "'?)");
+  }
+  std::size_t next = 0;
+  for (const std::size_t i : wanted) {
+    if (next == words.size()) {
+      if (infos[i].required && !may_miss) throw UsageError(infos[i].name + " is required");
+      continue;
+    }
+    const std::size_t count = infos[i].repeated ? words.size() - next : 1;
+    implementation_->takes[i](words.subspan(next, count));
+    next += count;
+  }
+  if (next < words.size()) {
+    throw UsageError("'" + words[next] + "' is one argument too many");
+  }
+}
+
+std::vector<std::string> Arguments::resolve(
+    const std::optional<std::string>& config,
+    const std::function<std::vector<std::string>()>& sections_of_all_verbs) {
   std::optional<OptionFile> file;
   if (config) {
     file.emplace(*config);
-    file->require_sections(known_sections);
+    const auto own = sections();
+    const auto others = sections_of_all_verbs();
+    const std::vector<std::string_view> own_views(own.begin(), own.end());
+    const std::vector<std::string_view> other_views(others.begin(), others.end());
+    file->require_sections(own_views, other_views);
   }
   for (auto& section : implementation_->sections) {
     if (file) {
@@ -360,14 +411,17 @@ void Arguments::resolve(const std::optional<std::string>& config,
     section.visit(applier);
     section.check();
   }
-  if (!file) return;
-  for (const auto& warning : file->warnings()) std::cerr << warning << '\n';
+  return file ? file->warnings() : std::vector<std::string>{};
 }
 
-std::vector<std::string_view> Arguments::sections() const {
-  std::vector<std::string_view> names;
-  for (const auto& section : implementation_->sections) names.emplace_back(section.name);
+std::vector<std::string> Arguments::sections() const {
+  std::vector<std::string> names;
+  for (const auto& section : implementation_->sections) names.push_back(section.name);
   return names;
+}
+
+const std::vector<ArgumentInfo>& Arguments::infos() const {
+  return implementation_->infos;
 }
 
 bool Arguments::given(const std::string& section, const std::string& name) const {
@@ -380,114 +434,166 @@ bool Arguments::given(const std::string& section, const std::string& name) const
   return false;
 }
 
-std::string_view verb_in(std::span<const Verb> verbs, int argc, const char* const* argv) {
-  for (const auto& verb : verbs) {
-    const auto [first, second] = words_of(verb);
-    if (argc >= 2 && first == argv[1] && (second.empty() || (argc >= 3 && second == argv[2]))) {
-      return verb.name;
-    }
+std::string Arguments::config_template(std::string_view verb) const {
+  std::string text = "# Options for panonav " + std::string(verb) +
+                     " --config FILE. A line without '# ' in front sets its option;\n"
+                     "# the others show the defaults. Options on the command line win.\n";
+  for (const auto& section : implementation_->sections) {
+    text += "\n[" + section.name + "]\n";
+    OptionLister lister([&](const ListedOption& option) {
+      const std::string name(option.info.name);
+      const std::string range = option.choices.empty() ? option.range : listed(option.choices);
+      const bool is_name = option.type == "NAME";
+      text += "# " + std::string(option.info.help) + (range.empty() ? "" : " (" + range + ")") +
+              "\n" + (given(section.name, name) ? "" : "# ") + name + " = " +
+              (is_name ? toml_text(option.value) : option.value) + "\n";
+    });
+    section.visit(lister);
   }
-  return {};
+  if (implementation_->sections.empty()) {
+    text += "# This verb has no option that a file can set.\n";
+  }
+  text.pop_back();  // whoever prints it ends the line
+  return text;
 }
 
-std::optional<ParsedCommand> parse(std::span<const Verb> verbs, int argc, const char* const* argv) {
-  CLI::App app(
-      "Image-based memory for robot navigation from omnidirectional images: remembers what places "
-      "look like, and knows from that where the robot is and which way it faces.",
-      "panonav");
-  app.set_version_flag("--version", "panonav " PANONAV_VERSION, "Print the version and stop");
-  app.set_help_flag("-h,--help", "Print this help and stop");
-  app.get_formatter()->column_width(32);
-  app.get_formatter()->label("SUBCOMMAND", "VERB");
-  app.footer(
-      "panonav VERB --help shows a verb's options with an example.\n"
-      "Exit codes: 0 done, 1 no answer (lost), 2 bad input, 3 fault of the program.");
-
-  if (argc >= 2 && argv[1][0] != '-' && verb_in(verbs, argc, argv).empty()) {
-    const std::string longer = verbs_beginning_with(verbs, argv[1]);
-    if (longer.empty()) throw UsageError(unknown_verb(verbs, argv[1]));
-    if (argc < 3) {
-      throw UsageError("'" + std::string(argv[1]) + "' wants a second word: " + longer);
-    }
-    if (argv[2][0] != '-') {
-      throw UsageError("'" + std::string(argv[1]) + " " + argv[2] +
-                       "' is no verb; allowed: " + longer);
-    }
-  }
-
-  struct Declared {
-    CLI::App* app;
-    CommonArguments common;
-    std::shared_ptr<Arguments> arguments;
-    Run run;
-  };
-  std::deque<Declared> declared;
-  std::map<std::string_view, CLI::App*> first_words;
+const Verb* verb_in(std::span<const Verb> verbs, std::span<const std::string> words) {
   for (const auto& verb : verbs) {
-    const auto [first, second] = words_of(verb);
-    CLI::App* parent = &app;
-    if (!second.empty()) {
-      parent = first_words[first];
-      if (parent == nullptr) {
-        parent = app.add_subcommand(std::string(first),
-                                    "Verbs of two words: " + verbs_beginning_with(verbs, first));
-        parent->group("Verbs")->require_subcommand(1);
-        first_words[first] = parent;
-      }
+    const auto [first, second] = words_of(verb.name);
+    if (words.empty() || (first != words[0] && (verb.alias.empty() || verb.alias != words[0]))) {
+      continue;
     }
-    CLI::App* sub = parent->add_subcommand(std::string(second.empty() ? first : second),
-                                           std::string(verb.summary));
-    sub->group("Verbs");
-    auto& entry = declared.emplace_back();
-    entry.app = sub;
-    Arguments::Parser parser{*sub};
-    entry.arguments = std::make_shared<Arguments>(parser);
-    entry.run = verb.declare(*entry.arguments);
-    sub->add_flag("--json", entry.common.json, "Results as JSON on standard output");
-    sub->add_flag("--former-keys", entry.common.former_keys,
-                  "With --json: keys that have a new name have their former one, for programs that "
-                  "were written for the last version");
-    entry.arguments->option("--threads", entry.common.threads, 0,
-                            "Threads to use; 0 takes one per core (default 0)");
-    sub->add_option("--config", entry.common.config,
-                    "TOML file with a table for each group of options; flags win over it")
-        ->type_name("FILE");
-    std::string footer(verb.details);
-    if (!footer.empty()) footer += "\n\n";
-    sub->footer(footer + "Example:\n" + std::string(verb.example));
+    if (second.empty() || (words.size() > 1 && second == words[1])) return &verb;
   }
+  return nullptr;
+}
 
-  std::vector<std::string> typed(argv, argv + argc);
-  const auto asked = std::ranges::find(verbs, verb_in(verbs, argc, argv), &Verb::name);
-  if (asked != verbs.end()) {
-    typed = declared[static_cast<std::size_t>(asked - verbs.begin())].arguments->renamed(typed);
+const Verb& required_verb(std::span<const Verb> verbs, std::span<const std::string> words) {
+  if (const Verb* verb = verb_in(verbs, words)) return *verb;
+  if (words.empty()) throw UsageError("a verb is missing");
+  const auto longer = verbs_beginning_with(verbs, words[0]);
+  if (!longer.empty() && words.size() == 1) {
+    throw UsageError("'" + words[0] + "' wants a second word: " + listed(longer));
   }
-  std::vector<const char*> words;
-  for (const auto& word : typed) words.push_back(word.c_str());
-  try {
-    app.parse(argc, words.data());
-  } catch (const CLI::Success& success) {  // --help, --version
-    app.exit(success, std::cout, std::cout);
-    return std::nullopt;
-  } catch (const CLI::ParseError& error) {
-    throw UsageError(one_line(error, app));
+  const std::string typed = longer.empty() ? words[0] : words[0] + " " + words[1];
+  if (looks_like_flag(typed)) throw UsageError("no such option: " + typed + "; a verb is missing");
+  std::vector<std::string_view> names;
+  for (const auto& verb : verbs) {
+    names.push_back(verb.name);
+    if (!verb.alias.empty()) names.push_back(verb.alias);
   }
-  // One file may serve several verbs, so the sections of all of them are allowed in it.
-  std::vector<std::string_view> sections;
-  for (const auto& entry : declared) {
-    const auto more = entry.arguments->sections();
-    sections.insert(sections.end(), more.begin(), more.end());
+  if (words.size() > 1) {  // the second word is part of what was meant, or is an argument
+    const std::string both = words[0] + " " + words[1];
+    if (const auto meant = did_you_mean(both, names); !meant.empty()) {
+      throw UsageError("'" + both + "' is no verb" + meant);
+    }
   }
-  for (std::size_t i = 0; i < declared.size(); ++i) {
-    if (!declared[i].app->parsed()) continue;
-    const auto& entry = declared[i];
-    entry.arguments->resolve(entry.common.config, sections);
-    return ParsedCommand{verbs[i].name, entry.common,
-                         [arguments = entry.arguments, run = entry.run](Session& session) {
-                           return run(session);  // with its arguments still alive
-                         }};
+  throw UsageError("'" + typed + "' is no verb" +
+                   (longer.empty() ? did_you_mean(typed, names) : "; allowed: " + listed(longer)));
+}
+
+namespace {
+
+/// A verb with all that it takes; `run` refers to the arguments.
+struct Declared {
+  CommonArguments common;
+  Arguments arguments;
+  Run run;
+  std::size_t own = 0;   ///< arguments of this verb; those of every verb come behind them
+  bool ignored = false;  ///< --help is found before
+
+  [[nodiscard]] Description description(const Verb& verb) const {
+    Description description{verb, arguments.infos()};
+    for (std::size_t i = own; i < description.arguments.size(); ++i) {
+      description.arguments[i].of_every_verb = true;
+    }
+    return description;
   }
-  throw UsageError("a verb is missing");
+};
+
+std::shared_ptr<Declared> declare(const Verb& verb) {
+  auto declared = std::make_shared<Declared>();
+  auto& arguments = declared->arguments;
+  auto& common = declared->common;
+  declared->run = verb.declare(arguments);
+  declared->own = arguments.infos().size();
+  arguments.flag("--json", common.session.json, "Print results as JSON on standard output");
+  arguments.flag("-q,--quiet", common.session.quiet,
+                 "Print results and errors only: no progress, no notes, no \"Next:\"");
+  arguments.flag("-v,--verbose", common.session.verbose,
+                 "Say on standard error what is done, and how long it takes");
+  arguments.option("--threads", common.session.threads, 0, "Threads to use; 0 takes one per core");
+  arguments.option("--config FILE", common.config,
+                   "Read options from this TOML file; options typed here win over it");
+  arguments.flag("--config-template", common.config_template,
+                 "Print such a file with all options, their defaults and ranges, and stop");
+  arguments.flag("--former-keys", common.session.former_keys,
+                 "With --json: keys that have a new name have their former one, for programs that "
+                 "were written for the last version");
+  arguments.flag("-h,--help", declared->ignored, "Print a short help and stop");
+  arguments.flag("--help-all", declared->ignored, "Print the help with all options and stop");
+  arguments.uncommon({"--threads", "--config", "--config-template", "--former-keys"});
+  return declared;
+}
+
+ParsedCommand printing(std::string_view verb, std::string text) {
+  return {verb, {}, [text = std::move(text)](Session& session) {
+            session.print(text);
+            return ExitCode::done;
+          }};
+}
+
+}  // namespace
+
+Description describe(const Verb& verb) {
+  return declare(verb)->description(verb);
+}
+
+ParsedCommand parse(std::span<const Verb> verbs, std::span<const std::string> words) {
+  if (words.size() == 1 && words[0] == "--version") {
+    return printing({}, "panonav " PANONAV_VERSION);
+  }
+  if (!words.empty() && asks_for_help(words[0])) return printing({}, overview(verbs));
+  if (words.size() > 1 && asks_for_help(words[1])) {
+    const auto longer = verbs_beginning_with(verbs, words[0]);
+    if (!longer.empty()) return printing({}, "Verbs of two words: " + listed(longer));
+  }
+  const Verb& verb = required_verb(verbs, words);
+  const auto declared = declare(verb);
+  const std::size_t own_words = words_of(verb.name).second.empty() ? 1 : 2;
+  const std::vector<std::string> rest(words.begin() + static_cast<std::ptrdiff_t>(own_words),
+                                      words.end());
+  for (const auto& word : rest) {
+    if (word == "--") break;
+    if (!asks_for_help(word)) continue;
+    return printing(verb.name, help_text(declared->description(verb), word == "--help-all"));
+  }
+  const bool wants_template = std::ranges::find(rest, "--config-template") != rest.end();
+  const auto& common = declared->common;
+  const auto warn = [&](const std::vector<std::string>& warnings) {
+    for (const auto& warning : warnings) {
+      if (!common.session.quiet) std::cerr << readable_line(warning) << '\n';
+    }
+  };
+  warn(declared->arguments.read(rest, verb.name, wants_template));
+  if (common.session.quiet && common.session.verbose) {
+    throw UsageError("--quiet and --verbose exclude each other");
+  }
+  warn(declared->arguments.resolve(common.config, [&] {
+    // One file may serve several verbs, so the sections of all of them are allowed in it.
+    std::vector<std::string> sections;
+    for (const auto& other : verbs) {
+      const auto more = declare(other)->arguments.sections();
+      sections.insert(sections.end(), more.begin(), more.end());
+    }
+    return sections;
+  }));
+  if (wants_template) {
+    return printing(verb.name, declared->arguments.config_template(verb.name));
+  }
+  return {verb.name, common.session, [declared](Session& session) {
+            return declared->run(session);  // with its arguments still alive
+          }};
 }
 
 }  // namespace panonav::command

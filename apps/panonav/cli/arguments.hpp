@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <initializer_list>
 #include <memory>
 #include <optional>
 #include <span>
@@ -11,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "cli/session.hpp"
 #include "cli/verb.hpp"
 #include "panonav/core/options.hpp"
 
@@ -24,28 +26,50 @@ class UsageError : public std::runtime_error {
 
 /// What every verb takes.
 struct CommonArguments {
-  bool json = false;
-  bool former_keys = false;  ///< of JSON
-  int threads = 0;           ///< 0: one per core
+  SessionOptions session;
   std::optional<std::string> config;
+  bool config_template = false;
+};
+
+/// One argument of a verb for all that is made of it: help, completion, manual, option files.
+struct ArgumentInfo {
+  std::string name;        ///< "--cell-size-m"; of a positional "MEMORY"
+  std::string short_form;  ///< "-o", or empty
+  std::string value;       ///< what stands for its value: "FILE", "LOW HIGH"; empty: a switch
+  std::string help;
+  std::string initial;               ///< its default; empty: none, or said in `help`
+  std::string range;                 ///< of numbers; empty: any
+  std::vector<std::string> choices;  ///< all allowed values; of a positional some of them
+  std::string section;               ///< of option files; empty: not in them
+  bool of_every_verb = false;        ///< as --json
+  bool required = false;
+  bool repeated = false;  ///< a positional that takes all words that are left
+  bool common = true;     ///< shown by --help; the others by --help-all alone
+
+  [[nodiscard]] bool positional() const { return name.front() != '-'; }
 };
 
 /// The command line of one verb. Values are bound by reference and must live until the verb has
-/// run.
+/// run. A declared flag is written "--out FILE" or "-o,--out FILE": the word behind it stands for
+/// its value in texts, and FILE, FOLDER and names of data are completed as files. `--help` shows
+/// the flags that are declared one by one, `--help-all` those of options structs, too; `common` and
+/// `uncommon` tell otherwise.
 class Arguments {
  public:
-  struct Parser;  // hides the parser's header
-  explicit Arguments(Parser& parser);
+  Arguments();
   ~Arguments();
   Arguments(const Arguments&) = delete;
   Arguments& operator=(const Arguments&) = delete;
 
-  /// Required, in the order of declaration.
-  void positional(const std::string& name, std::string& value, const std::string& help);
+  /// Required, in the order of declaration. `choices` are some values to propose.
+  void positional(const std::string& name, std::string& value, const std::string& help,
+                  std::vector<std::string> choices = {});
   /// One or more; the last positional of a verb.
   void positionals(const std::string& name, std::vector<std::string>& values,
                    const std::string& help);
-  /// `flag` as typed, with its short form where there is one ("-o,--output").
+  /// The same, or none.
+  void optional_positionals(const std::string& name, std::vector<std::string>& values,
+                            const std::string& help, std::vector<std::string> choices = {});
   void option(const std::string& flag, std::string& value, const std::string& help);
   void required_option(const std::string& flag, std::string& value, const std::string& help);
   void option(const std::string& flag, std::optional<std::string>& value, const std::string& help);
@@ -74,29 +98,47 @@ class Arguments {
         [&values] { validate(values); });
   }
 
+  /// Flags declared before that `--help` shows, or leaves to `--help-all`. Throws logic_error when
+  /// there is no such flag.
+  void common(std::initializer_list<std::string_view> flags) { set_common(flags, true); }
+  void uncommon(std::initializer_list<std::string_view> flags) { set_common(flags, false); }
+
   /// `former` is what the flag `now` was called in the last version: `--help` does not show it, but
   /// it is taken, with a warning.
   void formerly(const std::string& former, const std::string& now);
   /// The same of one value of a flag.
   void formerly(const std::string& flag, const std::string& former, const std::string& now);
-  /// What was typed, with new names in the place of former ones; warns of them on standard error.
-  /// Throws UsageError when a flag is there under both names.
-  [[nodiscard]] std::vector<std::string> renamed(std::vector<std::string> typed) const;
 
   /// Whether the user gave this member by flag or file; an empty name: any member of the section.
   /// Meaningful once the verb runs.
   [[nodiscard]] bool given(const std::string& section, const std::string& name = "") const;
 
-  /// Fills the option structs once everything is typed: file first, then flags, then checks. Other
-  /// sections of the file than `known_sections` are refused.
-  void resolve(const std::optional<std::string>& config,
-               std::span<const std::string_view> known_sections);
-  [[nodiscard]] std::vector<std::string_view> sections() const;
+  /// Reads the words behind the verb into the values; with `may_miss` also where required ones are
+  /// missing. Gives warnings of former names. Throws UsageError.
+  std::vector<std::string> read(std::vector<std::string> words, std::string_view verb,
+                                bool may_miss);
+  /// Fills the option structs once all words are read: file first, then flags, then checks. Gives
+  /// warnings of former names in the file, whose sections may also be those of `other_verbs`.
+  std::vector<std::string> resolve(
+      const std::optional<std::string>& config,
+      const std::function<std::vector<std::string>()>& sections_of_all_verbs);
+  [[nodiscard]] std::vector<std::string> sections() const;
+
+  [[nodiscard]] const std::vector<ArgumentInfo>& infos() const;
+  /// An option file for this verb: what the user gave is set, all else a comment with its default.
+  [[nodiscard]] std::string config_template(std::string_view verb) const;
 
  private:
   using Visit = std::function<void(OptionVisitor&)>;
+  using Take = std::function<void(std::span<const std::string>)>;
+  ArgumentInfo& add(const std::string& declared, const std::string& value, const std::string& help,
+                    Take take);
   void add_section(const std::string& section, const std::string& prefix, Visit visit,
                    std::function<void()> check);
+  void set_common(std::initializer_list<std::string_view> flags, bool common);
+  [[nodiscard]] std::vector<std::string> rename(std::vector<std::string>& words) const;
+  [[nodiscard]] std::string unknown_flag(const std::string& typed) const;
+  void take_positionals(std::span<const std::string> words, std::string_view verb, bool may_miss);
 
   struct Implementation;
   std::unique_ptr<Implementation> implementation_;
@@ -105,17 +147,19 @@ class Arguments {
 /// A verb with its arguments filled in, ready to run.
 struct ParsedCommand {
   std::string_view verb;
-  CommonArguments common;
+  SessionOptions session;
   Run run;
 };
 
-/// Reads the command line. Empty when --help or --version was asked for and has been printed to
-/// standard output. Throws UsageError on wrong use and panonav::Error on a wrong value.
-[[nodiscard]] std::optional<ParsedCommand> parse(std::span<const Verb> verbs, int argc,
-                                                 const char* const* argv);
+/// Reads the command line; what asks for a text, such as --help, becomes a command that prints it.
+/// Throws UsageError on wrong use and panonav::Error on a wrong value.
+[[nodiscard]] ParsedCommand parse(std::span<const Verb> verbs, std::span<const std::string> words);
 
-/// The name of the verb that the command line starts with, for messages; empty when there is none.
-[[nodiscard]] std::string_view verb_in(std::span<const Verb> verbs, int argc,
-                                       const char* const* argv);
+/// The verb that the words begin with, under its name or its alias; null when there is none.
+[[nodiscard]] const Verb* verb_in(std::span<const Verb> verbs, std::span<const std::string> words);
+
+/// The same where there must be one: throws UsageError with the verb that may have been meant.
+[[nodiscard]] const Verb& required_verb(std::span<const Verb> verbs,
+                                        std::span<const std::string> words);
 
 }  // namespace panonav::command

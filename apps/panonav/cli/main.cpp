@@ -1,8 +1,11 @@
+#include <algorithm>
 #include <csignal>
 #include <filesystem>
 #include <iostream>
 #include <new>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "cli/arguments.hpp"
 #include "cli/session.hpp"
@@ -20,14 +23,13 @@ void report(std::string_view verb, std::string_view message) {
             << panonav::readable_line(message) << '\n';
 }
 
-ExitCode run(std::string_view& verb, int argc, char** argv) {
+ExitCode run(std::string_view& verb, std::span<const std::string> words) {
   const auto verbs = panonav::command::all_verbs();
-  verb = panonav::command::verb_in(verbs, argc, argv);
-  const auto command = panonav::command::parse(verbs, argc, argv);
-  if (!command) return ExitCode::done;
-  panonav::command::Session session(command->common.json, command->common.threads,
-                                    command->common.former_keys);
-  const ExitCode code = command->run(session);
+  if (const auto* known = panonav::command::verb_in(verbs, words)) verb = known->name;
+  const auto command = panonav::command::parse(verbs, words);
+  panonav::command::Session session(command.session);
+  const ExitCode code = command.run(session);
+  session.detail("done on " + std::to_string(session.executor().threads()) + " threads");
   session.finish_output();
   return code;
 }
@@ -39,7 +41,8 @@ int main(int argc, char** argv) {
   std::signal(SIGXFSZ, SIG_IGN);
   std::string_view verb;
   try {
-    return static_cast<int>(run(verb, argc, argv));
+    const std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+    return static_cast<int>(run(verb, words));
   } catch (const panonav::command::UsageError& error) {
     std::string hint = verb.empty() ? "panonav --help" : "panonav " + std::string(verb) + " --help";
     report(verb, std::string(error.what()) + "; see " + hint);

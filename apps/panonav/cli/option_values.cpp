@@ -1,9 +1,11 @@
 #include "cli/option_values.hpp"
 
+#include <array>
 #include <charconv>
 #include <cmath>
 
 #include "cli/arguments.hpp"
+#include "panonav/core/error.hpp"
 
 namespace panonav::command {
 
@@ -63,6 +65,41 @@ void TextApplier::visit(const OptionInfo& info, std::span<const std::string_view
     all += (all.empty() ? "" : ", ") + std::string(choices[i]);
   }
   refuse(info.name, *typed, all);
+}
+
+namespace {
+
+// As people write it: 1000000, not 1e+06.
+std::string bound_text(double value) {
+  const bool whole = std::abs(value) < 1e12 && value == std::floor(value);
+  return whole ? std::to_string(static_cast<long long>(value)) : to_text(value);
+}
+
+std::string range_of(const OptionInfo& info) {
+  std::string text;
+  if (std::isfinite(info.low)) text = (info.low_open ? "above " : "from ") + bound_text(info.low);
+  if (!std::isfinite(info.high)) return text;
+  return text + (text.empty() ? "up to " : " to ") + bound_text(info.high);
+}
+
+}  // namespace
+
+void OptionLister::visit(const OptionInfo& info, int& value) {
+  list_({info, "INT", std::to_string(value), range_of(info), {}});
+}
+
+void OptionLister::visit(const OptionInfo& info, double& value) {
+  list_({info, "NUMBER", to_text(value), range_of(info), {}});
+}
+
+void OptionLister::visit(const OptionInfo& info, bool& value) {
+  static constexpr std::array<std::string_view, 2> choices{"true", "false"};
+  list_({info, "BOOL", value ? "true" : "false", {}, choices});
+}
+
+void OptionLister::visit(const OptionInfo& info, std::span<const std::string_view> choices,
+                         int& value) {
+  list_({info, "NAME", std::string(choices[static_cast<std::size_t>(value)]), {}, choices});
 }
 
 }  // namespace panonav::command

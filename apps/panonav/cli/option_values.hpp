@@ -1,9 +1,11 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "panonav/core/options.hpp"
 
@@ -35,6 +37,29 @@ class TextApplier final : public OptionVisitor {
  private:
   [[nodiscard]] const std::string* text(const OptionInfo& info) const;
   const OptionEntries& entries_;
+};
+
+/// A member of an options struct as texts show it.
+struct ListedOption {
+  const OptionInfo& info;
+  std::string_view type;  ///< what stands for its value: "INT"
+  std::string value;
+  std::string range;  ///< of a number; empty: any
+  std::span<const std::string_view> choices;
+};
+
+/// Shows each member that it visits to a function.
+class OptionLister final : public OptionVisitor {
+ public:
+  explicit OptionLister(std::function<void(const ListedOption&)> list) : list_(std::move(list)) {}
+  void visit(const OptionInfo& info, int& value) override;
+  void visit(const OptionInfo& info, double& value) override;
+  void visit(const OptionInfo& info, bool& value) override;
+  void visit(const OptionInfo& info, std::span<const std::string_view> choices,
+             int& value) override;
+
+ private:
+  std::function<void(const ListedOption&)> list_;
 };
 
 }  // namespace panonav::command

@@ -45,20 +45,34 @@ std::string readable(std::string_view text) {
   return result;
 }
 
+// From the rate so far. Empty until that means something: a few steps of many, and some seconds.
+std::string time_left(double elapsed_s, std::size_t done, std::size_t total) {
+  if (elapsed_s < 2.0 || total < 10 || done < 5 || 20 * done < total || done >= total) return {};
+  const double left_s = elapsed_s * static_cast<double>(total - done) / static_cast<double>(done);
+  if (left_s < 90.0) return ", about " + fixed(std::max(1.0, left_s), 0) + " s left";
+  return ", about " + fixed(left_s / 60.0, left_s < 570.0 ? 1 : 0) + " min left";
+}
+
 }  // namespace
 
-Session::Session(bool json, int threads, bool former_keys)
-    : json_(json),
-      former_keys_(json && former_keys),
-      colours_(!json && wants_colours(STDOUT_FILENO)),
-      executor_(threads) {
-  if (former_keys_) note("--former-keys: the next version will no longer know these keys");
+Session::Session(const SessionOptions& options)
+    : options_(options),
+      colours_(!options.json && wants_colours(STDOUT_FILENO)),
+      executor_(options.threads) {
+  options_.former_keys = options.former_keys && options.json;
+  if (options_.former_keys) note("--former-keys: the next version will no longer know these keys");
+}
+
+void Session::say(std::string_view line) {
+  clear_bar();
+  std::cerr << readable(line) << '\n';
 }
 
 void Session::print(std::string_view line) {
-  if (former_keys_) {
+  clear_bar();
+  if (options_.former_keys) {
     std::cout << with_former_keys(line) << '\n';
-  } else if (json_) {
+  } else if (options_.json) {
     std::cout << line << '\n';
   } else {
     std::cout << readable(line) << '\n';
@@ -66,7 +80,38 @@ void Session::print(std::string_view line) {
 }
 
 void Session::note(std::string_view line) {
-  std::cerr << line << '\n';
+  if (!options_.quiet) say(line);
+}
+
+void Session::detail(std::string_view line) {
+  if (!options_.verbose) return;
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start_;
+  std::string text = "[";
+  say(text.append(fixed(elapsed.count(), 2)).append(" s] ").append(line));
+}
+
+ExitCode Session::no_answer(std::string_view line) {
+  say(line);
+  return ExitCode::no_answer;
+}
+
+void Session::suggest(std::initializer_list<std::string_view> command, std::string_view before) {
+  if (options_.quiet || options_.json) return;
+  std::string line = "Next:";
+  if (!before.empty()) line.append(" ").append(before);
+  for (const auto word : command) line.append(" ").append(shell_quoted(word));
+  print(line);
+}
+
+void Session::draw_bar(std::string_view bar) {
+  std::cerr << "\r\033[K" << bar << std::flush;
+  bar_drawn_ = true;
+}
+
+void Session::clear_bar() {
+  if (!bar_drawn_) return;
+  std::cerr << "\r\033[K" << std::flush;
+  bar_drawn_ = false;
 }
 
 void Session::finish_output() {
@@ -89,16 +134,24 @@ std::string Session::bad(std::string_view text) const {
   return styled(text, "31");
 }
 
-Progress::Progress(std::string label, std::size_t total)
-    : label_(std::move(label)), total_(total), terminal_(isatty(STDERR_FILENO) == 1) {}
+Progress::Progress(Session& session, std::string label, std::size_t total)
+    : session_(session),
+      label_(std::move(label)),
+      total_(total),
+      visible_(!session.quiet() && isatty(STDERR_FILENO) == 1) {
+  session_.detail(label_ + ": 0 of " + std::to_string(total_));
+}
 
 Progress::~Progress() {
   clear();
+  const std::chrono::duration<double> elapsed = Clock::now() - start_;
+  session_.detail(label_ + ": " + std::to_string(done_) + " of " + std::to_string(total_) + " in " +
+                  fixed(elapsed.count(), 2) + " s");
 }
 
 void Progress::advance(std::size_t steps) {
   done_ += steps;
-  if (!terminal_) return;
+  if (!visible_) return;
   const auto now = Clock::now();
   using namespace std::chrono_literals;
   if (now - start_ < 1s || now - last_draw_ < 100ms) return;
@@ -108,21 +161,17 @@ void Progress::advance(std::size_t steps) {
 
 void Progress::relabel(std::string label) {
   label_ = std::move(label);
-  if (terminal_ && Clock::now() - start_ >= std::chrono::seconds(1)) draw();
+  session_.detail(label_);
+  if (visible_ && Clock::now() - start_ >= std::chrono::seconds(1)) draw();
 }
 
 void Progress::draw() {
   constexpr std::size_t width = 30;
   const std::size_t filled = total_ == 0 ? 0 : std::min(width, width * done_ / total_);
-  std::cerr << "\r\033[K" << label_ << " [" << std::string(filled, '=')
-            << std::string(width - filled, ' ') << "] " << done_ << '/' << total_ << std::flush;
-  drawn_ = true;
-}
-
-void Progress::clear() {
-  if (!drawn_) return;
-  std::cerr << "\r\033[K" << std::flush;
-  drawn_ = false;
+  const std::chrono::duration<double> elapsed = Clock::now() - start_;
+  session_.draw_bar(label_ + " [" + std::string(filled, '=') + std::string(width - filled, ' ') +
+                    "] " + std::to_string(done_) + "/" + std::to_string(total_) +
+                    time_left(elapsed.count(), done_, total_));
 }
 
 }  // namespace panonav::command

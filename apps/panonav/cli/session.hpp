@@ -2,28 +2,46 @@
 
 #include <chrono>
 #include <cstddef>
+#include <initializer_list>
 #include <string>
 #include <string_view>
 
+#include "cli/verb.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/core/text.hpp"
 
 namespace panonav::command {
 
+/// How a verb speaks, and on how many threads it works.
+struct SessionOptions {
+  bool json = false;         ///< results as JSON
+  bool former_keys = false;  ///< keys of JSON have their names of the last version
+  bool quiet = false;        ///< results and errors only
+  bool verbose = false;      ///< what is done, and when
+  int threads = 0;           ///< 0: one per core
+};
+
 /// What a verb needs of its surroundings: threads, and how to speak to people and to machines.
 class Session {
  public:
-  /// `former_keys`: keys of JSON are printed with their names of the last version.
-  Session(bool json, int threads, bool former_keys = false);
+  explicit Session(const SessionOptions& options);
 
   /// The caller is a machine: results as JSON, nothing else on standard output.
-  [[nodiscard]] bool json() const noexcept { return json_; }
+  [[nodiscard]] bool json() const noexcept { return options_.json; }
+  [[nodiscard]] bool quiet() const noexcept { return options_.quiet; }
   [[nodiscard]] Executor& executor() noexcept { return executor_; }
 
   /// One line on standard output.
   void print(std::string_view line);
-  /// One line on standard error that is no error: a warning, or what to do next.
+  /// One line on standard error that is no error: a warning or a hint. Silent with --quiet.
   void note(std::string_view line);
+  /// With --verbose: the line on standard error, behind the seconds since the start.
+  void detail(std::string_view line);
+  /// Says why there is no answer, on standard error.
+  [[nodiscard]] ExitCode no_answer(std::string_view line);
+  /// "Next: " and a command on standard output, its words as a shell wants them. Silent with
+  /// --quiet.
+  void suggest(std::initializer_list<std::string_view> command, std::string_view before = {});
   /// Throws FileError when standard output could not be written (a full disk behind a redirection).
   void finish_output();
 
@@ -32,19 +50,26 @@ class Session {
   [[nodiscard]] std::string good(std::string_view text) const;
   [[nodiscard]] std::string bad(std::string_view text) const;
 
+  /// A line on standard error that the next one takes away; only for terminals.
+  void draw_bar(std::string_view bar);
+  void clear_bar();
+
  private:
   [[nodiscard]] std::string styled(std::string_view text, std::string_view code) const;
-  bool json_;
-  bool former_keys_;
+  void say(std::string_view line);
+  SessionOptions options_;
   bool colours_;
+  bool bar_drawn_ = false;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   Executor executor_;
 };
 
-/// A bar on standard error, only where that is a terminal and only once the work has taken longer
-/// than a second. The bar is gone when the object is. Not thread-safe: advance it from one thread.
+/// A bar on standard error with the time left, only where that is a terminal, only once the work
+/// has taken longer than a second, and not with --quiet. The bar is gone when the object is. With
+/// --verbose, begin and end of the work are said. Not thread-safe: advance it from one thread.
 class Progress {
  public:
-  Progress(std::string label, std::size_t total);
+  Progress(Session& session, std::string label, std::size_t total);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
@@ -52,17 +77,17 @@ class Progress {
   void advance(std::size_t steps = 1);
   /// What runs now; drawn at once.
   void relabel(std::string label);
-  /// Takes the bar away until the next advance, so that a line can be printed.
-  void clear();
+  /// Takes the bar away until the next advance.
+  void clear() { session_.clear_bar(); }
 
  private:
   using Clock = std::chrono::steady_clock;
   void draw();
+  Session& session_;
   std::string label_;
   std::size_t total_;
   std::size_t done_ = 0;
-  bool terminal_;
-  bool drawn_ = false;
+  bool visible_;
   Clock::time_point start_ = Clock::now();
   Clock::time_point last_draw_ = start_;
 };

@@ -20,13 +20,15 @@ enum class ExitCode : int {
 /// `Arguments` that it was declared with are still there when it runs.
 using Run = std::function<ExitCode(Session&)>;
 
-/// One verb of the command line.
+/// One verb of the command line. Its help, its manual page and the completion of shells are made
+/// from this and from the arguments that it declares (cli/texts.hpp).
 struct Verb {
   std::string_view name;     ///< one word, or two with a blank between: "route record"
   std::string_view summary;  ///< one plain line
-  std::string_view details;  ///< what a user must know beyond the options; may be empty
-  std::string_view example;  ///< one or more command lines that work as they stand
+  std::string_view details;  ///< what a user must know beyond the options; lines are joined
+  std::string_view example;  ///< command lines that work as they stand, the most useful ones first
   Run (*declare)(Arguments&);
+  std::string_view alias = {};  ///< another spelling that is taken
 };
 
 }  // namespace panonav::command

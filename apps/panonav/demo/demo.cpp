@@ -336,7 +336,7 @@ ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
   prepare_demo_folder(out);
   constexpr int parts = 8;
   int part = 0;
-  Progress progress("demo", parts);
+  Progress progress(session, "demo", parts);
   const auto next_part = [&](const std::string& what) {
     if (part > 0) progress.advance();
     progress.relabel("part " + std::to_string(++part) + " of " + std::to_string(parts) + ": " +
@@ -345,8 +345,7 @@ ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
   next_part("simulates what the robot sees");
   const auto recordings = record_demo(wanted, session);
   if (!recordings) {
-    session.note("panonav demo: no mirror was found in the simulated pictures");
-    return ExitCode::no_answer;
+    return session.no_answer("panonav demo: no mirror was found in the simulated pictures");
   }
   ReportPage page("panonav: a robot that remembers what places look like",
                   "A simulated robot with one mirror camera drives through an office and remembers "
@@ -415,9 +414,9 @@ Run declare(Arguments& arguments) {
   auto wanted = std::make_shared<DemoOptions>();
   auto out = std::make_shared<std::string>("demo");
   auto seed = std::make_shared<std::optional<std::uint64_t>>();
-  arguments.option("-o,--out", *out,
-                   "Folder for the report: a new one, or that of an earlier demo (default: demo)");
-  arguments.option("--seed", *seed, "Of the simulated office (default: 1)");
+  arguments.option("-o,--out FOLDER", *out,
+                   "Folder for the report: a new one, or that of an earlier demo");
+  arguments.option("--seed", *seed, "Seed of the simulated office (default: 1)");
   arguments.flag("--quick", wanted->quick,
                  "A smoke run: fewer and smaller pictures, fewer questions and missions");
   return [wanted, out, seed](Session& session) {
@@ -430,16 +429,15 @@ Run declare(Arguments& arguments) {
 }  // namespace
 
 Verb demo_verb() {
-  return {
-      "demo", "The whole story on a simulated office, with a report to look at",
-      "A robot sees, remembers, localises and tracks itself, arranges what it remembers, goes "
-      "home, repeats\n"
-      "a route and goes where it is told. Takes about a minute on two cores. Needs nothing but "
-      "this program\n"
-      "and gnuplot. What an earlier demo left in the folder is written anew; a folder that holds "
-      "anything\n"
-      "else is refused.",
-      "  panonav demo\n  panonav demo --seed 5 -o other_office", declare};
+  return {"demo", "The whole story on a simulated office, with a report to look at",
+          "A robot sees, remembers, localises and tracks itself, arranges what it remembers, goes "
+          "home, repeats\n"
+          "a route and goes where it is told. It takes about a minute on two cores and needs "
+          "nothing but this program and gnuplot. What an earlier demo left in the folder is "
+          "written anew; a folder that holds "
+          "anything\n"
+          "else is refused.",
+          "  panonav demo\n  panonav demo --seed 5 -o other_office", declare};
 }
 
 }  // namespace panonav::command

@@ -179,8 +179,9 @@ std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& s
   const std::size_t kidnapped_after = walk.poses.size() - 1;
   walk.poses = kidnapped_walk(std::move(walk.poses), after.poses);
 
-  Progress progress("rendering", office.poses.size() + asked.poses.size() + elsewhere.poses.size() +
-                                     walk.poses.size());
+  Progress progress(
+      session, "rendering",
+      office.poses.size() + asked.poses.size() + elsewhere.poses.size() + walk.poses.size());
   const auto record_run = [&](const PlannedRun& run, const char* name) {
     return record_dataset(run.world, options.out / name, run.poses, run.with_path, executor,
                           [&] { progress.advance(); });

@@ -168,8 +168,7 @@ ExitCode arrange_views(const ArrangeArguments& wanted, Session& session) {
       MemoryFile::open(wanted.memory, wanted.no_save ? Access::read_only : Access::read_write);
   const VisualMemory memory = file.load();
   if (memory.empty()) {
-    session.note("panonav arrange: " + wanted.memory + " holds no views");
-    return ExitCode::no_answer;
+    return session.no_answer("panonav arrange: " + wanted.memory + " holds no views");
   }
   const Lattice lattice =
       arrange(memory, wanted.lattice, motions_of(wanted, memory), session.executor());
@@ -200,20 +199,21 @@ ExitCode arrange_views(const ArrangeArguments& wanted, Session& session) {
 Run declare(Arguments& arguments) {
   auto wanted = std::make_shared<ArrangeArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file; its views may be in any order");
-  arguments.option("--odometry", wanted->odometry,
+  arguments.option("--odometry DATASET", wanted->odometry,
                    "Take the robot's motion between views from this data set, by file name");
   arguments.option(
-      "--tum", wanted->tum,
+      "--tum FILE", wanted->tum,
       "Write the poses of the largest component to this file: TUM text, or CSV for a name "
       "that ends in .csv");
-  arguments.option("--graphml", wanted->graph, "Write the map as a graph to this file");
+  arguments.option("--graphml FILE", wanted->graph, "Write the map as a graph to this file");
 #ifdef PANONAV_COMMAND_SIMULATES
-  arguments.option("--picture", wanted->picture,
+  arguments.option("--picture FILE", wanted->picture,
                    "Draw the map, beside the truth where it is known, into this PNG or SVG file");
 #endif
   arguments.flag("--no-save", wanted->no_save, "Leave the memory file as it is");
   arguments.options("lattice", wanted->lattice);
   arguments.options("coarse_motion", wanted->motion, "motion");
+  arguments.common({"--neighbours"});
   return [wanted](Session& session) { return arrange_views(*wanted, session); };
 }
 

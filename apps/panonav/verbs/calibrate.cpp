@@ -56,9 +56,9 @@ struct CalibrateArguments {
   MirrorOptions mirror;
 };
 
-std::vector<Image> read_images(const std::vector<std::string>& paths) {
+std::vector<Image> read_images(const std::vector<std::string>& paths, Session& session) {
   std::vector<Image> images;
-  Progress progress("reading", paths.size());
+  Progress progress(session, "reading", paths.size());
   for (const auto& path : paths) {
     images.push_back(read_image(path));
     const auto size = images.back().size();
@@ -135,21 +135,20 @@ void print_text(const Arguments& arguments, const CalibrateArguments& wanted,
         short_number(wanted.mirror.rim_elevation_deg) +
         " at the rim. Say what you know with --profile, --rim-elevation-deg and their companions.");
   }
-  session.print(
-      "Next: " + (wanted.overlay ? "look at " + *wanted.overlay + ", then " : std::string()) +
-      "panonav unwrap " + wanted.images.front() + " --camera " + wanted.out + " -o panorama.png");
+  session.suggest(
+      {"panonav", "unwrap", wanted.images.front(), "--camera", wanted.out, "-o", "panorama.png"},
+      wanted.overlay ? "look at " + *wanted.overlay + ", then" : "");
 }
 
 ExitCode calibrate(const Arguments& arguments, const CalibrateArguments& wanted, Session& session) {
-  const auto images = read_images(wanted.images);
+  const auto images = read_images(wanted.images, session);
   std::vector<ImageView> views;
   for (const auto& image : images) views.push_back(image.view());
   const auto mirror = find_mirror(views, wanted.search);
   if (!mirror) {
-    session.note("panonav calibrate: no mirror found in " + wanted.images.front() +
-                 (images.size() > 1 ? " and the others" : "") +
-                 "; give more images, or allow a fainter rim with --min-quality");
-    return ExitCode::no_answer;
+    return session.no_answer("panonav calibrate: no mirror found in " + wanted.images.front() +
+                             (images.size() > 1 ? " and the others" : "") +
+                             "; give more images, or allow a fainter rim with --min-quality");
   }
   const double forward_rad = radians(wanted.mirror.forward_angle_deg);
   const Camera camera = camera_from_mirror(
@@ -176,23 +175,25 @@ Run declare(Arguments& arguments) {
   arguments.positionals("IMAGE", wanted->images,
                         "Raw images of one mirror camera; more are better");
   arguments.required_option("-o,--out", wanted->out, "Camera file to write (camera.toml)");
-  arguments.option("--overlay", wanted->overlay,
+  arguments.option("--overlay FILE", wanted->overlay,
                    "PNG picture to write: what was found, drawn over the first image");
   arguments.option("--inner-radius-px", wanted->inner_radius_px,
                    "Radius that the camera's own reflection covers, instead of the one found");
   arguments.options("mirror", wanted->mirror);
   arguments.options("mirror_search", wanted->search);
+  arguments.common({"--profile", "--inner-elevation-deg", "--rim-elevation-deg", "--direction",
+                    "--forward-angle-deg"});
   return [wanted, &arguments](Session& session) { return calibrate(arguments, *wanted, session); };
 }
 
 }  // namespace
 
 Verb calibrate_verb() {
-  return {"calibrate", "Find centre, rim and inner radius of a mirror in raw images",
-          "Ends with 1 when no image shows a mirror's rim. Look at the overlay before you trust "
-          "the file.",
-          "  panonav calibrate mirror1.jpg mirror2.jpg -o camera.toml --overlay overlay.png",
-          declare};
+  return {
+      "calibrate", "Find centre, rim and inner radius of a mirror in raw images",
+      "The exit code is 1 when no image shows a mirror's rim. Look at the overlay before you trust "
+      "the file.",
+      "  panonav calibrate mirror1.jpg mirror2.jpg -o camera.toml --overlay overlay.png", declare};
 }
 
 }  // namespace panonav::command

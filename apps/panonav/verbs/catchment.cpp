@@ -259,29 +259,29 @@ Run declare(Arguments& arguments) {
   auto wanted = std::make_shared<CatchmentArguments>();
   arguments.positional("DATASET", wanted->dataset,
                        "Data set with positions and headings; each view is a home");
-  arguments.option("--current", wanted->current,
+  arguments.option("--current DATASET", wanted->current,
                    "Data set of the views to go home from; default: the same recording");
   declare_pictures(arguments, wanted->pictures);
   arguments.option("--up-to-m", wanted->settings.up_to_m,
                    "Leave out pairs that are farther apart from the averages");
   arguments.option("--bin-m", wanted->settings.bin_m,
                    "Width of a bin of distances; default: the spacing of the places");
-  arguments.option("--turn-randomly", wanted->turn_seed,
-                   "Turn the robot before each current view by a random number of whole columns. "
-                   "SEED");
+  arguments.option("--turn-randomly SEED", wanted->turn_seed,
+                   "Turn the robot before each current view by a random number of whole columns");
   arguments.option(
-      "--stages", wanted->stages,
+      "--stages K,K,...", wanted->stages,
       "Runs go from coarse to fine: the highest frequency of each stage, as in 2,4,10");
-  arguments.option("--ahead", wanted->ahead, 1,
+  arguments.option("--ahead N", wanted->ahead, 1,
                    "Only compare each view with the one N pictures later: the direction of travel "
                    "where the camera looks along it. Needs no positions");
-  arguments.option("--goal", wanted->goal,
+  arguments.option("--goal PICTURE", wanted->goal,
                    "Picture whose home vectors the report shows; default: the one in the middle");
-  arguments.option("--report", wanted->report,
+  arguments.option("--report FOLDER", wanted->report,
                    "Write curves and maps into this folder: a new one, or that of an earlier "
                    "report");
   declare_homing(arguments, wanted->homing);
   arguments.options("run", wanted->settings.run);
+  arguments.uncommon({"--bin-m", "--goal"});
   return [wanted, &arguments](Session& session) { return catchment(arguments, *wanted, session); };
 }
 
@@ -289,7 +289,8 @@ Run declare(Arguments& arguments) {
 
 Verb catchment_verb() {
   return {"catchment", "Measure from how far the views of a recording lead home",
-          "Home vectors between all pairs of views, and runs from place to place [S06 section 4].\n"
+          "The verb computes home vectors between all pairs of views, and runs from place to place "
+          "[S06 section 4].\n"
           "Where they are not given, the longest step is twice the spacing of the places, a step "
           "must\n"
           "end within 0.8 of it, and the typical distance of things is learnt from near pairs.",

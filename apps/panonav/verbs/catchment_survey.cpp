@@ -42,7 +42,7 @@ std::vector<PairVector> all_vectors(const RecordedViews& goals, const RecordedVi
                                     Session& session) {
   const std::size_t count = places.views.size();
   std::vector<PairVector> vectors(goals.views.size() * count);
-  Progress progress(title, goals.views.size());
+  Progress progress(session, title, goals.views.size());
   const std::size_t batch = 4 * static_cast<std::size_t>(session.executor().threads());
   for (std::size_t begin = 0; begin < goals.views.size(); begin += batch) {
     const std::size_t many = std::min(batch, goals.views.size() - begin);
@@ -133,7 +133,7 @@ RecordedViews read_views(const Dataset& recording, const HomingArguments& wanted
   const std::size_t total = recording.entries.size();
   RecordedViews result;
   result.turned_rad.resize(total);
-  Progress progress("reading", total);
+  Progress progress(session, "reading", total);
   make_in_order(
       total, session.executor(),
       [&](std::size_t index) {

@@ -190,9 +190,9 @@ ExitCode evaluate(const EvaluateArguments& wanted, Session& session) {
   const Trajectory truth = read(wanted.truth);
   const auto error = trajectory_error(estimate.trajectory, truth, wanted.options);
   if (!error) {
-    session.note("panonav evaluate: fewer than two poses of " + wanted.estimate +
-                 " have a stamp within " + wanted.truth + "; do both count the same seconds?");
-    return ExitCode::no_answer;
+    return session.no_answer("panonav evaluate: fewer than two poses of " + wanted.estimate +
+                             " have a stamp within " + wanted.truth +
+                             "; do both count the same seconds?");
   }
   const MapFigures figures = compare_as_map(estimate, truth, wanted.options.max_gap_s);
   if (session.json()) {
@@ -220,6 +220,7 @@ Run declare(Arguments& arguments) {
                        "Trajectory as TUM text or CSV, or a memory file (NAME.panonav) with a map");
   arguments.positional("GROUND_TRUTH", wanted->truth, "Trajectory as TUM text or CSV");
   arguments.options("evaluation", wanted->options);
+  arguments.common({"--align", "--align-scale"});
   return [wanted](Session& session) { return evaluate(*wanted, session); };
 }
 
@@ -227,9 +228,8 @@ Run declare(Arguments& arguments) {
 
 Verb evaluate_verb() {
   return {"evaluate", "Compare an estimated trajectory or map with the ground truth",
-          "Poses are associated by stamp and aligned by least squares unless --align false. Ends "
-          "with 1\n"
-          "when the two have no time in common.",
+          "Poses are associated by stamp and aligned by least squares unless --align false. The "
+          "exit code is 1 when the two have no time in common.",
           "  panonav evaluate estimate.tum truth.tum\n"
           "  panonav evaluate estimate.csv truth.csv --align-scale true --json\n"
           "  panonav evaluate office.panonav run/poses.csv",

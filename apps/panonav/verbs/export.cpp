@@ -67,7 +67,7 @@ void tell(const MemoryExport& done, const MemoryFile& memory, const std::string&
 
 ExitCode export_all(const ExportArguments& wanted, Session& session) {
   const auto memory = MemoryFile::open(wanted.memory, Access::read_only);
-  Progress progress("exporting", static_cast<std::size_t>(memory.info().views));
+  Progress progress(session, "exporting", static_cast<std::size_t>(memory.info().views));
   const MemoryExport done = export_memory(memory, wanted.out, [&] { progress.advance(); });
   progress.clear();
   if (!session.json()) {
@@ -89,7 +89,8 @@ ExitCode export_all(const ExportArguments& wanted, Session& session) {
 Run declare(Arguments& arguments) {
   auto wanted = std::make_shared<ExportArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file");
-  arguments.required_option("-o,--out", wanted->out, "Folder to write: a new or an empty one");
+  arguments.required_option("-o,--out FOLDER", wanted->out,
+                            "Folder to write: a new or an empty one");
   return [wanted](Session& session) { return export_all(*wanted, session); };
 }
 

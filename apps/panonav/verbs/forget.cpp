@@ -83,7 +83,8 @@ Run declare(Arguments& arguments) {
 
 Verb forget_verb() {
   return {"forget", "Drop views from a memory",
-          "All the named views or, when one of them is not there, none. panonav undo brings them "
+          "All the named views are dropped or, when one of them is not there, none. panonav undo "
+          "brings them "
           "back.",
           "  panonav forget office.panonav view_0012.png view_0013.png\n"
           "  panonav forget office.panonav view_0012.png --dry-run",

@@ -149,7 +149,7 @@ ExitCode gallery(const GalleryArguments& wanted, Session& session) {
     page.text("The first " + std::to_string(views.size()) + " of " + std::to_string(found) +
               " views; --name and --near of panonav gallery choose others.");
   }
-  Progress progress("drawing", views.size());
+  Progress progress(session, "drawing", views.size());
   for (const auto& [title, members] : grouped(views)) {
     page.section(title + " (" + std::to_string(members.size()) +
                  (members.size() == 1 ? " view)" : " views)"));
@@ -182,7 +182,7 @@ ExitCode gallery(const GalleryArguments& wanted, Session& session) {
 Run declare(Arguments& arguments) {
   auto wanted = std::make_shared<GalleryArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file");
-  arguments.required_option("-o,--out", wanted->out,
+  arguments.required_option("-o,--out FOLDER", wanted->out,
                             "Folder to write: a new one, or that of an earlier gallery");
   declare_selection(arguments, wanted->selection);
   return [wanted](Session& session) { return gallery(*wanted, session); };
@@ -193,9 +193,9 @@ Run declare(Arguments& arguments) {
 Verb gallery_verb() {
   return {
       "gallery", "Write a page with the thumbnails of a memory",
-      "One page, gallery.html, with everything in it; it needs no network and no script. Views\n"
-      "are grouped by the folder in their names, by the component of the map and by place.\n"
-      "2000 views at most; --name and --near choose which.",
+      "The page gallery.html has everything in it and needs no network and no script. Views are "
+      "grouped by the folder in their names, by the component of the map and by place. The page "
+      "holds 2000 views at most; --name and --near choose which.",
       "  panonav gallery office.panonav -o gallery\n"
       "  panonav gallery office.panonav -o corner --near 1,1,0.8",
       declare};

@@ -74,7 +74,7 @@ ExitCode answer_all(const HomeArguments& wanted, const HomingGuide& guide, const
   const std::size_t total = recording.entries.size();
   std::vector<HomeAnswer> answers;
   std::size_t pointing = 0;
-  Progress progress("homing", total);
+  Progress progress(session, "homing", total);
   make_in_order(
       total, session.executor(),
       [&](std::size_t i) {
@@ -162,10 +162,10 @@ Run declare(Arguments& arguments) {
                        "Picture of the place to return to; with --memory the name or id of a view");
   arguments.positional("CURRENT", wanted->current,
                        "What the robot sees now: a picture, or a data set (an answer for each)");
-  arguments.option("--memory", wanted->memory, "Take GOAL from this memory file");
+  arguments.option("--memory FILE", wanted->memory, "Take GOAL from this memory file");
   declare_pictures(arguments, wanted->pictures);
 #ifdef PANONAV_COMMAND_SIMULATES
-  arguments.option("--report", wanted->report,
+  arguments.option("--report FOLDER", wanted->report,
                    "Write pictures of both views and the way home into this folder: a new one, or "
                    "that of an earlier report");
 #endif
@@ -176,16 +176,15 @@ Run declare(Arguments& arguments) {
 }  // namespace
 
 Verb home_verb() {
-  return {
-      "home", "Tell the direction back to a place from one view of it",
-      "Directions are seen from the robot as it stands now; the heading need not be known. The\n"
-      "distance is in units of R, the typical distance of the things around. A picture in the\n"
-      "folder of a data set lies as its dataset.toml says. Ends with 1 when no view tells the "
-      "way.",
-      "  panonav home door.png now.png --kind panorama --elevation-deg -30 40\n"
-      "  panonav home view_00012.png now.png --memory office.panonav --report way_home\n"
-      "  panonav home office_run/view_00012.png office_run --json",
-      declare};
+  return {"home", "Tell the direction back to a place from one view of it",
+          "Directions are seen from the robot as it stands now; the heading need not be known. The "
+          "distance is in units of R, the typical distance of the things around. A picture in the\n"
+          "folder of a data set lies as its dataset.toml says. The exit code is 1 when no view "
+          "tells the way.",
+          "  panonav home door.png now.png --kind panorama --elevation-deg -30 40\n"
+          "  panonav home view_00012.png now.png --memory office.panonav --report way_home\n"
+          "  panonav home office_run/view_00012.png office_run --json",
+          declare};
 }
 
 }  // namespace panonav::command

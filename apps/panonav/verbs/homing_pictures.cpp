@@ -10,11 +10,12 @@ void declare_homing(Arguments& arguments, HomingArguments& wanted) {
   arguments.flag("--horizon", wanted.views.horizon,
                  "Compare one row only, the mean of the rows within 5 degrees of the horizon (all "
                  "rows where elevations are not known), as [S06] does");
-  arguments.option("--published", wanted.published, 1,
-                   "Use the rule as published [S06] with K frequencies; goes with --iterations. K");
+  arguments.option("--published K", wanted.published, 1,
+                   "Use the rule as published [S06] with K frequencies; goes with --iterations");
   arguments.options("signature", wanted.views.signature);
   arguments.options("preprocessing", wanted.views.preprocessing);
   arguments.options("homing", wanted.homing);
+  arguments.uncommon({"--horizon"});
 }
 
 FourierHomingOptions homing_options(const Arguments& arguments, const HomingArguments& wanted,

@@ -134,9 +134,9 @@ Run declare(Arguments& arguments) {
 
 Verb list_verb() {
   return {"list", "List the views of a memory, and its routes and maps",
-          "What the file knows of each view: id, name, position, heading, stamp, number of links,\n"
-          "connected component of its map, whether a thumbnail is stored. Ends with 1 when there\n"
-          "is no such view.",
+          "Each line has what the file knows of a view: id, name, position, heading, stamp, number "
+          "of links, connected component of its map, and whether a thumbnail is stored. The exit "
+          "code is 1 when there is no such view.",
           "  panonav list office.panonav\n"
           "  panonav list office.panonav --near 1,1,0.5\n"
           "  panonav list office.panonav --name 'view_0001*' --csv",

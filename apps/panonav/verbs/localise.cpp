@@ -204,7 +204,7 @@ std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
                                        const LocaliseArguments& wanted, const Dataset& recording,
                                        Session& session) {
   const std::size_t total = recording.entries.size();
-  Progress progress("localising", total);
+  Progress progress(session, "localising", total);
   std::vector<LocalisedQuery> answers;
   std::size_t told = 0;
   std::exception_ptr failure;
@@ -284,21 +284,22 @@ Run declare(Arguments& arguments) {
   arguments.positionals("INPUT", wanted->inputs,
                         "Data set, folder of pictures, or one or more pictures");
   declare_pictures(arguments, wanted->pictures);
-  arguments.option("-o,--out", wanted->out, "Write a CSV table, one line for each picture");
+  arguments.option("-o,--out FILE", wanted->out, "Write a CSV table, one line for each picture");
 #ifdef PANONAV_COMMAND_SIMULATES
-  arguments.option("--report", wanted->report,
+  arguments.option("--report FOLDER", wanted->report,
                    "Write a page with each picture above its best match, turned alike, into this "
                    "folder: a new one, or that of an earlier report");
 #endif
   arguments.flag("--exclude-same-file", wanted->exclude_same_file,
                  "Leave out the reference view of the same file name (leave-one-out)");
-  arguments.option("--turn-randomly", wanted->turn_seed,
+  arguments.option("--turn-randomly SEED", wanted->turn_seed,
                    "Turn the robot before each query by a random number of whole columns; "
-                   "turned_rad is the turn, counter-clockwise positive. SEED");
+                   "turned_rad is the turn, counter-clockwise positive");
   arguments.flag("--areas", wanted->areas,
                  "Also show the area where the robot may be, component by component");
   arguments.options("localiser", wanted->localiser);
   arguments.options("accuracy", wanted->accuracy, "area");
+  arguments.common({"--top"});
   return [wanted, &arguments](Session& session) { return localise(arguments, *wanted, session); };
 }
 
@@ -306,16 +307,17 @@ Run declare(Arguments& arguments) {
 
 Verb localise_verb() {
   return {
-      "localise", "Tell where pictures were taken and which way the robot faced",
+      "localise",
+      "Tell where pictures were taken and which way the robot faced",
       "Pictures without a dataset.toml are read as those that the memory was made from. Pictures "
-      "that\n"
-      "cannot be read are named and skipped. Ends with 1 when no picture shows a place of the "
-      "memory.",
+      "that cannot be read are named and skipped. The exit code is 1 when no picture shows a place "
+      "of the memory.",
       "  panonav localise office.panonav query_run --report answers\n"
       "  panonav localise office.panonav one.png two.png -o answers.csv\n"
       "  panonav localise office.panonav view.png --json\n"
       "  panonav localise office.panonav office_run --exclude-same-file --turn-randomly 7 --json",
-      declare};
+      declare,
+      "localize"};
 }
 
 }  // namespace panonav::command

@@ -167,7 +167,7 @@ void print_result(const MapArguments& wanted, const Dataset& recording, const Ma
 }
 
 MappedRun map_recording(const Dataset& recording, Mapper& mapper, Session& session) {
-  Progress progress("mapping", recording.entries.size());
+  Progress progress(session, "mapping", recording.entries.size());
   make_in_order(
       recording.entries.size(), session.executor(),
       [&](std::size_t i) { return mapper.encode(read_observation(recording.entries[i])); },
@@ -247,12 +247,12 @@ Run declare(Arguments& arguments) {
                        "Memory file (NAME.panonav); views that it does not know are appended");
   declare_pictures(arguments, wanted->pictures);
   arguments.option(
-      "--tum", wanted->tum,
+      "--tum FILE", wanted->tum,
       "Write the poses of the largest component to this file: TUM text, or CSV for a name "
       "that ends in .csv");
-  arguments.option("--graphml", wanted->graph, "Write the map as a graph to this file");
+  arguments.option("--graphml FILE", wanted->graph, "Write the map as a graph to this file");
 #ifdef PANONAV_COMMAND_SIMULATES
-  arguments.option("--picture", wanted->picture,
+  arguments.option("--picture FILE", wanted->picture,
                    "Draw the map, beside the truth where it is known, into this PNG or SVG file");
 #endif
   arguments.flag("--no-thumbnails", wanted->no_thumbnails,
@@ -262,6 +262,7 @@ Run declare(Arguments& arguments) {
   arguments.options("visual_odometry", wanted->mapper.odometry);
   arguments.options("loop_closure", wanted->mapper.closure, "closure");
   arguments.options("pose_graph", wanted->mapper.graph, "graph");
+  arguments.common({"--camera-height-m", "--capture-difference"});
   return [wanted, &arguments](Session& session) { return map(arguments, *wanted, session); };
 }
 
@@ -276,8 +277,8 @@ Verb map_verb() {
           "else comes from the views. Without odometry, --camera-height-m makes metres of lengths. "
           "What\n"
           "nothing connects is kept as separate components.",
-          "  panonav map run office.panonav\n"
-          "  panonav map run office.panonav --picture map.png --graphml map.graphml --tum map.tum\n"
+          "  panonav map office_run office.panonav\n"
+          "  panonav map office_run office.panonav --picture map.png --graphml map.graphml\n"
           "  panonav map walk walk.panonav --camera-height-m 0.6\n"
           "  panonav map walk walk.panonav --capture-difference 0.1 --json",
           declare};

@@ -73,7 +73,7 @@ std::vector<Skipped> add_all(const Dataset& missing, const Dataset& recording, b
     noted = memoriser.file() != nullptr;
   };
   note();
-  Progress progress("memorising", missing.entries.size());
+  Progress progress(session, "memorising", missing.entries.size());
   DatasetObservations source(missing, session.executor());
   std::vector<Skipped> skipped;
   std::exception_ptr failure;
@@ -118,7 +118,7 @@ ExitCode memorise(const Arguments& arguments, const MemoriseArguments& wanted, S
   Dataset missing = recording;
   if (resumes) {
     check_same_options(arguments, wanted, *memoriser.file());
-    Progress comparing("comparing", recording.entries.size());
+    Progress comparing(session, "comparing", recording.entries.size());
     check_known_views(recording, *memoriser.file(), *memoriser.encoder(), session.executor(),
                       [&](std::size_t compared) { comparing.advance(compared); });
     std::erase_if(missing.entries, [&](const DatasetEntry& entry) {
@@ -152,7 +152,7 @@ ExitCode memorise(const Arguments& arguments, const MemoriseArguments& wanted, S
     session.print(
         "The pictures' elevations are not known: every row is treated as on the horizon.");
   }
-  session.print("Next: panonav localise " + wanted.memory + " INPUT");
+  session.suggest({"panonav", "localise", wanted.memory, "INPUT"});
   return ExitCode::done;
 }
 
@@ -170,6 +170,7 @@ Run declare(Arguments& arguments) {
                  "A folder of pictures: take those of the folders within, too");
   arguments.options("signature", wanted->signature);
   arguments.options("preprocessing", wanted->preprocessing);
+  arguments.common({"--components"});
   return [wanted, &arguments](Session& session) { return memorise(arguments, *wanted, session); };
 }
 
@@ -177,7 +178,8 @@ Run declare(Arguments& arguments) {
 
 Verb memorise_verb() {
   return {
-      "memorise", "Remember what the places of a recording look like",
+      "memorise",
+      "Remember what the places of a recording look like",
       "Views reach the disk in batches of 16, a new memory's first 32 together, each batch whole "
       "or\n"
       "not at all; after an interruption the same command goes on where it stopped. Views that "
@@ -186,7 +188,8 @@ Verb memorise_verb() {
       "name is refused.",
       "  panonav memorise office_run office.panonav\n"
       "  panonav memorise photos walk.panonav --kind equirectangular --elevation-deg -30 40",
-      declare};
+      declare,
+      "memorize"};
 }
 
 }  // namespace panonav::command

@@ -262,21 +262,23 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
 Run declare(Arguments& arguments) {
   auto wanted = std::make_shared<NavigateArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file of a simulated data set");
-  arguments.required_option("--goal", wanted->goal, "Name or id of the view to go to");
-  arguments.required_option("--scene", wanted->scene,
+  arguments.required_option("--goal VIEW", wanted->goal, "Name or id of the view to go to");
+  arguments.required_option("--scene SCENE", wanted->scene,
                             "Where the robot is: a scene as of panonav simulate");
-  arguments.option("--start", wanted->start,
-                   "Where it starts: X,Y,HEADING_DEG; else a free place at random");
-  arguments.option("--kidnap", wanted->kidnap,
-                   "Carry it to X,Y,HEADING_DEG once half of the way is driven");
+  arguments.option("--start X,Y,DEG", wanted->start,
+                   "Place where the robot starts, with its heading in degrees; otherwise a free "
+                   "place at random");
+  arguments.option("--kidnap X,Y,DEG", wanted->kidnap,
+                   "Carry the robot to this place once half of the way is driven");
   arguments.choice("--edges", wanted->edges, {"map", "lattice", "links", "arrangement"},
                    "What to plan over: a stored map, the memory's links, or an arrangement made "
                    "now (default: the first that is there)");
-  arguments.option("--route", wanted->route,
+  arguments.option("--route NAME", wanted->route,
                    "Go along this recorded route of the memory where the way leads along it; views "
                    "and route have the poses of one data set");
-  arguments.option("--log", wanted->log, "Write each decision as a line of text into this file");
-  arguments.option("--picture", wanted->picture,
+  arguments.option("--log FILE", wanted->log,
+                   "Write each decision as a line of text into this file");
+  arguments.option("--picture FILE", wanted->picture,
                    "Draw the directions to the goal, the way planned and the way driven into this "
                    "PNG or SVG file");
   arguments.options("simulation", wanted->simulation.simulation.scene);
@@ -288,6 +290,7 @@ Run declare(Arguments& arguments) {
   arguments.options("frame", wanted->simulation.frame);
   arguments.options("sensor", wanted->simulation.sensor);
   arguments.options("free_space", wanted->simulation.free_space);
+  arguments.common({"--seed", "--light"});
   return [wanted, &arguments](Session& session) { return navigate(arguments, *wanted, session); };
 }
 
@@ -297,11 +300,8 @@ Verb navigate_verb() {
   return {"navigate", "Send a simulated robot to a remembered view, by what it sees alone",
           "The robot sees as the memory's views were seen. Poses in the memory only say how far "
           "from the\n"
-          "goal it ended, and which views lie beside a --route. Ends with 1 unless it arrives: "
-          "blocked, lost or\n"
-          "unreachable.",
-          "  panonav simulate office memory_run --grid 0.5 && panonav memorise memory_run "
-          "office.panonav\n"
+          "goal it ended, and which views lie beside a --route. The exit code is 1 unless the "
+          "robot arrives: blocked, lost or unreachable.",
           "  panonav navigate office.panonav --goal view_00012.png --scene office --picture "
           "way.png\n"
           "  panonav navigate office.panonav --goal 3 --scene office --light 0.7 --moved-objects "

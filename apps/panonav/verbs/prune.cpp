@@ -111,6 +111,7 @@ Run declare(Arguments& arguments) {
   arguments.positional("MEMORY", wanted->memory, "Memory file");
   arguments.flag("--dry-run", wanted->dry_run, "Say what would be dropped, and drop nothing");
   arguments.options("prune", wanted->options);
+  arguments.common({"--max-difference", "--reach-m", "--outdated-within-m"});
   return [wanted](Session& session) { return prune(*wanted, session); };
 }
 
@@ -119,7 +120,8 @@ Run declare(Arguments& arguments) {
 Verb prune_verb() {
   return {"prune", "Keep one view of places where views hardly change",
           "A view is dropped when a newer one that is kept differs from it by no more than\n"
-          "--max-difference and was taken near it. Says by how much the memory shrinks and how "
+          "--max-difference and was taken near it. The verb says by how much the memory shrinks "
+          "and how "
           "far the\n"
           "reference that is found for a dropped view is from it, before and after. panonav undo "
           "brings\n"

@@ -78,7 +78,7 @@ void note_other_kind(const Dataset& recording, Session& session) {
 void declare_pictures(Arguments& arguments, PictureArguments& pictures) {
   arguments.choice("--kind", pictures.kind, {"panorama", "equirectangular", "mirror"},
                    "What the pictures show, where no dataset.toml says it");
-  arguments.option("--camera", pictures.camera,
+  arguments.option("--camera FILE", pictures.camera,
                    "Calibration of a mirror camera (panonav calibrate)");
   arguments.choice("--columns-run", pictures.columns, {"clockwise", "counter-clockwise"},
                    "How columns run, seen from above; default clockwise");
@@ -86,6 +86,7 @@ void declare_pictures(Arguments& arguments, PictureArguments& pictures) {
                    "Fraction of the width that looks along the heading; default 0.5");
   arguments.option("--elevation-deg", pictures.elevation_deg,
                    "Lower and upper edge of a panorama, or the band to keep of other pictures");
+  arguments.uncommon({"--columns-run", "--forward-column"});
 }
 
 std::optional<PictureSource> picture_source(const PictureArguments& pictures) {

@@ -55,8 +55,15 @@ ExitCode reproduce(const ReproduceArguments& wanted, Session& session) {
 
 Run declare(Arguments& arguments) {
   auto wanted = std::make_shared<ReproduceArguments>();
-  arguments.positional("PAPER", wanted->paper, "f11, m03, m04, navigation, s06, y03 or all");
-  arguments.option("-o,--out", wanted->out,
+  std::vector<std::string> papers;
+  std::string names;
+  for (const auto& paper : reproduced_papers()) {
+    papers.emplace_back(paper.name);
+    names.append(paper.name).append(", ");
+  }
+  papers.emplace_back("all");
+  arguments.positional("PAPER", wanted->paper, names + "or all", std::move(papers));
+  arguments.option("-o,--out FOLDER", wanted->out,
                    "Folder for the report (default: reproduction/PAPER; all: reproduction)");
   arguments.flag("--quick", wanted->quick, "A smoke run: few scenes, few questions or runs");
   arguments.flag("--continue", wanted->continues,
@@ -86,24 +93,25 @@ Run declare(Arguments& arguments) {
           defaults(f11.scenes, m03.scenes, m04.scenes, navigation.scenes, s06.scenes, y03.scenes) +
           ")");
   arguments.option("--queries", wanted->queries, 1,
-                   "m04: questions in each" + fallback(m04.queries) + "; from 1)");
+                   "m04: questions in each" + fallback(m04.queries) + ")");
   arguments.option("--runs", wanted->runs, 2,
                    "m04: missions of figure 18 in each kind of place" + fallback(m04.missions) +
                        "); m03: runs in each variant of an office" + fallback(m03.runs) +
                        "); f11: paths in each Gazebo world" + fallback(f11.runs) +
                        "); navigation: missions in each kind of place" + fallback(navigation.runs) +
                        "); y03: runs along routes of 60 m in each place" + fallback(y03.runs) +
-                       "); from 2");
+                       ")");
   arguments.option("--rows", wanted->rows, 1,
-                   "m03, m04: rows of the views" + fallback(m03.rows) + "; from 1)");
+                   "m03, m04: rows of the views" + fallback(m03.rows) + ")");
   arguments.option(
-      "--data", wanted->data,
+      "--data FOLDER", wanted->data,
       "f11, m03, navigation, s06, y03: folder with the recordings and Gazebo worlds (default: the "
       "environment's "
       "PANONAV_DATA; without it they are left out)");
   const auto parts = tracking_reproduction_parts();
   arguments.choice("--only", wanted->only, {parts.begin(), parts.end()},
                    "m03: this part of the experiments (default: all)");
+  arguments.uncommon({"--queries", "--rows", "--only"});
   return [wanted](Session& session) { return reproduce(*wanted, session); };
 }
 
@@ -111,7 +119,8 @@ Run declare(Arguments& arguments) {
 
 Verb reproduce_verb() {
   return {"reproduce", "Run the experiments of a paper: published figures beside ours",
-          "Writes pictures, results.json, results.md and index.html into the folder. The full run "
+          "The verb writes pictures, results.json, results.md and index.html into the folder. The "
+          "full run "
           "of a paper takes minutes. `all` runs every paper in a folder of its own and writes one "
           "table of all; targets that are missed are results and do not change the exit code.",
           "  panonav reproduce m03\n  panonav reproduce m04 --quick --json -o smoke\n"

@@ -95,7 +95,7 @@ void remove_file(const fs::path& path) {
 
 Reproduction reproduce_paper(const ReproducedPaper& paper, const ReproduceArguments& wanted,
                              const fs::path& out, Session& session) {
-  Progress progress("reproduce " + std::string(paper.name), 100);
+  Progress progress(session, "reproduce " + std::string(paper.name), 100);
   std::size_t shown_percent = 0;
   const ReproductionProgress report = [&](std::string_view, double fraction) {
     const auto percent = static_cast<std::size_t>(100.0 * fraction);

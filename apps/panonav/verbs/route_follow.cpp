@@ -147,7 +147,7 @@ ExitCode follow_run(const FollowArguments& wanted, Session& session) {
   if (wanted.report) prepare_route_report(*wanted.report, "route follow");
 #endif
   std::vector<FollowedImage> images;
-  Progress progress("following", (run.entries.size() - 1) / wanted.every + 1);
+  Progress progress(session, "following", (run.entries.size() - 1) / wanted.every + 1);
   follow(follower, run, truth, wanted.every, session.executor(), [&](FollowedImage&& image) {
     progress.clear();
     session.print(session.json() ? json_line(as_json(image, headings_known))
@@ -180,16 +180,17 @@ Run declare(Arguments& arguments) {
   auto wanted = std::make_shared<FollowArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file with a route");
   arguments.positional("DATASET", wanted->dataset, "Data set of a later drive, in its order");
-  arguments.option("--name", wanted->name, "Name of the route; the only one where none is given");
-  arguments.option("--every", wanted->every, 1,
-                   "Look at every N-th picture only and go by odometry between (default 1)");
+  arguments.option("--name NAME", wanted->name,
+                   "Name of the route; the only one where none is given");
+  arguments.option("--every N", wanted->every, 1,
+                   "Look at every N-th picture only and go by odometry between");
   arguments.flag("--no-odometry", wanted->no_odometry,
                  "Search the whole route for each picture alone");
-  arguments.option("--tum", wanted->tum,
+  arguments.option("--tum FILE", wanted->tum,
                    "Write the poses on the route to this file: TUM text, or CSV for a name that "
                    "ends in .csv");
 #ifdef PANONAV_COMMAND_SIMULATES
-  arguments.option("--report", wanted->report,
+  arguments.option("--report FOLDER", wanted->report,
                    "Write pictures of the route, the fixes, and what was seen beside what the "
                    "route shows into this folder: a new one, or that of an earlier report");
 #endif
@@ -208,8 +209,8 @@ Verb route_follow_verb() {
           "prediction\n"
           "does not hold the robot is looked for around it, then on the whole route. Parts of the "
           "scene\n"
-          "that are not as remembered are left out and named. Ends with 1 when no picture is on "
-          "the route.",
+          "that are not as remembered are left out and named. The exit code is 1 when no picture "
+          "is on the route.",
           "  panonav route follow office.panonav repeat_run\n"
           "  panonav route follow office.panonav repeat_run --report followed\n"
           "  panonav route follow office.panonav repeat_run --no-odometry --json",

@@ -100,7 +100,7 @@ RecordedRoute record_lines(const RecordArguments& wanted, const Dataset& dataset
   for (const std::size_t entry : chosen) drive.push_back(poses[entry]);
   const std::size_t recorded = recorder.skip_recorded(drive);
   chosen.erase(chosen.begin(), chosen.begin() + static_cast<std::ptrdiff_t>(recorded));
-  Progress progress("recording", chosen.size());
+  Progress progress(session, "recording", chosen.size());
   make_in_order(
       chosen.size(), session.executor(),
       [&](std::size_t i) {
@@ -163,7 +163,7 @@ ExitCode record(const Arguments& arguments, const RecordArguments& wanted, Sessi
         "The pictures' elevations are not known: all rows are averaged into a line. Say which show "
         "the horizon with --horizon-rows.");
   }
-  session.print("Next: panonav route follow " + wanted.memory + " DATASET");
+  session.suggest({"panonav", "route", "follow", wanted.memory, "DATASET"});
   return ExitCode::done;
 }
 
@@ -173,17 +173,17 @@ Run declare(Arguments& arguments) {
                        "Data set with positions or odometry, in the order of the drive");
   arguments.positional("MEMORY", wanted->memory,
                        "Memory file (NAME.panonav); made where there is none");
-  arguments.option("--name", wanted->name,
-                   "Name of the route; grows if it is there (default route)");
-  arguments.option("--every-m", wanted->every_m, "Way between lines, in metres (default 0.1)");
-  arguments.option("--every", wanted->every, 1, "Take every N-th picture only (default 1)");
-  arguments.option("--horizon-rows", wanted->horizon_rows,
-                   "FIRST-LAST: rows that show the horizon, from 0 at the top, of panoramas whose "
+  arguments.option("--name NAME", wanted->name, "Name of the route; it grows if it is there");
+  arguments.option("--every-m METRES", wanted->every_m,
+                   "Way between lines, in metres (default 0.1)");
+  arguments.option("--every N", wanted->every, 1, "Take every N-th picture only");
+  arguments.option("--horizon-rows FIRST-LAST", wanted->horizon_rows,
+                   "Rows that show the horizon, from 0 at the top, of panoramas whose "
                    "elevations are not known; all without it");
   arguments.flag("--odometry", wanted->odometry,
                  "Remember the odometry's poses, even where the data set knows positions");
 #ifdef PANONAV_COMMAND_SIMULATES
-  arguments.option("--report", wanted->report,
+  arguments.option("--report FOLDER", wanted->report,
                    "Write a picture of the route panorama into this folder: a new one, or that of "
                    "an earlier report");
 #endif
@@ -196,9 +196,9 @@ Run declare(Arguments& arguments) {
 Verb route_record_verb() {
   return {
       "route record", "Remember a route as one line of pixels a step",
-      "What the camera sees at its own height, a byte a degree, from every place of the way: a "
-      "few\n"
-      "megabytes a kilometre. Lines are on the disk batch by batch; after an interruption the "
+      "The route holds what the camera sees at its own height, a byte a degree, from every place "
+      "of the way: a few megabytes a kilometre. Lines are on the disk batch by batch; after an "
+      "interruption the "
       "same\n"
       "command goes on where it stopped, and a drive that goes on where the route ends makes it "
       "longer.",

@@ -185,7 +185,8 @@ Run declare(Arguments& arguments) {
   auto wanted = std::make_shared<ShowArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file");
   arguments.positional("VIEW", wanted->view, "Name or id of a view");
-  arguments.option("-o,--thumbnail", wanted->thumbnail, "Write its thumbnail into this PNG file");
+  arguments.option("-o,--thumbnail FILE", wanted->thumbnail,
+                   "Write its thumbnail into this PNG file");
   return [wanted](Session& session) { return show(*wanted, session); };
 }
 
@@ -193,8 +194,8 @@ Run declare(Arguments& arguments) {
 
 Verb show_verb() {
   return {"show", "Show all that a memory knows of a view",
-          "Its pose, links and place in maps, its size, and the five views that are most similar\n"
-          "and nearest to it.",
+          "The answer has the view's pose, links and place in maps, its size, and the five views "
+          "that are most similar and nearest to it.",
           "  panonav show office.panonav view_00012.png\n"
           "  panonav show office.panonav 13 -o view_13.png",
           declare};

@@ -103,7 +103,7 @@ ExitCode simulate(const Arguments& arguments, SimulateArguments wanted, Session&
                            static_cast<std::uint64_t>(settled.simulation.scene.seed));
   const bool with_path =
       wanted.trajectory.has_value() || settled.recording.path != RecordingPath::random;
-  Progress progress("rendering", poses.size());
+  Progress progress(session, "rendering", poses.size());
   const auto dataset = record_dataset(world, wanted.out, poses, with_path, session.executor(),
                                       [&] { progress.advance(); });
   progress.clear();
@@ -115,25 +115,29 @@ ExitCode simulate(const Arguments& arguments, SimulateArguments wanted, Session&
   } else {
     session.print(session.strong(std::to_string(dataset.entries.size())) + " views of " +
                   world.scene().name + " in " + wanted.out);
-    session.print("Next: panonav memorise " + wanted.out + " NAME.panonav");
+    session.suggest({"panonav", "memorise", wanted.out, "NAME.panonav"});
   }
   return ExitCode::done;
 }
 
 Run declare(Arguments& arguments) {
   auto wanted = std::make_shared<SimulateArguments>();
+  const auto scenes = scene_names();
   std::string names;
-  for (const auto name : scene_names()) names += (names.empty() ? "" : ", ") + std::string(name);
+  for (const auto name : scenes) names += (names.empty() ? "" : ", ") + std::string(name);
   arguments.positional("SCENE", wanted->scene,
-                       "Built-in scene (" + names + "), Gazebo world (.world, .sdf) or mesh file");
+                       "Built-in scene (" + names + "), Gazebo world (.world, .sdf) or mesh file",
+                       {scenes.begin(), scenes.end()});
   arguments.positional("OUT", wanted->out, "Folder for the data set; new or empty");
-  arguments.option("--grid", wanted->grid_m,
+  arguments.option("--grid METRES", wanted->grid_m,
                    "Short for --path grid --spacing-m: all free places of a grid");
-  arguments.option("--random", wanted->random,
+  arguments.option("--random N", wanted->random,
                    "Short for --path random --poses: random places and headings");
-  arguments.option("--trajectory", wanted->trajectory,
+  arguments.option("--trajectory FILE", wanted->trajectory,
                    "Poses of a trajectory file (TUM text or CSV)");
   declare_simulation(arguments, wanted->simulation);
+  arguments.common(
+      {"--path", "--spacing-m", "--poses", "--kind", "--seed", "--light", "--moved-objects"});
   return [wanted, &arguments](Session& session) { return simulate(arguments, *wanted, session); };
 }
 
@@ -141,9 +145,8 @@ Run declare(Arguments& arguments) {
 
 Verb simulate_verb() {
   return {"simulate", "Render a data set of a simulated robot with a mirror camera",
-          "Every way but random places comes with stamps and noisy odometry. Same options and "
-          "seeds, same pictures on\n"
-          "one kind of processor.",
+          "Every way but random places comes with stamps and noisy odometry. The same options and "
+          "seeds give the same pictures on one kind of processor.",
           "  panonav simulate office memory_run --grid 0.25\n"
           "  panonav simulate office query_run --random 20 --seed 7\n"
           "  panonav simulate house.world house_run --grid 0.5 --kind panorama",

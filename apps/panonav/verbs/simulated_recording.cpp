@@ -168,11 +168,11 @@ void discard(const Dataset& dataset, bool with_folder) {
 void visit_options(SceneOptions& options, OptionVisitor& visitor) {
   using T = SceneOptions;
   constexpr OptionTable table{
-      option<&T::seed>("of poses, noise, tilt and odometry", 0),
-      option<&T::scene_seed>("varies textures and furniture of built-in scenes", 0),
+      option<&T::seed>("seed of poses, noise, tilt and odometry", 0),
+      option<&T::scene_seed>("seed of the textures and furniture of built-in scenes", 0),
       option<&T::moved_objects>("share of the movable objects that stand elsewhere", 0, 1),
-      option<&T::moved_seed>("which objects moved, and where to", 0),
-      option<&T::light>("all lamps and the sky times this", above(0), 100),
+      option<&T::moved_seed>("seed of which objects are moved, and where to", 0),
+      option<&T::light>("factor on the brightness of all lamps and the sky", above(0), 100),
   };
   table.visit(options, visitor);
 }

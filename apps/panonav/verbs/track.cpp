@@ -31,7 +31,7 @@ void visit_options(StartOptions& options, OptionVisitor& visitor) {
   using T = StartOptions;
   constexpr OptionTable table{
       option<&T::deviation_m>("standard deviation of x and of y of the start pose", 0, 1e6),
-      option<&T::heading_deviation_deg>("standard deviation of its heading", 0, 360),
+      option<&T::heading_deviation_deg>("standard deviation of the start heading", 0, 360),
   };
   table.visit(options, visitor);
 }
@@ -239,7 +239,7 @@ ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Ses
 #endif
 
   std::vector<TrackedImage> images;
-  Progress progress("tracking", (run.entries.size() - 1) / settings.every + 1);
+  Progress progress(session, "tracking", (run.entries.size() - 1) / settings.every + 1);
   track(tracker, run, settings, session.executor(), [&](TrackedImage&& image) {
     progress.clear();
     session.print(session.json() ? json_line(as_json(image)) : as_text(image, session));
@@ -272,23 +272,25 @@ Run declare(Arguments& arguments) {
   arguments.positional("MEMORY", wanted->memory, "Memory file");
   arguments.positional("DATASET", wanted->dataset,
                        "Data set with odometry, in the order of the run");
-  arguments.option("--every", wanted->every, 1,
-                   "Look at every N-th picture only and go by odometry between (default 1)");
-  arguments.option("--start-x-m", wanted->start_x_m, "The run starts here, not anywhere");
-  arguments.option("--start-y-m", wanted->start_y_m, "Likewise");
+  arguments.option("--every N", wanted->every, 1,
+                   "Look at every N-th picture only and go by odometry between");
+  arguments.option("--start-x-m", wanted->start_x_m,
+                   "x of the place where the run starts; without it the run starts anywhere");
+  arguments.option("--start-y-m", wanted->start_y_m, "y of that place");
   arguments.option("--start-heading-deg", wanted->start_heading_deg,
-                   "Heading at the start; alone: of a robot that does not know its place");
-  arguments.option("--tum", wanted->tum,
+                   "Heading at the start; it may be given without the place");
+  arguments.option("--tum FILE", wanted->tum,
                    "Write the trajectory of localised images to this file: TUM text, or CSV for a "
                    "name that ends in .csv");
 #ifdef PANONAV_COMMAND_SIMULATES
-  arguments.option("--report", wanted->report,
+  arguments.option("--report FOLDER", wanted->report,
                    "Write pictures and an animation of particles, estimate and truth into this "
                    "folder: a new one, or that of an earlier report");
 #endif
   arguments.options("start", wanted->start, "start");
   arguments.options("monte_carlo", wanted->filter);
   arguments.options("odometry", wanted->odometry, "odometry");
+  arguments.common({"--seed"});
   return [wanted, &arguments](Session& session) { return track_run(arguments, *wanted, session); };
 }
 
@@ -300,7 +302,7 @@ Verb track_verb() {
           "look\n"
           "alike are kept until a picture tells them apart, and a robot that was kidnapped is "
           "found\n"
-          "again. Ends with 1 when it was never localised.",
+          "again. The exit code is 1 when it was never localised.",
           "  panonav track office.panonav run\n"
           "  panonav track office.panonav run --every 10 --report report\n"
           "  panonav track office.panonav run --tum estimate.tum --json\n"

@@ -49,11 +49,9 @@ Run declare(Arguments& arguments) {
 
 Verb undo_verb() {
   return {"undo", "Take back the last forget, prune or rename",
-          "Brings back views, their small pictures and links, what they were in maps, and former "
-          "names.\n"
-          "Views that were added since stay. Refused when one of them has the name of a view that "
-          "comes\n"
-          "back, or when a map was made anew.",
+          "Views come back with their small pictures, their links, what they were in maps, and "
+          "their former names. Views that were added since stay. The verb is refused when one of "
+          "them has the name of a view that comes back, or when a map was made anew.",
           "  panonav undo office.panonav --dry-run\n"
           "  panonav undo office.panonav",
           declare};

@@ -59,6 +59,7 @@ Run declare(Arguments& arguments) {
   arguments.required_option("-o,--out", wanted->out, "PNG picture to write");
   declare_pictures(arguments, wanted->pictures);
   arguments.options("unwarper", wanted->unwarper);
+  arguments.common({"--rows", "--columns"});
   return [wanted](Session& session) { return unwrap(*wanted, session); };
 }
 

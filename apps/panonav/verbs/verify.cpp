@@ -47,7 +47,7 @@ Run declare(Arguments& arguments) {
 
 Verb verify_verb() {
   return {"verify", "Check every byte of a memory that can be checked",
-          "Ends with 0 when the file is intact, with 2 when it is not.",
+          "The exit code is 0 when the file is intact, and 2 when it is not.",
           "  panonav verify office.panonav", declare};
 }
 

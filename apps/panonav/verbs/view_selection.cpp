@@ -33,9 +33,10 @@ std::array<double, 3> circle_of(const std::string& text) {
 
 void declare_selection(Arguments& arguments, ViewSelection& selection) {
   arguments.option(
-      "--name", selection.name,
+      "--name PATTERN", selection.name,
       "Only views whose name fits a pattern: * stands for any text, ? for a character");
-  arguments.option("--near", selection.near, "Only views at most METRES from a place: X,Y,METRES");
+  arguments.option("--near X,Y,METRES", selection.near,
+                   "Only views at most so far from this place");
 }
 
 std::vector<ViewRecord> selected(std::vector<ViewRecord> views, const ViewSelection& selection) {

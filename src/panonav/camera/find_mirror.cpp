@@ -284,10 +284,12 @@ void visit_options(MirrorSearchOptions& options, OptionVisitor& visitor) {
       option<&T::max_rim>("largest radius of the mirror's rim, in longer sides of the image",
                           above(0), 2)
           .formerly("largest_rim"),
-      option<&T::visible_fraction>("least part of the rim that lies inside the frame", 0.25, 1)
+      option<&T::visible_fraction>("smallest part of the rim that must lie inside the frame", 0.25,
+                                   1)
           .formerly("visible_part"),
       option<&T::min_quality>(
-          "least quality of a rim, from 0 (any circle) to 1 (a sharp edge all around)", above(0), 1)
+          "lowest quality of a rim, from 0 (any circle) to 1 (a sharp edge all around)", above(0),
+          1)
           .formerly("least_quality"),
   };
   table.visit(options, visitor);

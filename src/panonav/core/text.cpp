@@ -4,6 +4,7 @@
 #include <array>
 #include <iomanip>
 #include <sstream>
+#include <vector>
 
 namespace panonav {
 
@@ -35,6 +36,25 @@ std::size_t character_size(std::string_view text) {
     return number < form.smallest || number > 0x10FFFF || surrogate ? 0 : form.size;
   }
   return 0;
+}
+
+// Insertions, deletions, changes and swaps of neighbours that make one text of the other.
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::vector<std::size_t>> cost(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
+  for (std::size_t i = 0; i <= a.size(); ++i) {
+    for (std::size_t j = 0; j <= b.size(); ++j) {
+      if (i == 0 || j == 0) {
+        cost[i][j] = i + j;
+        continue;
+      }
+      cost[i][j] = std::min({cost[i - 1][j] + 1, cost[i][j - 1] + 1,
+                             cost[i - 1][j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1)});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) {
+        cost[i][j] = std::min(cost[i][j], cost[i - 2][j - 2] + 1);
+      }
+    }
+  }
+  return cost.back().back();
 }
 
 }  // namespace
@@ -104,6 +124,33 @@ std::string shortened(std::string_view text, std::size_t max_characters) {
     while (continues(text[end]));
   }
   return std::string(text.substr(0, begin)) + "..." + std::string(text.substr(end));
+}
+
+std::string did_you_mean(std::string_view typed, std::span<const std::string_view> names) {
+  constexpr std::size_t longest = 64;  // the work grows with the square
+  if (typed.size() > longest) return {};
+  std::size_t best = std::max<std::size_t>(1, typed.size() / 3) + 1;
+  std::string_view nearest;
+  for (const auto name : names) {
+    // The beginning of a longer name is that name.
+    const bool begins = typed.size() >= 4 && name.starts_with(typed);
+    const std::size_t distance = begins ? 1 : edit_distance(typed, name);
+    if (distance >= best) continue;
+    best = distance;
+    nearest = name;
+  }
+  return nearest.empty() ? "" : " (did you mean '" + std::string(nearest) + "'?)";
+}
+
+std::string shell_quoted(std::string_view text) {
+  const auto plain = [](char c) {
+    return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
+           std::string_view("_./:=,+@%-").find(c) != std::string_view::npos;
+  };
+  if (!text.empty() && std::ranges::all_of(text, plain)) return std::string(text);
+  std::string quoted = "'";
+  for (const char c : text) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return quoted + "'";
 }
 
 }  // namespace panonav

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -22,5 +23,14 @@ namespace panonav {
 
 /// Valid UTF-8 with its middle left out ("...") where it has more than `max_characters` (>= 8).
 [[nodiscard]] std::string shortened(std::string_view text, std::size_t max_characters);
+
+/// " (did you mean 'NAME'?)" with the name that is nearest to what was typed; empty where none is
+/// near: more than a third of the characters would have to be inserted, deleted, changed or
+/// swapped.
+[[nodiscard]] std::string did_you_mean(std::string_view typed,
+                                       std::span<const std::string_view> names);
+
+/// The text as one word for a POSIX shell, in quotation marks where it needs them.
+[[nodiscard]] std::string shell_quoted(std::string_view text);
 
 }  // namespace panonav

@@ -6,6 +6,7 @@
 #include <variant>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 
 namespace panonav {
 
@@ -128,12 +129,16 @@ bool OptionFile::has(std::string_view section, std::string_view field) const {
   return table != nullptr && std::ranges::find(*table, field, &TomlField::name) != table->end();
 }
 
-void OptionFile::require_sections(std::span<const std::string_view> known) const {
+void OptionFile::require_sections(std::span<const std::string_view> own,
+                                  std::span<const std::string_view> others) const {
   for (const TomlField& field : table_) {
-    if (std::ranges::find(known, field.name) != known.end()) continue;
+    if (std::ranges::find(own, field.name) != own.end()) continue;
+    if (std::ranges::find(others, field.name) != others.end()) continue;
     std::string all;
-    for (const auto name : known) all += (all.empty() ? "" : ", ") + std::string(name);
-    throw FileError(path_.string(), "[" + field.name + "] is not a known section; known: " + all);
+    for (const auto name : own) all += (all.empty() ? "" : ", ") + std::string(name);
+    throw FileError(path_.string(), "[" + readable_line(field.name) + "] is not a known section" +
+                                        did_you_mean(field.name, own) +
+                                        "; known: " + (all.empty() ? "none" : all));
   }
 }
 

@@ -33,9 +33,10 @@ class OptionFile {
 
   /// Whether the file gives this field.
   [[nodiscard]] bool has(std::string_view section, std::string_view field) const;
-  /// Throws FileError when the file has a section that is not among `known`: a misspelt one would
-  /// otherwise do nothing.
-  void require_sections(std::span<const std::string_view> known) const;
+  /// Throws FileError when the file has a section that is neither among `own` nor among `others`: a
+  /// misspelt one would otherwise do nothing. The message names `own` only.
+  void require_sections(std::span<const std::string_view> own,
+                        std::span<const std::string_view> others = {}) const;
   /// One line for each former name that was met in the sections applied.
   [[nodiscard]] const std::vector<std::string>& warnings() const noexcept { return warnings_; }
 

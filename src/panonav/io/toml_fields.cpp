@@ -243,9 +243,10 @@ void TomlFields::finish() const {
     if (asked_.contains(field.name)) continue;
     std::string known;
     for (const auto& name : asked_) known += (known.empty() ? "" : ", ") + name;
+    const std::vector<std::string_view> names(asked_.begin(), asked_.end());
     throw FileError(path_.string(), (section_.empty() ? "" : "[" + section_ + "] ") +
-                                        readable_line(field.name) +
-                                        " is not a known field; known: " + known);
+                                        readable_line(field.name) + " is not a known field" +
+                                        did_you_mean(field.name, names) + "; known: " + known);
   }
 }
 

@@ -82,7 +82,7 @@ void put_nearest_first(const VisualMemory& memory, Point2 position,
 void visit_options(LocaliserOptions& options, OptionVisitor& visitor) {
   using T = LocaliserOptions;
   constexpr OptionTable table{
-      option<&T::top>("matches listed", 1, 1e6),
+      option<&T::top>("number of matches listed", 1, 1e6),
       option<&T::components>("Fourier components compared, 0 for all", 0),
       option<&T::reranked_views>("views compared column by column when the nearest ones do not "
                                  "explain the picture; 0 keeps the order of dissimilarity",

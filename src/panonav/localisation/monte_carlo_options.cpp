@@ -12,7 +12,7 @@ void visit_options(MonteCarloOptions& options, OptionVisitor& visitor) {
       option<&T::kld_error>(
           "allowed error of the particles' distribution; smaller needs more particles", 1e-4, 1),
       option<&T::resample_below>(
-          "effective sample size below which particles are resampled, as a share", 0, 1),
+          "effective sample size below which particles are resampled, as a share of them", 0, 1),
       option<&T::compass>("weigh headings by the visual compass"),
       choice<&T::injection>("where new particles are drawn", "none", "uniform", "topological",
                             "explained")

@@ -452,11 +452,11 @@ class Arranger {
 void visit_options(LatticeOptions& options, OptionVisitor& visitor) {
   using T = LatticeOptions;
   constexpr OptionTable table{
-      option<&T::neighbours>("springs that each view asks for, to the most similar views", 1, 1000),
+      option<&T::neighbours>("springs of each view to the most similar views", 1, 1000),
       option<&T::components>("Fourier components compared, 0 for all", 0),
       option<&T::phases>("take directions and headings from phases"),
-      option<&T::landmarks>("views from which the start is laid out", 3, 2000),
-      option<&T::rounds>("how often curve and springs are made anew from the arrangement", 1, 20),
+      option<&T::landmarks>("views from which the initial arrangement is made", 3, 2000),
+      option<&T::rounds>("times that curve and springs are made anew from the arrangement", 1, 20),
   };
   table.visit(options, visitor);
 }

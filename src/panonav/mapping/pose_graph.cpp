@@ -193,8 +193,10 @@ class Problem {
 void visit_options(PoseGraphOptions& options, OptionVisitor& visitor) {
   using T = PoseGraphOptions;
   constexpr OptionTable table{
-      option<&T::max_iterations>("steps of the solver", 1, 1000).formerly("most_iterations"),
-      option<&T::settled_m>("solved when no position changes by more", above(0), 1e6),
+      option<&T::max_iterations>("largest number of steps of the solver", 1, 1000)
+          .formerly("most_iterations"),
+      option<&T::settled_m>("the solver has converged when no position changes by more", above(0),
+                            1e6),
       option<&T::doubt_deviations>(
           "error at which a loop closure loses its weight, in standard deviations", above(0), 1e6),
   };

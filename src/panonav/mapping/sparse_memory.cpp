@@ -99,14 +99,16 @@ class Pairs {
 void visit_options(SparseMemoryOptions& options, OptionVisitor& visitor) {
   using T = SparseMemoryOptions;
   constexpr OptionTable table{
-      option<&T::max_difference>("a view is redundant when one that is kept differs by no more", 0,
-                                 1)
+      option<&T::max_difference>("largest difference from a kept view at which a view is redundant",
+                                 0, 1)
           .formerly("most_difference"),
-      option<&T::reach_m>("only a view so near stands for another, where positions are known",
-                          above(0), 1e6),
-      option<&T::reach_links>("only a view so many links away, where they are not", 0, 1000),
+      option<&T::reach_m>(
+          "distance within which a view stands for another, where positions are known", above(0),
+          1e6),
+      option<&T::reach_links>(
+          "links within which a view stands for another, where positions are not known", 0, 1000),
       option<&T::outdated_within_m>(
-          "a view is outdated when a newer one was taken so near; 0: never", 0, 1e6),
+          "distance of a newer view within which a view is outdated; 0: never", 0, 1e6),
   };
   table.visit(options, visitor);
 }

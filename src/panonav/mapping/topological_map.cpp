@@ -90,7 +90,7 @@ void visit_options(MappingOptions& options, OptionVisitor& visitor) {
   using T = MappingOptions;
   constexpr OptionTable table{
       option<&T::capture_difference>(
-          "a view becomes a node when it differs from the last by more; 0: every view", 0, 1),
+          "difference from the last node above which a view becomes a node; 0: every view", 0, 1),
       option<&T::close_loops>("look for places passed before"),
       option<&T::bridge_m>(
           "length of steps that neither views nor wheels show; 0: a new component begins", 0, 1e6),

@@ -75,7 +75,8 @@ void visit_options(VisualOdometryOptions& options, OptionVisitor& visitor) {
       choice<&T::rule>("how the motion between two views is read", "published", "home_vector"),
       option<&T::scale_m>("metres for each unit of length that the views give", above(0), 1e6),
       option<&T::camera_height_m>(
-          "of the camera above level ground, which then tells lengths; 0: not known", 0, 100),
+          "height of the camera above level ground, which then gives lengths; 0: not known", 0,
+          100),
       option<&T::distance_components>(
           "components compared for the distance of the published rule (k1); 0: all", 0, 4096),
       option<&T::turn_components>(

@@ -14,8 +14,8 @@ void visit_options(FieldOptions& options, OptionVisitor& visitor) {
   using T = FieldOptions;
   constexpr OptionTable table{
       option<&T::links_ahead>("edges ahead that count for a direction", 1, 100),
-      option<&T::max_bend_rad>("a way that has bent by more is not looked along any further", 0,
-                               std::numbers::pi)
+      option<&T::max_bend_rad>("bend of the way beyond which edges no longer count for a direction",
+                               0, std::numbers::pi)
           .formerly("most_bend_rad"),
   };
   table.visit(options, visitor);

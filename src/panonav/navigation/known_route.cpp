@@ -41,7 +41,8 @@ std::optional<RouteStretch> follow_way(const KnownRoute& route, double start_m, 
 void visit_options(KnownRouteOptions& options, OptionVisitor& visitor) {
   using T = KnownRouteOptions;
   constexpr OptionTable table{
-      option<&T::beside_m>("references and robots lie no farther beside a route", above(0), 100),
+      option<&T::beside_m>("largest distance of references and robots beside a route", above(0),
+                           100),
       options_of<&T::tracker>(),
       options_of<&T::fit>(),
   };

@@ -47,7 +47,7 @@ void visit_options(NavigatorOptions& options, OptionVisitor& visitor) {
   using T = NavigatorOptions;
   constexpr OptionTable table{
       option<&T::step_m>("longest way between two steps", above(0), 100),
-      option<&T::near_links>("the next place is looked for within so many edges of the last one", 1,
+      option<&T::near_links>("edges from the last place within which the next one is searched", 1,
                              10),
       option<&T::coarse_components>("components compared in the open, 0 for all", 0, 1000),
       option<&T::views_ahead>("views of the next area that a step loads", 0, 1e6),

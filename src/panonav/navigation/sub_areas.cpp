@@ -14,8 +14,8 @@ namespace panonav {
 void visit_options(SubAreaOptions& options, OptionVisitor& visitor) {
   using T = SubAreaOptions;
   constexpr OptionTable table{
-      option<&T::views_per_area>("size of an area aimed at", 2, 1e6),
-      option<&T::iterations>("steps of relaxation by which each cut is sought", 0, 1e5),
+      option<&T::views_per_area>("number of views that an area should have", 2, 1e6),
+      option<&T::iterations>("relaxation steps for each cut", 0, 1e5),
   };
   table.visit(options, visitor);
 }

@@ -49,8 +49,8 @@ std::vector<float> mean_row(const Panorama& panorama, double half_band_rad) {
 void visit_options(HorizonScanlineOptions& options, OptionVisitor& visitor) {
   using T = HorizonScanlineOptions;
   constexpr OptionTable table{
-      option<&T::columns>("values of a line", 16, 16384),
-      option<&T::half_band_rad>("rows so near to the horizon are averaged", 0, 0.5),
+      option<&T::columns>("number of values of a line", 16, 16384),
+      option<&T::half_band_rad>("angle from the horizon within which rows are averaged", 0, 0.5),
   };
   table.visit(options, visitor);
 }

@@ -120,7 +120,7 @@ void visit_options(RecordingOptions& options, OptionVisitor& visitor) {
       choice<&T::path>("where the robot takes its pictures", "grid", "zigzag", "tour", "walk",
                        "random"),
       choice<&T::heading>("which way the robot faces", "fixed", "path", "random"),
-      option<&T::heading_rad>("heading where it is fixed"),
+      option<&T::heading_rad>("the fixed heading"),
       option<&T::spacing_m>("spacing of the grid, or along the path", above(0), 1000),
       option<&T::poses>("number of poses of a walk, or of random ones", 1, 1e7),
       option<&T::speed_m_s>("speed of the robot, which gives the time stamps", above(0), 100),

@@ -90,18 +90,17 @@ double light_factor(const SensorOptions& options, double azimuth_rad) {
 void visit_options(SensorOptions& options, OptionVisitor& visitor) {
   using T = SensorOptions;
   constexpr OptionTable table{
-      option<&T::exposure>("light that the camera collects, times a full exposure", above(0), 1000),
+      option<&T::exposure>("exposure, in units of a full one", above(0), 1000),
       option<&T::gain>("electronic amplification of signal and noise", above(0), 1000),
-      option<&T::read_noise>("standard deviation of a dark pixel, share of full scale", 0, 1),
+      option<&T::read_noise>("standard deviation of a dark pixel, as a share of full scale", 0, 1),
       option<&T::full_well>("electrons of a full pixel; fewer make more shot noise", 1, 1e12),
       option<&T::vignetting>("share of light lost at the mirror's rim", 0, 1),
-      option<&T::directional_light>("by which share things on the light's side are brighter", 0, 1),
-      option<&T::light_azimuth_rad>(
-          "where that light comes from, counter-clockwise from the heading", -kFullTurn, kFullTurn),
-      option<&T::occluded_fraction>("share of all azimuths that people or things stand before", 0,
-                                    1),
-      option<&T::occluders>("how many stand there, equally wide", 1, 1000),
-      option<&T::eight_bit>("values are multiples of 1/255"),
+      option<&T::directional_light>("share by which things on the light's side are brighter", 0, 1),
+      option<&T::light_azimuth_rad>("direction of that light, counter-clockwise from the heading",
+                                    -kFullTurn, kFullTurn),
+      option<&T::occluded_fraction>("share of all azimuths that people or things hide", 0, 1),
+      option<&T::occluders>("number of people or things that hide it, equally wide", 1, 1000),
+      option<&T::eight_bit>("round values to multiples of 1/255"),
   };
   table.visit(options, visitor);
 }

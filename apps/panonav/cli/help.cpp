@@ -1,0 +1,162 @@
+#include <algorithm>
+#include <array>
+
+#include "cli/texts.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+/// An argument and its help beside it, or below it where it is long.
+std::string row(const std::string& left, std::string_view right, std::size_t column) {
+  std::string line = "  " + left;
+  if (line.size() + 2 > column) {
+    line += "\n";
+    line.append(column, ' ');
+  } else {
+    line.resize(column, ' ');
+  }
+  return line + wrapped(right, column, column) + "\n";
+}
+
+/// The lines of the examples, at most so many.
+std::string examples(std::string_view text, std::size_t count) {
+  std::size_t end = 0;
+  while (count-- > 0 && end < text.size())
+    end = std::min(text.find('\n', end), text.size() - 1) + 1;
+  std::string kept(text.substr(0, end));
+  while (!kept.empty() && kept.back() == '\n') kept.pop_back();
+  return kept + "\n";
+}
+
+}  // namespace
+
+std::vector<Description> describe(std::span<const Verb> verbs) {
+  std::vector<Description> descriptions;
+  for (const auto& verb : verbs) descriptions.push_back(describe(verb));
+  return descriptions;
+}
+
+std::span<const ExitMeaning> exit_meanings() {
+  static constexpr std::array<ExitMeaning, 4> meanings{{
+      {ExitCode::done, "done"},
+      {ExitCode::no_answer, "no answer, for example lost"},
+      {ExitCode::bad_input, "bad input; one line on standard error says what is wrong"},
+      {ExitCode::fault, "fault of the program"},
+  }};
+  return meanings;
+}
+
+std::string wrapped(std::string_view text, std::size_t indent, std::size_t column) {
+  constexpr std::size_t width = 80;
+  std::string lines;
+  bool begins = true;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find_first_of(" \n"), text.size());
+    const auto word = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    if (word.empty()) continue;
+    if (!begins && column + 1 + word.size() > width) {
+      lines += '\n';
+      lines.append(indent, ' ');
+      column = indent;
+      begins = true;
+    }
+    lines.append(begins ? "" : " ").append(word);
+    column += word.size() + (begins ? 0 : 1);
+    begins = false;
+  }
+  return lines;
+}
+
+std::string help_line(const ArgumentInfo& argument) {
+  std::string notes;
+  const auto note = [&notes](const std::string& text) {
+    if (!text.empty()) notes += (notes.empty() ? "" : "; ") + text;
+  };
+  if (argument.required && !argument.positional()) note("required");
+  if (!argument.initial.empty()) note("default " + argument.initial);
+  note(argument.range);
+  std::string choices;
+  for (const auto& choice : argument.choices) choices += (choices.empty() ? "" : ", ") + choice;
+  if (!argument.positional() && !choices.empty()) note("one of " + choices);
+  return argument.help + (notes.empty() ? "" : " (" + notes + ")");
+}
+
+std::string forms(const ArgumentInfo& argument) {
+  return (argument.short_form.empty() ? "" : argument.short_form + ", ") + argument.name +
+         (argument.value.empty() ? "" : " " + argument.value);
+}
+
+std::string usage(const Description& description) {
+  std::string text = "[OPTIONS]";
+  for (const auto& argument : description.arguments) {
+    if (argument.positional() || !argument.required) continue;
+    text += " " + (argument.short_form.empty() ? argument.name : argument.short_form) + " " +
+            argument.value;
+  }
+  for (const auto& argument : description.arguments) {
+    if (!argument.positional()) continue;
+    const std::string word = argument.name + (argument.repeated ? "..." : "");
+    text += argument.required ? " " + word : " [" + word + "]";
+  }
+  return text;
+}
+
+std::string group_title(const ArgumentInfo& argument) {
+  if (argument.of_every_verb) return "Options of every verb";
+  return argument.section.empty() ? "Options" : "Options of [" + argument.section + "]";
+}
+
+std::string help_text(const Description& description, bool all) {
+  const auto& [verb, arguments] = description;
+  const std::string name(verb.name);
+  std::string text = wrapped(std::string(verb.summary) + ".", 0, 0) + "\n\n";
+  text += "Usage: panonav " + name + " " + usage(description) + "\n";
+  if (!verb.alias.empty()) text += "Also: panonav " + std::string(verb.alias) + "\n";
+  text += "\nExamples:\n" + examples(verb.example, all ? arguments.size() + 100 : 2);
+  std::string title;
+  std::size_t hidden = 0;
+  for (const bool positional : {true, false}) {
+    for (const auto& argument : arguments) {
+      if (argument.positional() != positional) continue;
+      if (!all && !argument.common) {
+        ++hidden;
+        continue;
+      }
+      // The short help has one list of options.
+      const std::string group = positional ? "Arguments" : all ? group_title(argument) : "Options";
+      if (group != title) text += "\n" + group + ":\n";
+      title = group;
+      text += row(forms(argument), help_line(argument), 28);
+    }
+  }
+  if (!verb.details.empty()) text.append("\n").append(wrapped(verb.details, 0, 0)).append("\n");
+  if (hidden > 0) {
+    text += "\nThere are " + std::to_string(hidden) + " more options: panonav " + name +
+            " --help-all\n";
+  }
+  text.pop_back();  // whoever prints it ends the line
+  return text;
+}
+
+std::string overview(std::span<const Verb> verbs) {
+  std::string text =
+      wrapped(
+          "Image-based memory for robot navigation from omnidirectional images: it remembers "
+          "what places look like, and knows from that where the robot is and which way it "
+          "faces.",
+          0, 0) +
+      "\n\nUsage: panonav VERB [OPTIONS] ARGUMENTS\n\nVerbs:\n";
+  for (const auto& verb : verbs) text += row(std::string(verb.name), verb.summary, 17);
+  text +=
+      "\npanonav help VERB shows how a verb is used, panonav VERB --help-all all its options, and\n"
+      "panonav --version the version.\n\nExit codes:\n";
+  for (const auto& [code, meaning] : exit_meanings()) {
+    text += row(std::to_string(static_cast<int>(code)), meaning, 5);
+  }
+  text.pop_back();
+  return text;
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,141 @@
+#include <algorithm>
+#include <array>
+#include <cctype>
+
+#include "cli/texts.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+struct Meaning {
+  std::string_view name;
+  std::string_view meaning;
+};
+
+constexpr std::array<Meaning, 4> environment{{
+    {"PANONAV_DATA", "Folder of the real recordings that panonav reproduce uses."},
+    {"PANONAV_INSTRUCTIONS",
+     "The instruction set of the processor to use: scalar, avx2, avx512 or neon. The best one is "
+     "found where it is not set."},
+    {"GAZEBO_MODEL_PATH, GZ_SIM_RESOURCE_PATH",
+     "Folders where models of Gazebo worlds are looked for."},
+    {"NO_COLOR", "Where it is set, output is not coloured."},
+}};
+
+constexpr std::array<Meaning, 4> files{{
+    {"NAME.panonav",
+     "A memory: an SQLite database. NAME.panonav-wal and NAME.panonav-shm lie beside it while it "
+     "is open for writing, and belong to it."},
+    {"dataset.toml", "Says how the pictures of a data set lie; it is in the folder of them."},
+    {"camera.toml", "The calibration of a mirror camera, as panonav calibrate writes it."},
+    {"FILE of --config", "Options by section; panonav VERB --config-template prints one."},
+}};
+
+/// Text that roff shows as it is; lines are filled.
+std::string roff(std::string_view text) {
+  std::string shown;
+  for (const char c : text) {
+    if (c == '\\') {
+      shown += "\\e";
+    } else if (c == '-') {
+      shown += "\\-";
+    } else if (c == '\n') {
+      shown += ' ';
+    } else {
+      shown += c;
+    }
+  }
+  return !shown.empty() && (shown.front() == '.' || shown.front() == '\'') ? "\\&" + shown : shown;
+}
+
+std::string entry(std::string_view term, std::string_view text) {
+  return ".TP\n\\fB" + roff(term) + "\\fR\n" + roff(text) + "\n";
+}
+
+template <class Meanings>
+std::string entries(std::string_view title, const Meanings& meanings) {
+  std::string text = ".SH " + std::string(title) + "\n";
+  for (const auto& [name, meaning] : meanings) text += entry(name, meaning);
+  return text;
+}
+
+std::string exit_status() {
+  std::string text = ".SH EXIT STATUS\n";
+  for (const auto& [code, meaning] : exit_meanings()) {
+    text += entry(std::to_string(static_cast<int>(code)), std::string(meaning) + ".");
+  }
+  return text;
+}
+
+std::string header(std::string_view page, std::string_view summary) {
+  std::string upper(page);
+  for (char& c : upper) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  return ".TH \"" + roff(upper) +
+         "\" 1 \"\" \"panonav " PANONAV_VERSION "\" \"panonav manual\"\n.nh\n.ad l\n.SH NAME\n" +
+         roff(page) + " \\- " + roff(summary) + "\n.SH SYNOPSIS\n";
+}
+
+}  // namespace
+
+std::string manual_name(const Verb& verb) {
+  std::string name = "panonav-" + std::string(verb.name);
+  std::ranges::replace(name, ' ', '-');
+  return name;
+}
+
+std::string manual_page(const Description& description) {
+  const auto& [verb, arguments] = description;
+  std::string text = header(manual_name(verb), verb.summary);
+  for (const auto name : {verb.name, verb.alias}) {
+    if (name.empty()) continue;
+    text += (name == verb.name ? "" : ".br\n") + std::string("\\fBpanonav ") + roff(name) +
+            "\\fR " + roff(usage(description)) + "\n";
+  }
+  text += ".SH DESCRIPTION\n" + roff(verb.summary) + ".\n";
+  if (!verb.details.empty()) text += roff(verb.details) + "\n";
+  std::string title = "Options";
+  for (const bool positional : {true, false}) {
+    if (!positional) text += ".SH OPTIONS\n";
+    for (const auto& argument : arguments) {
+      if (argument.positional() != positional) continue;
+      const std::string group = positional ? "Arguments" : group_title(argument);
+      if (group != title)
+        text += (positional ? ".SH ARGUMENTS\n" : ".SS \"" + roff(group) + "\"\n");
+      title = group;
+      text += entry(forms(argument), help_line(argument) + ".");
+    }
+  }
+  text += ".SH EXAMPLES\n.nf\n";
+  std::string_view left = verb.example;
+  while (!left.empty()) {
+    const std::size_t end = std::min(left.find('\n'), left.size());
+    text += roff(left.substr(0, end)) + "\n";
+    left.remove_prefix(std::min(end + 1, left.size()));
+  }
+  return text + ".fi\n" + exit_status() + entries("ENVIRONMENT", environment) +
+         entries("FILES", files) + ".SH SEE ALSO\n\\fBpanonav\\fR(1)";
+}
+
+std::string manual_overview(std::span<const Description> verbs) {
+  std::string text = header("panonav", "image-based memory for robot navigation");
+  text +=
+      "\\fBpanonav\\fR \\fIVERB\\fR [OPTIONS] ARGUMENTS\n.SH DESCRIPTION\n"
+      "Panonav remembers what places look like in omnidirectional images, and knows from that "
+      "where a robot is and which way it faces.\nEach verb has a page of its own.\n.SH VERBS\n";
+  for (const auto& [verb, arguments] : verbs)
+    text += entry(verb.name, std::string(verb.summary) + ".");
+  text += ".SH OPTIONS\n";
+  for (const auto& argument : verbs.front().arguments) {
+    if (argument.of_every_verb) text += entry(forms(argument), help_line(argument) + ".");
+  }
+  text += exit_status() + entries("ENVIRONMENT", environment) + entries("FILES", files) +
+          ".SH SEE ALSO\n";
+  for (const auto& [verb, arguments] : verbs) {
+    text += "\\fB" + roff(manual_name(verb)) + "\\fR(1)" +
+            (verb.name == verbs.back().verb.name ? "" : ",\n");
+  }
+  return text;
+}
+
+}  // namespace panonav::command
