@@ -37,6 +37,12 @@ set(command ${prefix}/bin/panonav)
 if(NOT EXISTS ${command})
   return()  # a build without the command has nothing to compare the examples with
 endif()
+foreach(text man/man1/panonav.1 man/man1/panonav-localise.1 man/man1/panonav-route-record.1
+             bash-completion/completions/panonav zsh/site-functions/_panonav fish/vendor_completions.d/panonav.fish)
+  if(NOT EXISTS ${prefix}/share/${text})
+    message(FATAL_ERROR "share/${text} is not installed")
+  endif()
+endforeach()
 build_project(${EXAMPLES} ${prefix}/examples_build)
 set(data ${prefix}/data)
 file(MAKE_DIRECTORY ${data})

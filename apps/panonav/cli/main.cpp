@@ -28,8 +28,10 @@ ExitCode run(std::string_view& verb, std::span<const std::string> words) {
   if (const auto* known = panonav::command::verb_in(verbs, words)) verb = known->name;
   const auto command = panonav::command::parse(verbs, words);
   panonav::command::Session session(command.session);
+  session.detail("panonav " PANONAV_VERSION " " + std::string(command.verb) + " on " +
+                 std::to_string(session.executor().threads()) + " threads");
   const ExitCode code = command.run(session);
-  session.detail("done on " + std::to_string(session.executor().threads()) + " threads");
+  session.detail("done");
   session.finish_output();
   return code;
 }

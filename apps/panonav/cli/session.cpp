@@ -95,10 +95,9 @@ ExitCode Session::no_answer(std::string_view line) {
   return ExitCode::no_answer;
 }
 
-void Session::suggest(std::initializer_list<std::string_view> command, std::string_view before) {
+void Session::suggest(std::initializer_list<std::string_view> command, std::string_view lead) {
   if (options_.quiet || options_.json) return;
-  std::string line = "Next:";
-  if (!before.empty()) line.append(" ").append(before);
+  std::string line(lead);
   for (const auto word : command) line.append(" ").append(shell_quoted(word));
   print(line);
 }

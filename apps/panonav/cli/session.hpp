@@ -39,9 +39,8 @@ class Session {
   void detail(std::string_view line);
   /// Says why there is no answer, on standard error.
   [[nodiscard]] ExitCode no_answer(std::string_view line);
-  /// "Next: " and a command on standard output, its words as a shell wants them. Silent with
-  /// --quiet.
-  void suggest(std::initializer_list<std::string_view> command, std::string_view before = {});
+  /// A command to type, on standard output, its words as a shell wants them. Silent with --quiet.
+  void suggest(std::initializer_list<std::string_view> command, std::string_view lead = "Next:");
   /// Throws FileError when standard output could not be written (a full disk behind a redirection).
   void finish_output();
 

@@ -170,8 +170,10 @@ ExitCode arrange_views(const ArrangeArguments& wanted, Session& session) {
   if (memory.empty()) {
     return session.no_answer("panonav arrange: " + wanted.memory + " holds no views");
   }
+  session.detail(std::to_string(memory.size()) + " views loaded");
   const Lattice lattice =
       arrange(memory, wanted.lattice, motions_of(wanted, memory), session.executor());
+  session.detail("views arranged");
   if (!wanted.no_save) store_lattice(lattice, memory, file);
   if (wanted.tum) write_trajectory(*wanted.tum, trajectory_of(lattice, memory));
   if (wanted.graph) {

@@ -137,7 +137,7 @@ void print_text(const Arguments& arguments, const CalibrateArguments& wanted,
   }
   session.suggest(
       {"panonav", "unwrap", wanted.images.front(), "--camera", wanted.out, "-o", "panorama.png"},
-      wanted.overlay ? "look at " + *wanted.overlay + ", then" : "");
+      wanted.overlay ? "Next: look at " + *wanted.overlay + ", then" : "Next:");
 }
 
 ExitCode calibrate(const Arguments& arguments, const CalibrateArguments& wanted, Session& session) {

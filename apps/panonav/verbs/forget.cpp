@@ -67,7 +67,7 @@ ExitCode forget(const ForgetArguments& wanted, Session& session) {
   }
   session.print(std::to_string(views.size()) + " views forgotten; " + wanted.memory + " holds " +
                 std::to_string(left));
-  session.print("To bring them back: panonav undo " + wanted.memory);
+  session.suggest({"panonav", "undo", wanted.memory}, "To bring them back:");
   return ExitCode::done;
 }
 

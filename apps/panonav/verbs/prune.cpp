@@ -41,7 +41,9 @@ ExitCode prune(const PruneArguments& wanted, Session& session) {
   auto file =
       MemoryFile::open(wanted.memory, wanted.dry_run ? Access::read_only : Access::read_write);
   const VisualMemory memory = file.load();
+  session.detail(std::to_string(memory.size()) + " views loaded");
   const SparseSelection selection = select_references(memory, wanted.options);
+  session.detail("redundant views: " + std::to_string(selection.redundant.size()));
   const SparseLoss loss = measure_loss(memory, selection);
   std::vector<ViewId> dropped;
   std::vector<std::string> names;
@@ -101,7 +103,7 @@ ExitCode prune(const PruneArguments& wanted, Session& session) {
                   fixed(loss.median_difference, 3) + " (median)");
   }
   if (!wanted.dry_run && !dropped.empty()) {
-    session.print("To bring them back: panonav undo " + wanted.memory);
+    session.suggest({"panonav", "undo", wanted.memory}, "To bring them back:");
   }
   return ExitCode::done;
 }

@@ -47,7 +47,7 @@ ExitCode rename(const RenameArguments& wanted, Session& session) {
   }
   session.print("the " + what + " " + readable_line(former) + " of " + wanted.memory +
                 " is now called " + session.strong(readable_line(wanted.new_name)));
-  session.print("To take it back: panonav undo " + wanted.memory);
+  session.suggest({"panonav", "undo", wanted.memory}, "To take it back:");
   return ExitCode::done;
 }
 
