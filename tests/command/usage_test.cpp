@@ -94,6 +94,7 @@ TEST(Usage, VersionAndHelpGoToStandardOutput) {
   EXPECT_EQ(help.exit_code, 0);
   EXPECT_TRUE(contains(help.out, "Usage"));
   EXPECT_TRUE(help.err.empty());
+  for (const auto& line : lines(help.out)) EXPECT_LE(line.size(), 80U) << line;
 }
 
 TEST(Usage, WrongUseIsOneLineWithAHint) {
@@ -321,8 +322,9 @@ TEST(Usage, ManualPagesNameEveryOptionAndFormatWithoutWarnings) {
       EXPECT_TRUE(contains(page, ".SH " + std::string(title) + "\n"));
     }
     if (!has_groff) continue;
-    EXPECT_EQ(shell("groff -man -Tascii -ww -z '" + path + "'"), "");
-    EXPECT_TRUE(contains(shown(path), "--config-template"));
+    const std::string formatted = shown(path);
+    EXPECT_TRUE(contains(formatted, "--config-template"));
+    EXPECT_EQ(formatted.find("warning"), std::string::npos) << formatted;
   }
   const std::string overview = bytes_of(folder / "man/panonav.1");
   EXPECT_EQ(run_panonav({"man"}).out, overview);

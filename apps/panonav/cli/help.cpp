@@ -149,9 +149,12 @@ std::string overview(std::span<const Verb> verbs) {
           0, 0) +
       "\n\nUsage: panonav VERB [OPTIONS] ARGUMENTS\n\nVerbs:\n";
   for (const auto& verb : verbs) text += row(std::string(verb.name), verb.summary, 17);
-  text +=
-      "\npanonav help VERB shows how a verb is used, panonav VERB --help-all all its options, and\n"
-      "panonav --version the version.\n\nExit codes:\n";
+  text += "\n";
+  text += wrapped(
+      "panonav help VERB shows how a verb is used, panonav VERB --help-all all its options, "
+      "and panonav --version the version.",
+      0, 0);
+  text += "\n\nExit codes:\n";
   for (const auto& [code, meaning] : exit_meanings()) {
     text += row(std::to_string(static_cast<int>(code)), meaning, 5);
   }
