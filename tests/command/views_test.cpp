@@ -184,7 +184,10 @@ TEST_F(Views, ExportMemorisedAgainIsTheSameMemory) {
   EXPECT_EQ(said["views"], 16);
   EXPECT_EQ(said["pictures"], 16);
   EXPECT_EQ(said["enlarged"], false);
-  run_well({"memorise", out, again, "--config", out / "memorise.toml"});
+  const std::vector<std::string> back{"memorise", out, again, "--config", out / "memorise.toml",
+                                      "--json"};
+  EXPECT_EQ(answer_of(back)["appended"], 16);
+  EXPECT_EQ(answer_of(back)["known_before"], 16) << "going on";
   EXPECT_EQ(answer_of({"list", memory, "--json"})["views"],
             answer_of({"list", again, "--json"})["views"]);
   // Nothing was lost on the way, so the answers are the same to the bit.

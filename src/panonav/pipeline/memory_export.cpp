@@ -217,7 +217,8 @@ MemoryExport export_memory(const MemoryFile& memory, const fs::path& folder,
   write_file(out / "views.csv", std::string_view(view_table(views, files)));
   write_file(out / "signatures.npy", signature_array(memory.load(ids)));
   OptionText options;
-  options.section("signature", SignatureOptions{.components = header.shape.components});
+  options.text = "[signature]\ncomponents = ";  // rows and columns are those of the pictures
+  options.text.append(std::to_string(header.shape.components)).append("\n");
   options.section("preprocessing", header.preprocessing);
   write_file(out / "memorise.toml", std::string_view(options.text));
   if (header.source.camera) {
