@@ -61,8 +61,8 @@ void tell(const MemoryExport& done, const MemoryFile& memory, const std::string&
   }
   const bool more = info.links + info.maps + info.routes > 0;
   if (more) session.print("Links, maps and routes are not exported.");
-  session.print("Back again: panonav memorise " + out + " NEW.panonav --config " + out +
-                "/memorise.toml");
+  session.suggest({"panonav", "memorise", out, "NEW.panonav", "--config", out + "/memorise.toml"},
+                  "Back again:");
 }
 
 ExitCode export_all(const ExportArguments& wanted, Session& session) {
