@@ -537,7 +537,7 @@ std::shared_ptr<Declared> declare(const Verb& verb) {
 }
 
 ParsedCommand printing(std::string_view verb, std::string text) {
-  return {verb, {}, [text = std::move(text)](Session& session) {
+  return {verb, {.threads = 1}, [text = std::move(text)](Session& session) {
             session.print(text);
             return ExitCode::done;
           }};
