@@ -3,12 +3,32 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "panonav/geometry/pose2.hpp"
 
 namespace panonav {
+
+/// The colours of all plots: those of Okabe and Ito, which colour-blind readers tell apart, and
+/// greys for what lies behind.
+enum class PlotColour {
+  blue,
+  vermilion,
+  green,
+  purple,
+  orange,
+  sky,
+  black,
+  yellow,
+  dark_grey,
+  grey,
+  light_grey,
+  pale_grey,
+};
+/// "#0072b2".
+[[nodiscard]] std::string_view hex(PlotColour colour);
 
 enum class SeriesStyle { lines, points, lines_and_points, bars };
 
@@ -44,7 +64,8 @@ struct LinePlot {
   std::vector<std::string> x_tick_labels;  ///< for bars: one per x value
 };
 
-/// Values on a regular grid seen from above, lowest row first.
+/// Values on a regular grid seen from above, lowest row first. The colour bar begins at 0 unless
+/// there are negative values.
 struct HeatMap {
   std::string title;
   std::string x_label = "x [m]";
@@ -61,7 +82,7 @@ struct HeatMap {
 /// A map seen from above.
 struct MapLayer {
   std::string label;
-  std::string colour = "#1f77b4";
+  PlotColour colour = PlotColour::blue;
   std::vector<Point2> circles;
   std::vector<Point2> crosses;
   std::vector<std::vector<Point2>> lines;
@@ -72,16 +93,20 @@ struct MapLayer {
 struct MapPlot {
   std::string title;
   std::vector<MapLayer> layers;  ///< drawn in this order
-  std::string unit = "m";        ///< of both axes; panels beside each other are in metres
+  std::string unit = "m";        ///< of both axes
+  /// Two corners of what is shown; empty: everything.
+  std::optional<std::pair<Point2, Point2>> shown = {};
 };
 
 /// Writes a PNG (or, for a path ending in .svg, an SVG) through the external program gnuplot; the
 /// file appears whole or not at all. Throws Error when gnuplot is not installed, FileError when the
-/// file cannot be written, ContractError on series whose x and y differ in size.
+/// file cannot be written, ContractError on series whose x and y differ in size. What holds no
+/// point does not appear in the legend.
 void write_plot(const std::filesystem::path& path, const LinePlot& plot);
 void write_plot(const std::filesystem::path& path, const HeatMap& plot);
 void write_plot(const std::filesystem::path& path, const MapPlot& plot);
-/// Several maps side by side in one picture (as in [M04] figures 9 and 10).
+/// Several maps side by side in one picture, of one size and with one legend (as in [M04] figures 9
+/// and 10).
 void write_plot(const std::filesystem::path& path, const std::vector<MapPlot>& panels,
                 int panel_columns);
 

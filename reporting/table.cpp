@@ -2,10 +2,10 @@
 
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 
 namespace panonav {
 
@@ -16,20 +16,18 @@ std::string_view symbol(Comparison comparison) {
 }
 
 // Four significant digits: what a person compares.
-std::string shown(double value) {
-  if (!std::isfinite(value)) return "none";
-  std::array<char, 32> text{};
-  if (value == std::round(value) && std::abs(value) < 1e7) {
-    std::snprintf(text.data(), text.size(), "%.0f", value);
-  } else {
-    std::snprintf(text.data(), text.size(), "%.4g", value);
-  }
-  return text.data();
+std::string shown(double value, const std::string& unit) {
+  return short_number(value, unit, 4);
 }
 
-std::string shown(const std::pair<double, double>& range) {
-  return range.first == range.second ? shown(range.first)
-                                     : shown(range.first) + " .. " + shown(range.second);
+// With its interval, without its unit.
+std::string figure_text(const ResultRow& row) {
+  std::string text = shown(row.ours, row.unit);
+  if (row.interval) {
+    text += " (" + shown(row.interval->first, row.unit) + " .. " +
+            shown(row.interval->second, row.unit) + ")";
+  }
+  return text;
 }
 
 }  // namespace
@@ -50,21 +48,19 @@ TargetCount count_targets(std::span<const ResultRow> rows) {
 }
 
 std::string shown_figure(const ResultRow& row) {
-  std::string text = shown(row.ours);
-  if (row.interval) {
-    text += " (" + shown(row.interval->first) + " .. " + shown(row.interval->second) + ")";
-  }
-  return row.unit.empty() ? text : text + " " + row.unit;
+  return row.unit.empty() ? figure_text(row) : figure_text(row) + " " + row.unit;
 }
 
 std::string shown_published(const ResultRow& row) {
-  return row.published ? shown(*row.published) : "-";
+  if (!row.published) return "-";
+  const auto& [low, high] = *row.published;
+  return shown(low, row.unit) + (low == high ? "" : " .. " + shown(high, row.unit));
 }
 
 std::string shown_target(const ResultRow& row) {
   if (!row.target) return "-";
   return (row.target->comparison == Comparison::at_most ? "at most " : "at least ") +
-         shown(row.target->value);
+         shown(row.target->value, row.unit);
 }
 
 std::string miss_text(const ResultRow& row) {
@@ -72,7 +68,7 @@ std::string miss_text(const ResultRow& row) {
   if (!std::isfinite(row.ours)) {
     return row.reason.empty() ? "nothing could be measured" : row.reason;
   }
-  std::vector<std::string> parts{"by " + shown(std::abs(row.ours - row.target->value))};
+  std::vector<std::string> parts{"by " + shown(std::abs(row.ours - row.target->value), row.unit)};
   ResultRow reached = row;
   if (row.interval) {
     reached.ours =
@@ -98,11 +94,9 @@ std::span<const std::string> table_header() {
 }
 
 std::vector<std::string> table_cells(const ResultRow& row) {
-  ResultRow bare = row;
-  bare.unit.clear();
   return {row.over.empty() ? row.what : row.what + " (" + row.over + ")",
           shown_published(row),
-          shown_figure(bare),
+          figure_text(row),
           row.unit.empty() ? "-" : row.unit,
           shown_target(row),
           !row.target   ? "-"

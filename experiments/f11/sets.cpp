@@ -99,17 +99,19 @@ void plot_grid(const Grid& grid, const std::string& title, const std::filesystem
 MapPlot plot_of(const std::string& title, const PlaceRecording& place,
                 const MappingRecording& recording, const MappedRecording& open,
                 const MappedRecording& closed) {
-  MapPlot plot{.title = title, .layers = furniture_layers(place.scene)};
+  MapPlot plot{.title = title, .layers = scene_layers(place.scene)};
   std::vector<Point2> wheels;
   for (const std::size_t i : open.number) wheels.push_back(recording.wheels[i].position());
-  plot.layers.push_back({.label = "ground truth", .colour = "#777777", .lines = {open.truth}});
   plot.layers.push_back(
-      {.label = "wheels", .colour = "#d62728", .lines = {laid_over(wheels, open.truth)}});
+      {.label = "ground truth", .colour = PlotColour::black, .lines = {open.truth}});
+  plot.layers.push_back({.label = "wheels",
+                         .colour = PlotColour::vermilion,
+                         .lines = {laid_over(wheels, open.truth)}});
   plot.layers.push_back({.label = "visual odometry",
-                         .colour = "#1f77b4",
+                         .colour = PlotColour::blue,
                          .lines = {laid_over(open.estimate, open.truth)}});
   plot.layers.push_back({.label = "loops closed",
-                         .colour = "#2ca02c",
+                         .colour = PlotColour::green,
                          .lines = {laid_over(closed.estimate, closed.truth)}});
   return plot;
 }
@@ -255,10 +257,10 @@ void reproduce_first_set(const MappingReproductionOptions& options, Executor& ex
              "loop: heading error of the compass alone between views 30 cm apart", "deg",
              compass_deg);
   plot_grid(grid, "First set: shape difference by the published rule, median",
-            options.out / "f11_figure6a.png");
+            options.out / "f11_figure6a.svg");
   result.pictures.push_back(
-      {"f11_figure6a.png", "Figure 6 (a): shape difference against k1, for several k2"});
-  add_plot(result, options.out, "f11_figure4.png",
+      {"f11_figure6a.svg", "Figure 6 (a): shape difference against k1, for several k2"});
+  add_plot(result, options.out, "f11_figure4.svg",
            "Figure 4: maps of the loop beside the truth and the wheels, laid over the truth with "
            "one scale",
            maps, 2);
@@ -332,10 +334,10 @@ void reproduce_second_set(const MappingReproductionOptions& options, Executor& e
                  std::to_string(best.first.first) + ", k2 = " + std::to_string(best.first.second),
              "", grid.at(best.first));
   plot_grid(grid, "Second set: shape difference by the published rule, median",
-            options.out / "f11_figure6b.png");
+            options.out / "f11_figure6b.svg");
   result.pictures.push_back(
-      {"f11_figure6b.png", "Figure 6 (b): shape difference against k1, for several k2"});
-  add_plot(result, options.out, "f11_figure5.png",
+      {"f11_figure6b.svg", "Figure 6 (b): shape difference against k1, for several k2"});
+  add_plot(result, options.out, "f11_figure5.svg",
            "Figure 5: maps of the second set beside the truth and the wheels, laid over the truth",
            maps, 2);
 }

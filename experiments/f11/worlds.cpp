@@ -165,19 +165,19 @@ void map_indoor_walk(const MappingReproductionOptions& options, Executor& execut
   add_row(result, "f11.indoor_walk.without_sequence",
           "indoor_walk_360: loops that single views would close, were no sequence asked for",
           static_cast<double>(refused.size()), "closures");
-  MapLayer lines{.label = "closures", .colour = "#d62728"};
+  MapLayer lines{.label = "closures", .colour = PlotColour::vermilion};
   const auto place_of = [&](ViewId view) {
     return bridged.estimate[view.value - bridged.map.nodes[0].view.value];
   };
   for (const MapEdge& edge : closures_of(bridged)) {
     lines.lines.push_back({place_of(edge.a), place_of(edge.b)});
   }
-  add_plot(result, options.out, "f11_indoor_walk.png",
+  add_plot(result, options.out, "f11_indoor_walk.svg",
            "A walk through a building, pictures metres apart: steps that the views do not show "
-           "count as 1.5 m straight ahead; closures in red",
+           "count as 1.5 m straight ahead; closures in orange",
            MapPlot{.title = "indoor_walk_360, no positions known",
                    .layers = {{.label = "consecutive pictures",
-                               .colour = "#1f77b4",
+                               .colour = PlotColour::blue,
                                .lines = {bridged.estimate},
                                .dots = bridged.estimate},
                               lines}});
@@ -192,7 +192,7 @@ void map_indoor_walk(const MappingReproductionOptions& options, Executor& execut
     pairs.emplace_back(reader.read(dataset.entries[edge.a.value - first].path),
                        reader.read(dataset.entries[edge.b.value - first].path));
   }
-  add_plot(result, options.out, "f11_indoor_walk_pairs.png",
+  add_plot(result, options.out, "f11_indoor_walk_pairs.svg",
            "Pairs of pictures (one over the other) that pass every check of a loop closure but the "
            "sequence: corridors of one kind on several floors. None of them becomes a closure",
            pairs_picture("indoor_walk_360: pairs that no sequence of views confirms", pairs));
@@ -252,7 +252,7 @@ void measure_step_time(const MappingReproductionOptions& options, Executor& exec
             "from signature to pose with " + std::to_string(count) + " components", times.y.back(),
             "ms");
   }
-  add_plot(result, options.out, "f11_figure6_time.png",
+  add_plot(result, options.out, "f11_figure6_time.svg",
            "Figure 6: time of a step against the number of components",
            LinePlot{.title = "Time from a signature to a pose, median",
                     .x_label = "components",
@@ -339,19 +339,20 @@ void reproduce_mapping_in_world(const MappingReproductionOptions& options, const
       wrong += mapped->wrong_closures;
     }
     if (run < 4) {
-      const FreeSpace& space = *place.free_space;
       MapPlot map{.title = name + ", path " + std::to_string(run + 1),
-                  .layers = {obstacle_layer(space, space.low(), space.high(), 0.1)}};
-      map.layers.push_back({.label = "ground truth", .colour = "#000000", .lines = {open.truth}});
+                  .layers = scene_layers(place.scene)};
+      map.layers.push_back(
+          {.label = "ground truth", .colour = PlotColour::black, .lines = {open.truth}});
       std::vector<Point2> wheel_line;
       const Alignment wheel_alignment = align(wheels, open.truth);
       for (const Point2& p : wheels) wheel_line.push_back(wheel_alignment.apply(p));
-      map.layers.push_back({.label = "wheels", .colour = "#d62728", .lines = {wheel_line}});
+      map.layers.push_back(
+          {.label = "wheels", .colour = PlotColour::vermilion, .lines = {wheel_line}});
       map.layers.push_back({.label = "views alone",
-                            .colour = "#1f77b4",
+                            .colour = PlotColour::blue,
                             .lines = {laid_over(with_ground.estimate, with_ground.truth)}});
       map.layers.push_back({.label = "views, lengths from wheels",
-                            .colour = "#2ca02c",
+                            .colour = PlotColour::green,
                             .lines = {laid_over(with_wheels.estimate, with_wheels.truth)}});
       maps.push_back(std::move(map));
     }
@@ -381,7 +382,7 @@ void reproduce_mapping_in_world(const MappingReproductionOptions& options, const
            better_without, runs);
   add_rate(result, id + ".right_closures", what + ": closures between views at most 1 m apart",
            right, std::max<std::size_t>(1, right + wrong));
-  const std::string file = "f11_" + name + ".png";
+  const std::string file = "f11_" + name + ".svg";
   add_plot(result, options.out, file,
            "Paths of 60 m with two loops in " + name + ", laid over the truth", maps, 2);
 }
@@ -396,13 +397,14 @@ void reproduce_mapped_recordings(const MappingReproductionOptions& options, Exec
             rms_m(mapped.estimate, mapped.truth, true), "m");
     add_row(result, "f11.sussex.shape", "sussex_route: shape difference",
             shape_error(mapped.estimate, mapped.truth), "");
-    add_plot(result, options.out, "f11_sussex_route.png",
-             "A route outdoors, laid over the tracker's",
-             MapPlot{.title = "sussex_route",
-                     .layers = {{.label = "tracker", .colour = "#777777", .lines = {mapped.truth}},
-                                {.label = "visual odometry",
-                                 .colour = "#1f77b4",
-                                 .lines = {laid_over(mapped.estimate, mapped.truth)}}}});
+    add_plot(
+        result, options.out, "f11_sussex_route.svg", "A route outdoors, laid over the tracker's",
+        MapPlot{
+            .title = "sussex_route",
+            .layers = {{.label = "tracker", .colour = PlotColour::black, .lines = {mapped.truth}},
+                       {.label = "visual odometry",
+                        .colour = PlotColour::blue,
+                        .lines = {laid_over(mapped.estimate, mapped.truth)}}}});
   }
   if (has_data(options.data, "indoor_walk_360")) map_indoor_walk(options, executor, result);
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "experiments/m03/experiments.hpp"
+#include "experiments/runs/surroundings.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/motion/path.hpp"
@@ -148,12 +149,13 @@ CorridorRuns record_corridors(const TrackingReproductionOptions& options, Execut
         record_along(ways, place, *place.renderer, *remembered, {}, seed * 100003U, executor),
         executor));
     if (s == 0) {
-      MapLayer layer{.label = "stands only once", .colour = "#009e73"};
+      MapLayer layer{.label = "stands only once", .colour = PlotColour::green};
       for (const Box& box : things) {
         layer.crosses.push_back(
             {0.5 * (box.low.x_m + box.high.x_m), 0.5 * (box.low.y_m + box.high.y_m)});
       }
-      corridors.things = {layer};
+      corridors.things = scene_layers(place.scene);
+      corridors.things.push_back(layer);
     }
   }
   return corridors;
@@ -227,7 +229,7 @@ void reproduce_corridor(const TrackingReproductionOptions& options, Executor& ex
   const std::size_t last = shown.runs.front().steps.size() - 1;
   const std::size_t first = std::min(corridors.first_distinct.front().value_or(last), last);
   const std::array<std::size_t, 4> steps{0, first / 2, first, std::min(first + 2, last)};
-  add_plot(result, options.out, "corridor.png",
+  add_plot(result, options.out, "corridor.svg",
            "A corridor of identical doors: the particles keep to places that look alike until "
            "something that stands only once comes into view.",
            particle_maps(*shown.place, corridors.things, shown.runs.front(), setting,

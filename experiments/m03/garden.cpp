@@ -123,7 +123,7 @@ void reproduce_garden(const TrackingReproductionOptions& options, Executor& exec
   }
   (void)rows("light_changing", "light that changes at each image between 0.50 and 2.00",
              gardens.changing);
-  add_plot(result, options.out, "garden_success.png",
+  add_plot(result, options.out, "garden_success.svg",
            "Outdoors in other light than memorised: single images, and the filter.",
            LinePlot{.title = "Garden: localisation against brightness",
                     .x_label = "light, times that of the memory",
@@ -132,7 +132,7 @@ void reproduce_garden(const TrackingReproductionOptions& options, Executor& exec
                     .log_x = true,
                     .x_range = std::pair{0.4, 2.5},
                     .y_range = std::pair{0.0, 1.02}});
-  add_plot(result, options.out, "garden_images.png", "Images until localised against brightness.",
+  add_plot(result, options.out, "garden_images.svg", "Images until localised against brightness.",
            LinePlot{.title = "Garden: mean number of images until localised",
                     .x_label = "light, times that of the memory",
                     .y_label = "images",

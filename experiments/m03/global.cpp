@@ -130,13 +130,13 @@ void reproduce_global_localisation(const TrackingReproductionOptions& options,
       x += 0.08 * static_cast<double>(curves.series.size() - 1);
     }
   }
-  add_plot(result, options.out, "global_error.png",
+  add_plot(result, options.out, "global_error.svg",
            "Error of the heaviest mode over the images, from no knowledge of position and heading, "
            "for four rules of injection.",
            curves);
   const std::array<std::size_t, 3> steps{0, 2, 8};
   const OfficeRuns& shown = offices.front();
-  add_plot(result, options.out, "fig07_global_localisation.png",
+  add_plot(result, options.out, "fig07_global_localisation.svg",
            "Global localisation with as many particles as references and nothing injected, heading "
            "unknown, hard ([M03] figure 7, 1 to 3).",
            particle_maps(*shown.hard.place, shown.furniture, shown.hard.runs.front(),

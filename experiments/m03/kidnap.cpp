@@ -74,11 +74,11 @@ void reproduce_kidnapping(const TrackingReproductionOptions& options,
       maps.push_back(std::move(map));
     }
   }
-  add_plot(result, options.out, "kidnapped_error.png",
+  add_plot(result, options.out, "kidnapped_error.svg",
            "Error of the heaviest mode after the robot was kidnapped by at least 1 m away.",
            curves);
   if (maps.empty()) return;
-  add_plot(result, options.out, "fig08_kidnapped.png",
+  add_plot(result, options.out, "fig08_kidnapped.svg",
            "The kidnapped robot 1, 3 and 6 images after it was kidnapped: injected anywhere "
            "([M03] figure 8), around the best matches ([M03] figure 9), and by our rule.",
            maps, 3);

@@ -218,7 +218,7 @@ void reproduce_leaving(const TrackingReproductionOptions& options, const std::st
                 success_rate((*counts)[b], reports.asked[b]));
     }
   }
-  const std::string file = "leaving_" + name + ".png";
+  const std::string file = "leaving_" + name + ".svg";
   add_plot(result, options.out, file,
            "What the filter says of itself, by how far the robot is from all references.",
            LinePlot{.title = "Leaving the memorised half of " + name,

@@ -50,7 +50,7 @@ OfficeRuns record_office(const TrackingReproductionOptions& options, int number,
                              .seed = 1};
   const WalkOptions hard{.variants = options.variants, .runs_each = options.runs, .seed = 2};
   OfficeRuns office{
-      furniture_layers(place.scene),
+      scene_layers(place.scene),
       make_run_set(remembered,
                    record_walks(place, *remembered, clean_condition(), constant, executor),
                    executor),
@@ -165,17 +165,18 @@ std::vector<MapPlot> particle_maps(const TrackingPlace& place, std::span<const M
                              (images == 1 ? " image" : " images") +
                              (run.steps[step].view ? "" : ", driving blind"),
                     .layers = {furniture.begin(), furniture.end()}};
-        map.layers.push_back(
-            {.label = "references", .colour = "#999999", .dots = place.reference_positions()});
-        MapLayer particles{.label = "particles", .colour = "#e41a1c"};
+        map.layers.push_back({.label = "references",
+                              .colour = PlotColour::grey,
+                              .dots = place.reference_positions()});
+        MapLayer particles{.label = "particles", .colour = PlotColour::vermilion};
         const Particles& held = filter.particles();
         for (std::size_t i = 0; i < held.size(); ++i) particles.dots.push_back(held.position(i));
         map.layers.push_back(std::move(particles));
         map.layers.push_back({.label = "ground truth",
-                              .colour = "#0072b2",
+                              .colour = PlotColour::black,
                               .crosses = {run.steps[step].truth.position()},
                               .lines = truths});
-        MapLayer guess{.label = "estimate", .colour = "#000000", .lines = estimates};
+        MapLayer guess{.label = "estimate", .colour = PlotColour::blue, .lines = estimates};
         if (!estimate.modes.empty()) {
           guess.circles = {estimate.modes.front().mean.position()};
         }

@@ -50,8 +50,8 @@ void write(const TrackingReproductionOptions& options, const std::string& file,
     success.series.push_back(curve.success);
     images.series.push_back(curve.images);
   }
-  add_plot(result, options.out, file + "_success.png", title + ": success.", success);
-  add_plot(result, options.out, file + "_images.png", title + ": images.", images);
+  add_plot(result, options.out, file + "_success.svg", title + ": success.", success);
+  add_plot(result, options.out, file + "_images.svg", title + ": images.", images);
 }
 
 std::string shown(double factor) {

@@ -84,12 +84,12 @@ void reproduce_position_tracking(const TrackingReproductionOptions& options,
       x += 0.05 * static_cast<double>(curves.series.size() - 1);
     }
   }
-  add_plot(result, options.out, "tracking_error.png",
+  add_plot(result, options.out, "tracking_error.svg",
            "Error of the heaviest mode after 2 m of dead reckoning.", curves);
   if (sets.front().runs.empty()) return;
   const std::array<std::size_t, 3> steps{images_before - 1, first_after - 1, first_after};
   add_plot(
-      result, options.out, "fig07_position_tracking.png",
+      result, options.out, "fig07_position_tracking.svg",
       "Position tracking: before, at the end of, and one image after 2 m without images ([M03] "
       "figure 7, 4 to 6).",
       particle_maps(*sets.front().place, offices.front().furniture, sets.front().runs.front(),

@@ -187,10 +187,10 @@ MapPlot plan_of(const PlaceRecording& place, const ReferenceAreas& areas, Point2
                 const std::vector<Match>& candidates, std::size_t number) {
   MapPlot map{.title = "place " + std::to_string(number) + ", " +
                        std::to_string(kComponents.front()) + " components",
-              .layers = furniture_layers(place.scene)};
-  MapLayer area{.label = "where it may be", .colour = "#0072b2"};
+              .layers = scene_layers(place.scene)};
+  MapLayer area{.label = "where it may be", .colour = PlotColour::blue};
   for (const Match& match : candidates) area.filled_polygons.push_back(areas.cell(match.view));
-  MapLayer truth{.label = "robot", .colour = "#d55e00", .crosses = {robot}};
+  MapLayer truth{.label = "robot", .colour = PlotColour::vermilion, .crosses = {robot}};
   map.layers.push_back(area);
   map.layers.push_back(truth);
   return map;
@@ -246,7 +246,7 @@ class AreaShape final : public Experiment {
   void report(const std::filesystem::path& folder, Reproduction& result) const override {
     require(!scenes_.empty(), "places", 0.0, ">= 1");
     if (!shown_.empty()) {
-      add_plot(result, folder, "fig10_areas_at_places.png",
+      add_plot(result, folder, "fig10_areas_at_places.svg",
                "Areas after 3 components at places of one office, with its furniture seen from "
                "above ([M04] figure 10).",
                shown_, 2);
@@ -268,7 +268,7 @@ class AreaShape final : public Experiment {
         }
       }
     }
-    add_plot(result, folder, "fig10_shape_against_surroundings.png",
+    add_plot(result, folder, "fig10_shape_against_surroundings.svg",
              "The open question of figure 10: how much farther or less far the area reaches in a "
              "direction than in other offices, by how the surroundings there differ from those in "
              "other offices.",

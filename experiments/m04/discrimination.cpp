@@ -235,7 +235,7 @@ class Discrimination final : public Experiment {
 
   void draw(const std::filesystem::path& folder, Reproduction& result) const {
     add_plot(
-        result, folder, "fig06_similarity_profile.png",
+        result, folder, "fig06_similarity_profile.svg",
         "With 2 components the peak is broad; from 15 on it is narrow and stands at the true "
         "position.",
         LinePlot{
@@ -261,7 +261,7 @@ class Discrimination final : public Experiment {
       }
       rates.series.push_back(std::move(line));
     }
-    add_plot(result, folder, "fig06_success.png",
+    add_plot(result, folder, "fig06_success.svg",
              "How often the most similar reference is the nearest one: clean views, views with "
              "people around, and a noisy camera.",
              rates);

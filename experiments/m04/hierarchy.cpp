@@ -5,6 +5,7 @@
 
 #include "experiments/m04/experiment.hpp"
 #include "experiments/m04/support.hpp"
+#include "experiments/runs/surroundings.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/localisation/hierarchical.hpp"
 #include "reporting/plot.hpp"
@@ -20,20 +21,20 @@ constexpr std::size_t kLevels = m04_components;
 constexpr double kTolerance = 0.25;
 constexpr double kWantedRadiusM = 0.5;
 
-MapPlot area_map(const VisualMemory& memory, const ReferenceAreas& areas, Point2 robot,
-                 const LocalisationLevel& level) {
+MapPlot area_map(const Scene& scene, const VisualMemory& memory, const ReferenceAreas& areas,
+                 Point2 robot, const LocalisationLevel& level) {
   MapPlot map{.title = std::to_string(level.components) +
                        (level.components == 1 ? " component" : " components"),
-              .layers = {}};
-  MapLayer area{.label = "where it may be", .colour = "#888888"};
+              .layers = scene_layers(scene)};
+  MapLayer area{.label = "where it may be", .colour = PlotColour::orange};
   for (const Match& match : level.candidates)
     area.filled_polygons.push_back(areas.cell(match.view));
-  MapLayer references{.label = "reference views", .colour = "#0072b2"};
+  MapLayer references{.label = "reference views", .colour = PlotColour::blue};
   for (const ViewId view : memory.views()) {
     references.circles.push_back(memory.info(view).pose->position());
   }
-  MapLayer truth{.label = "robot", .colour = "#d55e00", .crosses = {robot}};
-  map.layers = {area, references, truth};
+  MapLayer truth{.label = "robot", .colour = PlotColour::vermilion, .crosses = {robot}};
+  for (const MapLayer& layer : {area, references, truth}) map.layers.push_back(layer);
   return map;
 }
 
@@ -80,7 +81,7 @@ class HierarchicalAreas final : public Experiment {
                               static_cast<double>(scan));
       if (shown_.empty()) {
         for (const std::size_t m : {0U, 2U, 5U, 14U}) {
-          shown_.push_back(area_map(memory, areas, robot, levels.at(m)));
+          shown_.push_back(area_map(place.scene, memory, areas, robot, levels.at(m)));
         }
       }
     }
@@ -89,7 +90,7 @@ class HierarchicalAreas final : public Experiment {
   void report(const std::filesystem::path& folder, Reproduction& result) const override {
     require(trials_ >= 1, "queries", 0.0, ">= 1");
     add_plot(
-        result, folder, "fig09_hierarchical_areas.png",
+        result, folder, "fig09_hierarchical_areas.svg",
         "With more components the area where the robot may be shrinks around it ([M04] figure 9).",
         shown_, 2);
     LinePlot curve{.title = "Area where the robot may be, by number of components",
@@ -99,7 +100,7 @@ class HierarchicalAreas final : public Experiment {
     for (std::size_t m = 0; m < kLevels; ++m) {
       add_point(curve.series[0], static_cast<double>(m + 1), median_figure(areas_m2_[m]));
     }
-    add_plot(result, folder, "fig09_area_curve.png", "The median area over all queries and scenes.",
+    add_plot(result, folder, "fig09_area_curve.svg", "The median area over all queries and scenes.",
              curve);
     for (const std::size_t m : {std::size_t{1}, std::size_t{3}, kLevels}) {
       const std::string text = std::to_string(m);

@@ -9,6 +9,7 @@
 #include "experiments/m04/lattice_support.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/positions.hpp"
 #include "panonav/signature/dissimilarity.hpp"
@@ -59,14 +60,13 @@ void add_rows(const std::string& id, const std::string& what, const Arrangements
 }
 
 MapPlot map_of(const std::string& title, const ViewGrid& grid, std::span<const Point2> positions) {
-  MapLayer lines{.label = "", .colour = "#7f7f7f", .lines = grid_lines(grid, positions)};
+  MapLayer lines{.label = "", .colour = PlotColour::grey, .lines = grid_lines(grid, positions)};
   MapLayer views{.label = "views", .circles = {positions.begin(), positions.end()}};
   return {.title = title, .layers = {lines, views}};
 }
 
 std::string with_mu(const std::string& title, double mu) {
-  const double rounded = std::round(mu * 1e4) / 1e4;
-  return title + ", mu " + to_text(rounded);
+  return title + ", mu " + fixed(mu, 4);
 }
 
 class LatticeExperiment {
@@ -143,7 +143,7 @@ class LatticeExperiment {
     range_.push_back(curve.range());
     for (std::size_t i = 0; i < error_.size(); ++i) error_[i].push_back(curve.error(kErrorsAt[i]));
     if (!drawn) return;
-    draw("fig15_lattice.png",
+    draw("fig15_lattice.svg",
          "Views of the hall as they were taken and as they arrange themselves, unordered and "
          "without motion: by phases, and by dissimilarity alone as published.",
          {map_of("as taken", grid, positions_of(grid.poses)),
@@ -184,7 +184,7 @@ class LatticeExperiment {
     }
     if (!drawn) return;
     if (coarse) draw_path(grid);
-    draw(coarse ? "fig17_lattice.png" : "fig17_lattice_30cm.png",
+    draw(coarse ? "fig17_lattice.svg" : "fig17_lattice_30cm.svg",
          "Periodic hall: with the robot's coarse motion and phases its views come out as they were "
          "taken; without phases the map bends, and by dissimilarity alone it folds.",
          panels);
@@ -216,8 +216,8 @@ class LatticeExperiment {
 
   void draw_path(const ViewGrid& grid) {
     MapLayer views{.label = "reference images"};
-    MapLayer path{.label = "path", .colour = "#d62728"};
-    MapLayer arrows{.label = "heading", .colour = "#2ca02c"};
+    MapLayer path{.label = "path", .colour = PlotColour::vermilion};
+    MapLayer arrows{.label = "heading", .colour = PlotColour::green};
     auto& way = path.lines.emplace_back();
     for (const Pose2& pose : grid.poses) {
       views.circles.push_back(pose.position());
@@ -225,9 +225,9 @@ class LatticeExperiment {
       arrows.lines.push_back({pose.position(), pose * Point2{0.4 * grid.spacing_m, 0.0}});
     }
     write_plot(
-        options_.out / "fig16_path.png",
+        options_.out / "fig16_path.svg",
         MapPlot{.title = "Path and headings ([M04] figure 16)", .layers = {path, arrows, views}});
-    pictures_.push_back({"fig16_path.png", "Where the images were taken, along a zigzag."});
+    pictures_.push_back({"fig16_path.svg", "Where the images were taken, along a zigzag."});
   }
 
   void draw_curve(const DissimilarityCurve& curve) {
@@ -237,13 +237,13 @@ class LatticeExperiment {
       error.add(knot.distance, knot.error);
       stiffness.add(knot.distance, curve.stiffness(knot.distance));
     }
-    write_plot(options_.out / "fig12_error_stiffness.png",
+    write_plot(options_.out / "fig12_error_stiffness.svg",
                LinePlot{.title = "Error of the distance read from dissimilarity, and what it makes "
                                  "of springs ([M04] figure 12)",
                         .x_label = "distance x [spacings of 30 cm]",
                         .y_label = "E [spacings]; K",
                         .series = {error, stiffness}});
-    pictures_.push_back({"fig12_error_stiffness.png",
+    pictures_.push_back({"fig12_error_stiffness.svg",
                          "Estimated from the views alone: the error grows with the distance, so "
                          "long springs are weak."});
   }

@@ -129,7 +129,7 @@ class Rivals final : public Experiment {
             "rivals: difference between the colour channels of a pixel (mean; 0: grey, 1: pure "
             "colours)",
             mean_figure(colourfulness_), "");
-    add_plot(result, folder, "rivals.png",
+    add_plot(result, folder, "rivals.svg",
              "The Fourier signature beside what the paper argues against, on the same views.",
              plot);
   }

@@ -146,7 +146,7 @@ class PowerSpectrum final : public Experiment {
       average.add(k, total_[static_cast<std::size_t>(k)] / static_cast<double>(shares_.size()));
     }
     plot.series = {single, average};
-    add_plot(result, folder, "fig05_power_spectrum.png",
+    add_plot(result, folder, "fig05_power_spectrum.svg",
              "Power falls steeply with frequency: the first 15 components hold most of it.", plot);
     add_row(result, "m04.fig5.share_15",
             "figure 5: share of the power (without k = 0) in the first 15 components (median)",

@@ -45,7 +45,7 @@ class WeightsOfComponents final : public Experiment {
                       .y = {1.0, 1.0},
                       .style = SeriesStyle::lines};
     add_plot(
-        result, folder, "eq06_weights.png",
+        result, folder, "eq06_weights.svg",
         "How much each component should count, learnt in each scene.",
         LinePlot{
             .title = "Weights of the components, learnt from memories with poses ([M04] eq. 6)",

@@ -110,9 +110,8 @@ int runs_of(const NavigationReproductionOptions& options, int scene) {
 void draw(const NavigationReproductionOptions& options, const std::string& name,
           const MissionPlace& place, const RememberedPlace& remembered, const Mission& mission,
           const MissionRun& run, Reproduction& result) {
-  const std::string file = "mission_" + name + ".png";
-  write_mission_picture(options.out / file, name + ": x and y in metres", place, remembered, {},
-                        mission.goal, run);
+  const std::string file = "mission_" + name + ".svg";
+  write_mission_picture(options.out / file, name + "", place, remembered, {}, mission.goal, run);
   result.pictures.push_back(
       {file, "A mission in " + name +
                  ": every reference view says in which direction the goal lies; the robot takes "

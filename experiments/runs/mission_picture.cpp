@@ -35,8 +35,8 @@ std::vector<Point2> arrow(Point2 from, double direction_rad, double length_m) {
 std::vector<MapLayer> field_layers(const RememberedPlace& remembered, const FieldOptions& options,
                                    ViewId goal) {
   constexpr double share_of_spacing = 0.55;
-  MapLayer references{.label = "references", .colour = "#1f77b4"};
-  MapLayer arrows{.label = "their directions to the goal", .colour = "#8fc1e3"};
+  MapLayer references{.label = "references", .colour = PlotColour::blue};
+  MapLayer arrows{.label = "their directions to the goal", .colour = PlotColour::sky};
   const auto field = direction_field(remembered.graph, goal, options);
   for (std::size_t i = 0; i < field.size(); ++i) {
     const Pose2& pose = remembered.truth[i];
@@ -49,29 +49,10 @@ std::vector<MapLayer> field_layers(const RememberedPlace& remembered, const Fiel
   return {arrows, references};
 }
 
-/// Things around, but for frames that the robot can drive through: their outlines would bar doors.
-std::vector<MapLayer> things_layers(const MissionPlace& place) {
-  std::vector<MapLayer> layers = furniture_layers(place.scene);
-  for (MapLayer& layer : layers) {
-    std::erase_if(layer.filled_polygons, [&](const std::vector<Point2>& corners) {
-      const Point2 middle{0.5 * (corners[0].x_m + corners[2].x_m),
-                          0.5 * (corners[0].y_m + corners[2].y_m)};
-      const FreeSpace& space = *place.free_space;
-      // Far trees of a garden would make its floor a spot.
-      constexpr double around_m = 3.0;
-      const bool is_far =
-          middle.x_m < space.low().x_m - around_m || middle.y_m < space.low().y_m - around_m ||
-          middle.x_m > space.high().x_m + around_m || middle.y_m > space.high().y_m + around_m;
-      return is_far || space.is_free(middle);
-    });
-  }
-  return layers;
-}
-
 /// Over the references, from that which the robot was nearest to at first.
 MapLayer planned_layer(const RememberedPlace& remembered, const PlannerOptions& options,
                        ViewId goal, const MissionRun& run) {
-  MapLayer layer{.label = "way planned", .colour = "#e69f00"};
+  MapLayer layer{.label = "way planned", .colour = PlotColour::orange};
   const auto known = std::ranges::find_if(
       run.decisions, [](const auto& step) { return step.nearest.has_value(); });
   if (known == run.decisions.end()) return layer;
@@ -86,7 +67,7 @@ MapLayer planned_layer(const RememberedPlace& remembered, const PlannerOptions& 
 }
 
 MapLayer driven_layer(const MissionRun& run) {
-  MapLayer layer{.label = "way driven", .colour = "#d62728", .lines = {{}}};
+  MapLayer layer{.label = "way driven", .colour = PlotColour::vermilion, .lines = {{}}};
   for (std::size_t i = 0; i < run.path.size(); ++i) {
     layer.lines.back().push_back(run.path[i].position());
     if (run.kidnapped_at == i) layer.lines.emplace_back();
@@ -99,28 +80,25 @@ MapLayer driven_layer(const MissionRun& run) {
 void write_mission_picture(const std::filesystem::path& path, const std::string& title,
                            const MissionPlace& place, const RememberedPlace& remembered,
                            const PlannerOptions& options, ViewId goal, const MissionRun& run) {
-  // Fine enough for a table's leg in a room, coarse enough for a hall.
-  constexpr double dots_a_side = 150.0;
-  const FreeSpace& space = *place.free_space;
-  const double side_m =
-      std::max(space.high().x_m - space.low().x_m, space.high().y_m - space.low().y_m);
-  MapPlot plot{.title = title, .layers = things_layers(place)};
-  plot.layers.push_back(obstacle_layer(space, space.low(), space.high(), side_m / dots_a_side));
+  const std::vector<MapLayer> scene = scene_layers(place.scene);
+  MapPlot plot{.title = title, .layers = {scene.front()}};
   for (MapLayer& layer : field_layers(remembered, options.field, goal)) {
     plot.layers.push_back(std::move(layer));
   }
+  plot.layers.push_back(scene.back());  // a screen stands among the references
   plot.layers.push_back(planned_layer(remembered, options, goal, run));
   plot.layers.push_back(driven_layer(run));
   plot.layers.push_back(
-      {.label = "start", .colour = "#009e73", .squares = {run.path.front().position()}});
+      {.label = "start", .colour = PlotColour::green, .squares = {run.path.front().position()}});
   if (run.kidnapped_at) {
     plot.layers.push_back({.label = "kidnapped to here",
-                           .colour = "#cc79a7",
+                           .colour = PlotColour::purple,
                            .squares = {run.path.at(*run.kidnapped_at + 1).position()}});
   }
   const Pose2& at_goal = remembered.truth[*remembered.graph.node_of(goal)];
   if (is_known(at_goal)) {
-    plot.layers.push_back({.label = "goal", .colour = "#000000", .crosses = {at_goal.position()}});
+    plot.layers.push_back(
+        {.label = "goal", .colour = PlotColour::black, .crosses = {at_goal.position()}});
   }
   write_plot(path, plot);
 }

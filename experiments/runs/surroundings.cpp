@@ -18,6 +18,70 @@ namespace {
 
 constexpr double kSectorRad = 2.0 * std::numbers::pi / shape_directions;
 
+using Triangle = std::array<Vector3, 3>;
+
+/// Triangles that share corners, to the millimetre, belong together.
+std::vector<std::vector<Triangle>> bodies_of(const std::vector<Triangle>& triangles) {
+  std::map<std::array<long, 3>, std::size_t> body_at;  // a corner's body, as first numbered
+  std::vector<std::size_t> joined;                     // to this body; itself: its own
+  const auto body = [&](std::size_t number) {
+    while (joined[number] != number) number = joined[number] = joined[joined[number]];
+    return number;
+  };
+  std::vector<std::size_t> number_of;
+  for (const Triangle& triangle : triangles) {
+    const std::size_t own = joined.size();
+    joined.push_back(own);
+    number_of.push_back(own);
+    for (const Vector3& v : triangle) {
+      const std::array corner{std::lround(1e3 * v.x_m), std::lround(1e3 * v.y_m),
+                              std::lround(1e3 * v.z_m)};
+      joined[body(own)] = body(body_at.try_emplace(corner, own).first->second);
+    }
+  }
+  std::map<std::size_t, std::vector<Triangle>> bodies;
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    bodies[body(number_of[i])].push_back(triangles[i]);
+  }
+  std::vector<std::vector<Triangle>> result;
+  for (auto& [number, members] : bodies) result.push_back(std::move(members));
+  return result;
+}
+
+/// Counter-clockwise; two points where all lie on one line, to a hundredth of a square millimetre.
+std::vector<Point2> convex_hull(std::vector<Point2> points) {
+  std::ranges::sort(points, {}, [](const Point2& p) { return std::pair(p.x_m, p.y_m); });
+  const auto is_left = [](const Point2& a, const Point2& b, const Point2& c) {
+    return (b.x_m - a.x_m) * (c.y_m - a.y_m) - (b.y_m - a.y_m) * (c.x_m - a.x_m) > 1e-8;
+  };
+  std::vector<Point2> hull;
+  for (int side = 0; side < 2; ++side) {
+    const std::size_t begin = hull.size();
+    for (const Point2& p : points) {
+      while (hull.size() >= begin + 2 && !is_left(hull[hull.size() - 2], hull.back(), p)) {
+        hull.pop_back();
+      }
+      hull.push_back(p);
+    }
+    hull.pop_back();
+    std::ranges::reverse(points);
+  }
+  return hull;
+}
+
+/// Where a horizontal plane cuts it: both ends, or fewer points.
+std::vector<Point2> cut(const Triangle& triangle, double height_m) {
+  std::vector<Point2> ends;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Vector3& a = triangle[i];
+    const Vector3& b = triangle[(i + 1) % 3];
+    if ((a.z_m < height_m) == (b.z_m < height_m)) continue;
+    const double share = (height_m - a.z_m) / (b.z_m - a.z_m);
+    ends.push_back({a.x_m + share * (b.x_m - a.x_m), a.y_m + share * (b.y_m - a.y_m)});
+  }
+  return ends;
+}
+
 }  // namespace
 
 std::size_t sector_of(double azimuth_rad) {
@@ -117,45 +181,63 @@ Directional predicted_extents(const PlaceRecording& place, const Pose2& pose, co
   return extents;
 }
 
-std::vector<MapLayer> furniture_layers(const Scene& scene) {
-  struct Box {
-    Vector3 low{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(),
-                std::numeric_limits<double>::infinity()};
-    Vector3 high{-low.x_m, -low.y_m, -low.z_m};
+std::vector<MapLayer> scene_layers(const Scene& scene) {
+  constexpr double lowest_m = 0.1;    // carpets and sills do not count
+  constexpr double headroom_m = 1.9;  // nor do lamps, lintels and ceilings
+  constexpr double room_m = 4.0;      // what is as large is cut through, not seen from above
+  constexpr double around_m = 3.0;    // far trees would make the floor a spot
+  constexpr std::size_t max_bodies = 30;
+  MapLayer walls{.label = "walls", .colour = PlotColour::dark_grey};
+  MapLayer things{.label = "furniture and other things", .colour = PlotColour::grey};
+  const auto is_near = [&](const std::vector<Point2>& points) {
+    return std::ranges::any_of(points, [&](const Point2& p) {
+      return p.x_m > scene.floor_low.x_m - around_m && p.x_m < scene.floor_high.x_m + around_m &&
+             p.y_m > scene.floor_low.y_m - around_m && p.y_m < scene.floor_high.y_m + around_m;
+    });
   };
-  std::map<std::string, Box> boxes;
+  std::map<std::string, std::vector<Triangle>> objects;
   for (const Mesh& mesh : scene.meshes) {
-    Box& box = boxes[mesh.object];
-    for (const Vector3& v : mesh.vertices) {
-      box.low = {std::min(box.low.x_m, v.x_m), std::min(box.low.y_m, v.y_m),
-                 std::min(box.low.z_m, v.z_m)};
-      box.high = {std::max(box.high.x_m, v.x_m), std::max(box.high.y_m, v.y_m),
-                  std::max(box.high.z_m, v.z_m)};
+    std::vector<Triangle>& object = objects[mesh.object];
+    for (const auto& [a, b, c] : mesh.triangles) {
+      object.push_back({mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]});
     }
   }
-  MapLayer lower{.label = "lower than the camera", .colour = "#e69f00"};
-  MapLayer higher{.label = "higher than the camera", .colour = "#5b3a00"};
-  for (const auto& [name, box] : boxes) {
-    const double width = box.high.x_m - box.low.x_m;
-    const double depth = box.high.y_m - box.low.y_m;
-    // Furniture stands on the floor and is neither flat nor as large as the room.
-    const bool stands = box.low.z_m < 0.1 && box.high.z_m > 0.2;
-    if (!stands || std::min(width, depth) < 0.1 || std::max(width, depth) > 4.0) continue;
-    MapLayer& layer = box.high.z_m < scene.camera_height_m ? lower : higher;
-    layer.filled_polygons.push_back({{box.low.x_m, box.low.y_m},
-                                     {box.high.x_m, box.low.y_m},
-                                     {box.high.x_m, box.high.y_m},
-                                     {box.low.x_m, box.high.y_m}});
+  for (const auto& [name, object] : objects) {
+    std::vector<std::vector<Triangle>> bodies = bodies_of(object);
+    if (bodies.size() > max_bodies) bodies = {object};
+    std::vector<std::vector<Point2>> thin;
+    std::size_t solid = 0;
+    for (const std::vector<Triangle>& body : bodies) {
+      std::vector<Point2> corners;
+      double bottom_m = std::numeric_limits<double>::infinity();
+      double top_m = -bottom_m;
+      for (const Triangle& triangle : body) {
+        for (const Vector3& v : triangle) {
+          corners.push_back({v.x_m, v.y_m});
+          bottom_m = std::min(bottom_m, v.z_m);
+          top_m = std::max(top_m, v.z_m);
+        }
+      }
+      if (top_m < lowest_m || bottom_m > headroom_m || !is_near(corners)) continue;
+      const std::vector<Point2> outline = convex_hull(std::move(corners));
+      const auto [west, east] = std::ranges::minmax(outline, {}, &Point2::x_m);
+      const auto [south, north] = std::ranges::minmax(outline, {}, &Point2::y_m);
+      if (std::max(east.x_m - west.x_m, north.y_m - south.y_m) > room_m) {
+        for (const Triangle& triangle : body) {
+          std::vector<Point2> line = cut(triangle, scene.camera_height_m);
+          if (line.size() == 2 && is_near(line)) walls.lines.push_back(std::move(line));
+        }
+      } else if (outline.size() == 2) {
+        thin.push_back(outline);
+      } else {
+        things.filled_polygons.push_back(outline);
+        ++solid;
+      }
+    }
+    // A screen or a wall; not the faces of a shelf.
+    if (solid == 0) walls.lines.insert(walls.lines.end(), thin.begin(), thin.end());
   }
-  return {lower, higher};
-}
-
-MapLayer obstacle_layer(const FreeSpace& space, Point2 low, Point2 high, double spacing_m) {
-  MapLayer layer{.label = "no place for the robot", .colour = "#b0b0b0"};
-  for (const GridPosition& place : grid_positions(low, high, spacing_m)) {
-    if (!space.is_free(place.position)) layer.dots.push_back(place.position);
-  }
-  return layer;
+  return {things, walls};
 }
 
 }  // namespace panonav

@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "experiments/runs/place_recording.hpp"
-#include "panonav/simulation/free_space.hpp"
 #include "reporting/plot.hpp"
 
 namespace panonav {
@@ -37,11 +36,9 @@ struct Surroundings {
 /// The sector of a direction, 0 .. shape_directions - 1.
 [[nodiscard]] std::size_t sector_of(double azimuth_rad);
 
-/// Furniture as on a floor plan: one layer of things lower than the camera, one of higher ones.
-[[nodiscard]] std::vector<MapLayer> furniture_layers(const Scene& scene);
-
-/// Where the robot cannot be, as dots `spacing_m` apart.
-[[nodiscard]] MapLayer obstacle_layer(const FreeSpace& space, Point2 low, Point2 high,
-                                      double spacing_m);
+/// A scene from above, behind everything else in a plot: what stands around as it is (its convex
+/// bodies, so that screens are slanted and the crowns of trees round), and walls, cut at the height
+/// of the camera so that doors are open.
+[[nodiscard]] std::vector<MapLayer> scene_layers(const Scene& scene);
 
 }  // namespace panonav

@@ -55,8 +55,8 @@ class GoalPictures {
 // One layer of cells for each range between limits, the highest values darkest.
 std::vector<MapLayer> GoalPictures::shaded(const std::vector<double>& values,
                                            const std::vector<double>& limits) const {
-  constexpr std::array<const char*, 6> greys{"#f0e442", "#cccccc", "#999999",
-                                             "#666666", "#333333", "#000000"};
+  constexpr std::array greys{PlotColour::yellow, PlotColour::pale_grey, PlotColour::light_grey,
+                             PlotColour::grey,   PlotColour::dark_grey, PlotColour::black};
   const double half_m = 0.5 * arena_.options.spacing_m;
   std::vector<MapLayer> layers;
   for (std::size_t level = 0; level <= limits.size(); ++level) {
@@ -76,7 +76,7 @@ std::vector<MapLayer> GoalPictures::shaded(const std::vector<double>& values,
 
 // A stroke from each place towards home, a dot where it begins.
 MapLayer GoalPictures::vectors(const FourierHomingOptions& homing) const {
-  MapLayer layer{.colour = "#0072b2"};
+  MapLayer layer{.colour = PlotColour::blue};
   for (const auto& placed : arena_.currents.views) {
     const HomeVector vector = home_vector(home(), placed.view, homing);
     if (vector.length() == 0.0) continue;
@@ -92,7 +92,7 @@ MapLayer GoalPictures::vectors(const FourierHomingOptions& homing) const {
 
 // The edges between cells inside and all others.
 MapLayer GoalPictures::border(const std::vector<bool>& inside) const {
-  MapLayer layer{.colour = "#d55e00"};
+  MapLayer layer{.colour = PlotColour::vermilion};
   const double spacing_m = arena_.options.spacing_m;
   const auto is_inside = [&](double x_m, double y_m) {
     for (std::size_t p = 0; p < inside.size(); ++p) {
@@ -119,13 +119,13 @@ MapLayer GoalPictures::border(const std::vector<bool>& inside) const {
 }
 
 MapLayer GoalPictures::goal_mark() const {
-  return {.label = "goal", .colour = "#d00000", .squares = {position()}};
+  return {.label = "goal", .colour = PlotColour::purple, .squares = {position()}};
 }
 
 MapLayer GoalPictures::most_similar(const std::vector<double>& differences) const {
   const auto best = std::ranges::min_element(differences) - differences.begin();
   return {.label = "most similar",
-          .colour = "#009e73",
+          .colour = PlotColour::green,
           .circles = {arena_.currents.views[static_cast<std::size_t>(best)].pose.position()}};
 }
 
@@ -183,7 +183,7 @@ void reproduce_goal_figures(ArenaSurveys& surveys, const std::filesystem::path& 
   const auto at_five = of.differences(5);
   const auto ends_five = of.final_distances_of(published_strategy({5}));
   add_plot(
-      result, folder, "figure_09_vectors.png",
+      result, folder, "figure_09_vectors.svg",
       "[S06] figure 9: home vectors to one goal (strokes from the dots), the darker the less "
       "similar "
       "the views. Other valleys lead astray.",
@@ -211,7 +211,7 @@ void reproduce_goal_figures(ArenaSurveys& surveys, const std::filesystem::path& 
     along_x.series.push_back(transect(arena, of.position(), differences, true, k));
     along_y.series.push_back(transect(arena, of.position(), differences, false, k));
   }
-  add_plot(result, folder, "figure_14_stages.png",
+  add_plot(result, folder, "figure_14_stages.svg",
            "[S06] figure 14: the same goal with K = 2, 4 and 10. Left: image difference and home "
            "vectors; right: how far from the goal runs end that start there.",
            panels, 2);
@@ -220,7 +220,7 @@ void reproduce_goal_figures(ArenaSurveys& surveys, const std::filesystem::path& 
   const auto own = of.final_distances_of(own_strategy());
   const auto images = of.final_distances_of(expected_image_strategy());
   add_plot(
-      result, folder, "figure_15_areas.png",
+      result, folder, "figure_15_areas.svg",
       "[S06] figure 15: where runs to this goal end, coarse to fine, by our rule and by expected "
       "images. Yellow: at the goal; dark: beyond 40 cm; orange: the area within 10 cm.",
       std::vector<MapPlot>{map_of("K = 2, 4, 10", of.shaded(staged, distance_limits),
@@ -231,11 +231,11 @@ void reproduce_goal_figures(ArenaSurveys& surveys, const std::filesystem::path& 
                                   of.border(within(images, reached_m)), of.goal_mark())},
       3);
 
-  add_plot(result, folder, "figure_16_transect_x.png",
+  add_plot(result, folder, "figure_16_transect_x.svg",
            "[S06] figure 16, left: the image difference along a line through the goal. More "
            "frequencies, a narrower valley.",
            along_x);
-  add_plot(result, folder, "figure_16_transect_y.png", "The same across.", along_y);
+  add_plot(result, folder, "figure_16_transect_y.svg", "The same across.", along_y);
   const auto surface = of.differences(10);
   HeatMap map{.title = "Image difference to the goal (cross), K = 10",
               .value_label = "share of the energy of both views",
@@ -252,7 +252,7 @@ void reproduce_goal_figures(ArenaSurveys& surveys, const std::filesystem::path& 
     const auto row = static_cast<std::size_t>(std::lround(at.y_m / map.spacing_m));
     map.values.at(row * static_cast<std::size_t>(map.columns) + column) = surface[p];
   }
-  add_plot(result, folder, "figure_16_surface.png",
+  add_plot(result, folder, "figure_16_surface.svg",
            "[S06] figure 16, right: the image difference over the arena.", map);
 }
 

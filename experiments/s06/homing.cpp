@@ -39,7 +39,7 @@ void draw_homeward(ArenaSurveys& surveys, const std::filesystem::path& folder, E
   by_highest.series.push_back(
       homeward_series("expected images", surveys.expected_images(), spacing_m));
   by_highest.series.push_back(homeward_series("our rule, K = 10", surveys.own(10), spacing_m));
-  add_plot(result, folder, "figure_10_homeward.png",
+  add_plot(result, folder, "figure_10_homeward.svg",
            "[S06] figure 10a: how far home vectors point home, by the distance: few frequencies "
            "from afar, many close by.",
            by_highest);
@@ -55,7 +55,7 @@ void draw_homeward(ArenaSurveys& surveys, const std::filesystem::path& folder, E
       by_iterations.series.push_back(homeward_series(label, survey, spacing_m));
     }
   }
-  add_plot(result, folder, "figure_10_iterations.png",
+  add_plot(result, folder, "figure_10_iterations.svg",
            "[S06] figure 10b: the same with iterations.", by_iterations);
 
   for (const double away_m : {0.1, 0.2, 0.4}) {
@@ -120,7 +120,7 @@ void draw_areas(ArenaSurveys& surveys, const std::filesystem::path& folder, Repr
   }
   single.series.push_back(area_series(surveys, expected_image_strategy()));
   single.series.push_back(no_run(surveys.expected_images()));
-  add_plot(result, folder, "figure_11_areas.png",
+  add_plot(result, folder, "figure_11_areas.svg",
            "[S06] figure 11: mean number of places from which runs end near the goal.", single);
 
   LinePlot staged = area_plot("Catchment area, K rising in stages");
@@ -130,7 +130,7 @@ void draw_areas(ArenaSurveys& surveys, const std::filesystem::path& folder, Repr
   }
   staged.series.push_back(area_series(surveys, expected_image_strategy()));
   staged.series.push_back(area_series(surveys, own_strategy()));
-  add_plot(result, folder, "figure_13_stages.png",
+  add_plot(result, folder, "figure_13_stages.svg",
            "[S06] figure 13: the same when more frequencies count where homing stops, and our rule "
            "in its stages.",
            staged);
@@ -157,7 +157,7 @@ void draw_iterations(ArenaSurveys& surveys, const std::filesystem::path& folder,
     }
     plot.series.push_back(std::move(series));
   }
-  add_plot(result, folder, "figure_12_iterations.png",
+  add_plot(result, folder, "figure_12_iterations.svg",
            "[S06] figure 12: mean catchment area by the number of solutions of each home vector.",
            plot);
 }

@@ -80,7 +80,7 @@ void draw_correlation(const Arena& arena, const std::filesystem::path& folder,
     }
     terms.series.push_back(std::move(series));
   }
-  add_plot(result, folder, "figure_03_correlation.png",
+  add_plot(result, folder, "figure_03_correlation.svg",
            "[S06] figure 3a: the first five terms of the correlation of two views from one place, "
            "and the whole. Only the whole has one clear maximum.",
            terms);
@@ -95,7 +95,7 @@ void draw_correlation(const Arena& arena, const std::filesystem::path& folder,
     series.add(highest, degrees(angle_difference(static_cast<double>(turn[0]), truth)));
   }
   maxima.series.push_back(std::move(series));
-  add_plot(result, folder, "figure_03_maximum.png",
+  add_plot(result, folder, "figure_03_maximum.svg",
            "[S06] figure 3b: the turn of the same two views by their first K frequencies, less the "
            "truth.",
            maxima);
@@ -147,7 +147,7 @@ void draw_spectrum(const Arena& arena, const std::filesystem::path& folder, Repr
     line.add(k, std::exp(mean_log - slope * (std::log(k) - mean_k)));
   }
   series.label = "mean and standard deviation";
-  add_plot(result, folder, "figure_06_spectrum.png",
+  add_plot(result, folder, "figure_06_spectrum.svg",
            "[S06] figure 6: mean power of the views; a straight line is a power law.",
            LinePlot{.title = "Power spectrum of all views of the arena",
                     .x_label = "frequency k",
@@ -264,11 +264,11 @@ void draw_changes(const Arena& arena, const std::filesystem::path& folder, Execu
     changes.series.push_back(std::move(change));
     if (s < shown.size()) phases.series.push_back(std::move(phase));
   }
-  add_plot(result, folder, "figure_07_coefficients.png",
+  add_plot(result, folder, "figure_07_coefficients.svg",
            "[S06] figure 7a: change of coefficients with the distance, all pairs of places. It "
            "grows with the square of the distance farther out where frequencies are low.",
            changes);
-  add_plot(result, folder, "figure_07_phases.png",
+  add_plot(result, folder, "figure_07_phases.svg",
            "[S06] figure 7b: change of phases. High frequencies soon have nothing to do with each "
            "other.",
            phases);
@@ -344,7 +344,7 @@ void draw_headings(const Arena& arena, const std::filesystem::path& folder, Exec
     }
     plot.series.push_back(std::move(series));
   }
-  add_plot(result, folder, "figure_08_headings.png",
+  add_plot(result, folder, "figure_08_headings.svg",
            "[S06] figure 8: error of the heading that the phases tell, by the distance of the two "
            "views; all pairs, random headings.",
            plot);

@@ -34,28 +34,27 @@ MapPlot map_of_failure(const HomingPlace& place, const HomingRun& run, std::size
     low = {std::min(low.x_m, pose.x_m), std::min(low.y_m, pose.y_m)};
     high = {std::max(high.x_m, pose.x_m), std::max(high.y_m, pose.y_m)};
   }
-  MapPlot map;
-  map.title = "run " + std::to_string(number) + ": " + reason_of_failure(run);
-  map.layers.push_back(obstacle_layer(*place.free_space, {low.x_m - margin_m, low.y_m - margin_m},
-                                      {high.x_m + margin_m, high.y_m + margin_m}, 0.05));
-  map.layers.push_back({.label = "way", .colour = "#d62728", .lines = {positions_of(run.path)}});
+  MapPlot map{.title = "run " + std::to_string(number) + ": " + reason_of_failure(run),
+              .layers = scene_layers(place.scene)};
+  map.shown = std::pair(Point2{low.x_m - margin_m, low.y_m - margin_m},
+                        Point2{high.x_m + margin_m, high.y_m + margin_m});
   map.layers.push_back(
-      {.label = "start", .colour = "#1f77b4", .circles = {run.path.front().position()}});
+      {.label = "way", .colour = PlotColour::blue, .lines = {positions_of(run.path)}});
   map.layers.push_back(
-      {.label = "end", .colour = "#d62728", .crosses = {run.path.back().position()}});
-  map.layers.push_back({.label = "goal", .colour = "#2ca02c", .squares = {run.goal.position()}});
+      {.label = "start", .colour = PlotColour::green, .circles = {run.path.front().position()}});
+  map.layers.push_back(
+      {.label = "end", .colour = PlotColour::vermilion, .crosses = {run.path.back().position()}});
+  map.layers.push_back(
+      {.label = "goal", .colour = PlotColour::black, .squares = {run.goal.position()}});
   return map;
 }
 
 MapPlot map_of_all(const HomingPlace& place, const std::vector<HomingRun>& runs,
                    const std::string& name) {
-  MapPlot map;
-  map.title = "Runs home in " + name;
-  map.layers.push_back(
-      obstacle_layer(*place.free_space, place.free_space->low(), place.free_space->high(), 0.1));
-  MapLayer reached{.label = "reached home", .colour = "#2ca02c"};
-  MapLayer failed{.label = "did not", .colour = "#d62728"};
-  MapLayer goals{.label = "goals", .colour = "#000000"};
+  MapPlot map{.title = "Runs home in " + name, .layers = scene_layers(place.scene)};
+  MapLayer reached{.label = "reached home", .colour = PlotColour::blue};
+  MapLayer failed{.label = "did not", .colour = PlotColour::vermilion};
+  MapLayer goals{.label = "goals", .colour = PlotColour::black};
   for (const HomingRun& run : runs) {
     (run.succeeds(homing_success_m) ? reached : failed).lines.push_back(positions_of(run.path));
     goals.squares.push_back(run.goal.position());
@@ -161,13 +160,13 @@ void reproduce_homing_in_world(const std::filesystem::path& data, const std::str
   add_other(".stopped_by_obstacles", "the first obstacle ends a run", stopping);
 
   const std::string prefix = "s06_world_" + name;
-  add_plot(reproduction, out, prefix + ".png",
+  add_plot(reproduction, out, prefix + ".svg",
            "Homing runs in " + name + " from starts within 1.5 m of random goals",
            map_of_all(place, runs, name));
   for (std::size_t i = 0; i < runs.size(); ++i) {
     if (runs[i].succeeds(homing_success_m)) continue;
     const MapPlot map = map_of_failure(place, runs[i], i);
-    const std::string file = prefix + "_failure_" + std::to_string(i) + ".png";
+    const std::string file = prefix + "_failure_" + std::to_string(i) + ".svg";
     add_plot(reproduction, out, file, name + ", " + map.title, map);
   }
 }

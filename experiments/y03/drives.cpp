@@ -302,11 +302,11 @@ void reproduce_lab_drives(const RouteReproductionOptions& options, Executor& exe
               "cm");
     }
   };
-  draw("spacing.png", "Way between the lines, direct fit", "way between lines [cm]", spacings_cm,
+  draw("spacing.svg", "Way between the lines, direct fit", "way between lines [cm]", spacings_cm,
        spacing, "direct fit", "Error against the way between memorised lines.");
-  draw("offset.png", "Distance from the path, direct fit", "distance from the path [cm]",
+  draw("offset.svg", "Distance from the path, direct fit", "distance from the path [cm]",
        offsets_cm, offset, "direct fit", "Error of drives parallel to the path.");
-  draw("margin.png", "Margin of the contours", "margin on either side [cm]", margins_cm, margin,
+  draw("margin.svg", "Margin of the contours", "margin on either side [cm]", margins_cm, margin,
        "dual contours",
        "Error of the published contours against the margin from which they start.");
 }

@@ -17,8 +17,7 @@ namespace panonav {
 
 namespace {
 
-MapLayer line_layer(const std::string& label, const std::string& colour,
-                    const std::vector<Pose2>& poses) {
+MapLayer line_layer(const std::string& label, PlotColour colour, const std::vector<Pose2>& poses) {
   return {.label = label, .colour = colour, .lines = {positions_of(poses)}};
 }
 
@@ -29,7 +28,7 @@ std::vector<Pose2> in_path_frame(const LabRoute& lab, const std::vector<Pose2>& 
 }
 
 MapLayer path_layer(const LabRoute& lab) {
-  return line_layer("memorised path", "#999999",
+  return line_layer("memorised path", PlotColour::grey,
                     in_path_frame(lab, {lab.route.poses().begin(), lab.route.poses().end()}));
 }
 
@@ -64,7 +63,7 @@ PicturePlot panorama_plot(const LabRoute& lab, const std::string& title) {
 
 void draw_route_panorama(const LabRoute& lab, const std::filesystem::path& folder,
                          Reproduction& result) {
-  const std::string file = "figure_03_route_panorama.png";
+  const std::string file = "figure_03_route_panorama.svg";
   add_plot(result, folder, file,
            "The route panorama of the straight path [Y03 figure 3], the start at the bottom. "
            "Things ahead and behind keep their place, things beside the path wander by.",
@@ -99,7 +98,7 @@ void draw_virtual_view(const LabRoute& lab, const LineDrive& beside,
   const std::string where = std::to_string(std::lround(100.0 * in_path.y_m)) +
                             " cm to the left of the path, " +
                             std::to_string(std::lround(100.0 * in_path.x_m)) + " cm along it";
-  add_plot(result, folder, "figure_05_curve.png",
+  add_plot(result, folder, "figure_05_curve.svg",
            "Eq. 5 for a viewpoint " + where +
                " [Y03 figure 5]: along this curve the route panorama holds what is seen there.",
            plot);
@@ -113,7 +112,7 @@ void draw_virtual_view(const LabRoute& lab, const LineDrive& beside,
     if (!std::isfinite(shown[c])) continue;
     made.add(azimuth, static_cast<double>(shown[c]));
   }
-  add_plot(result, folder, "figure_05_lines.png",
+  add_plot(result, folder, "figure_05_lines.svg",
            "The line synthesised at that viewpoint, where no picture was taken, and the one that a "
            "camera sees there. Ahead and behind, the lines of sight do not cross the path.",
            LinePlot{.title = "The horizon " + where,
@@ -129,11 +128,12 @@ void draw_drives(const LabRoute& lab, const LocalisedDrives& drives,
                          const DriveErrors& contours) {
     return MapPlot{
         title,
-        {path_layer(lab), line_layer("true", "#000000", in_path_frame(lab, drive.truth)),
-         line_layer("contours, as published", "#d95f02", in_path_frame(lab, contours.poses)),
-         line_layer("direct fit", "#1f77b4", in_path_frame(lab, fit.poses))}};
+        {path_layer(lab), line_layer("true", PlotColour::black, in_path_frame(lab, drive.truth)),
+         line_layer("contours, as published", PlotColour::vermilion,
+                    in_path_frame(lab, contours.poses)),
+         line_layer("direct fit", PlotColour::blue, in_path_frame(lab, fit.poses))}};
   };
-  const std::string file = "figure_09_drives.png";
+  const std::string file = "figure_09_drives.svg";
   add_plot(
       result, folder, file,
       "A robot crosses the memorised path at 30 degrees [Y03 figure 9]; metres. The direct fit "
@@ -149,7 +149,7 @@ void draw_drives(const LabRoute& lab, const LocalisedDrives& drives,
     }
     return line;
   };
-  const std::string errors_file = "figure_09_errors.png";
+  const std::string errors_file = "figure_09_errors.svg";
   add_plot(result, folder, errors_file, "The errors of these drives, image by image.",
            LinePlot{.title = "How far off along these drives",
                     .x_label = "image, 5 cm apart",
@@ -162,15 +162,17 @@ void draw_drives(const LabRoute& lab, const LocalisedDrives& drives,
 
 void draw_goal_run(const LabRoute& lab, const GoalRun& run, const std::filesystem::path& folder,
                    Reproduction& result) {
-  MapLayer goals{.label = "start, sub-goal and goal", .colour = "#2ca02c"};
+  MapLayer goals{.label = "start, sub-goal and goal", .colour = PlotColour::green};
   for (const Point2 point : goal_run_points()) goals.squares.push_back(point);
-  const std::string file = "figure_10_goal.png";
-  add_plot(result, folder, file,
-           "Closed loop under proportional control [Y03 figure 10]; the estimate lies on the true "
-           "drive.",
-           MapPlot{"To a goal over a sub-goal off the path: metres",
-                   {path_layer(lab), line_layer("true", "#000000", in_path_frame(lab, run.truth)),
-                    line_layer("estimate", "#d62728", in_path_frame(lab, run.estimate)), goals}});
+  const std::string file = "figure_10_goal.svg";
+  add_plot(
+      result, folder, file,
+      "Closed loop under proportional control [Y03 figure 10]; the estimate lies on the true "
+      "drive.",
+      MapPlot{
+          "To a goal over a sub-goal off the path: metres",
+          {path_layer(lab), line_layer("true", PlotColour::black, in_path_frame(lab, run.truth)),
+           line_layer("estimate", PlotColour::blue, in_path_frame(lab, run.estimate)), goals}});
 }
 
 }  // namespace panonav

@@ -63,9 +63,7 @@ RepeatedRoute repeat_one(const RouteScene& place, int runs, std::uint64_t seed,
 }
 
 MapPlot map_of(const RouteScene& place, const RepeatedRoute& repeated) {
-  const FreeSpace& space = *place.free_space;
-  MapPlot map{.title = place.name + ": x and y in metres",
-              .layers = {obstacle_layer(space, space.low(), space.high(), 0.1)}};
+  MapPlot map{.title = place.name, .layers = scene_layers(place.scene)};
   std::ranges::move(route_layers(repeated.way, repeated.runs), std::back_inserter(map.layers));
   return map;
 }
@@ -117,7 +115,7 @@ void report_routes(const RouteReproductionOptions& options, const std::string& n
            lines);
   add_rate(result, id + ".turned_aside", what + ": steps at which something was in the way",
            turned_aside, lines);
-  const std::string file = "route_" + name + ".png";
+  const std::string file = "route_" + name + ".svg";
   add_plot(result, options.out, file,
            "A route of 60 m through " + name +
                ", recorded once and repeated forward and back; the driven ways lie on it.",
@@ -229,8 +227,8 @@ void reproduce_real_route(const RouteReproductionOptions& options, Executor& exe
   std::vector<double> along_cm;
   std::vector<double> beside_cm;
   std::size_t asked = 0;
-  MapLayer right{.label = "fixes", .colour = "#1f77b4"};
-  MapLayer remembered{.label = "remembered lines", .colour = "#000000"};
+  MapLayer right{.label = "fixes", .colour = PlotColour::blue};
+  MapLayer remembered{.label = "remembered lines", .colour = PlotColour::black};
   for (std::size_t i = 0; i < way.size(); ++i) {
     if (i % every == 0) {
       remembered.circles.push_back(places[i]);
@@ -250,12 +248,12 @@ void reproduce_real_route(const RouteReproductionOptions& options, Executor& exe
   add_median(result, "y03.sussex.lateral", what + ": error beside the route, median", "cm",
              beside_cm);
   add_rate(result, "y03.sussex.found", what + ": found on the route", along_cm.size(), asked);
-  MapLayer driven{.label = "driven way", .colour = "#999999", .lines = {places}};
+  MapLayer driven{.label = "driven way", .colour = PlotColour::grey, .lines = {places}};
   add_plot(
-      result, options.out, "sussex_route.png",
+      result, options.out, "sussex_route.svg",
       "A real route outdoors: where each picture between the remembered lines was found, without "
       "odometry.",
-      MapPlot{.title = "sussex_route: x and y in metres", .layers = {driven, right, remembered}});
+      MapPlot{.title = "sussex_route", .layers = {driven, right, remembered}});
 }
 
 }  // namespace panonav

@@ -268,11 +268,12 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
 }
 
 std::vector<MapLayer> route_layers(std::span<const Pose2> way, std::span<const RouteRun> runs) {
-  MapLayer route{.label = "remembered route", .colour = "#000000", .lines = {positions_of(way)}};
-  MapLayer forward{.label = "driven forward", .colour = "#1f77b4"};
-  MapLayer back{.label = "driven back", .colour = "#2ca02c"};
-  MapLayer starts{.label = "starts, 0.3 m off", .colour = "#d62728"};
-  MapLayer lost{.label = "lost", .colour = "#d62728"};
+  MapLayer route{
+      .label = "remembered route", .colour = PlotColour::black, .lines = {positions_of(way)}};
+  MapLayer forward{.label = "driven forward", .colour = PlotColour::blue};
+  MapLayer back{.label = "driven back", .colour = PlotColour::green};
+  MapLayer starts{.label = "starts, 0.3 m off", .colour = PlotColour::orange};
+  MapLayer lost{.label = "lost", .colour = PlotColour::vermilion};
   for (std::size_t i = 0; i < runs.size(); ++i) {
     (i % 2 == 0 ? forward : back).lines.push_back(positions_of(runs[i].truth));
     starts.circles.push_back(runs[i].truth.front().position());

@@ -122,9 +122,13 @@ TEST_F(Catchment, BadInputIsOneLine) {
 TEST_F(Catchment, TheReportHasItsPictures) {
   const std::filesystem::path report = folder / "report";
   run_well({"catchment", run, "--report", report});
-  for (const auto* file : {"index.html", "homeward.png", "orientation.png", "areas.png",
-                           "catchment.png", "field.png", "difference.png", "ends.png"}) {
+  for (const auto* file : {"index.html", "homeward.svg", "orientation.svg", "areas.svg",
+                           "catchment.svg", "field.svg", "difference.svg", "ends.svg"}) {
     EXPECT_TRUE(std::filesystem::exists(report / file)) << file;
+  }
+  // Distances, shares and differences begin at 0, whatever the values.
+  for (const auto* file : {"catchment.svg", "difference.svg", "ends.svg"}) {
+    EXPECT_FALSE(contains(bytes_of(report / file), "<text>-1</text>")) << file;
   }
 }
 

@@ -181,7 +181,7 @@ TEST_F(Home, BadInputIsOneLine) {
 TEST_F(Home, TheReportHasItsPictures) {
   const std::filesystem::path report = folder / "report";
   run_well({"home", folder / "home.png", folder / "run", "--report", report});
-  for (const auto* file : {"index.html", "home_1.png", "home_4.png", "field.png"}) {
+  for (const auto* file : {"index.html", "home_1.png", "home_4.png", "field.svg"}) {
     EXPECT_TRUE(std::filesystem::exists(report / file)) << file;
   }
   EXPECT_TRUE(

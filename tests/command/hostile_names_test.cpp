@@ -97,14 +97,14 @@ TEST_F(HostileNames, HomeReportShowsThem) {
   const std::string text = text_of(report / "index.html");
   for (const std::string& name : names) EXPECT_TRUE(contains(text, "<td>" + name + "</td>"));
   EXPECT_TRUE(contains(text, "From one view of a place"));
-  EXPECT_TRUE(fs::exists(report / "field.png"));
+  EXPECT_TRUE(fs::exists(report / "field.svg"));
 }
 
 TEST_F(HostileNames, CatchmentReportShowsThem) {
   const fs::path report = folder / "c`touch run`\n'\"<i>";
   run_well({"catchment", run, "--report", report});
   (void)text_of(report / "index.html");
-  EXPECT_TRUE(fs::exists(report / "field.png"));
+  EXPECT_TRUE(fs::exists(report / "field.svg"));
 }
 
 TEST_F(HostileNames, GalleryExportAndAnswersShowThem) {

@@ -25,8 +25,13 @@ int readable_pictures(const fs::path& folder) {
   const std::regex source("<img src=\"([^\"]+)\"");
   int count = 0;
   for (std::sregex_iterator i(page.begin(), page.end(), source), end; i != end; ++i) {
-    const Image picture = read_image(folder / (*i)[1].str());
-    EXPECT_GE(picture.width(), 200);
+    const fs::path picture = folder / (*i)[1].str();
+    if (picture.extension() == ".svg") {
+      EXPECT_TRUE(contains(bytes_of(picture), "</svg>")) << picture;
+      EXPECT_LT(fs::file_size(picture), 1500000U) << picture;
+    } else {
+      EXPECT_GE(read_image(picture).width(), 200);
+    }
     ++count;
   }
   return count;
@@ -64,13 +69,13 @@ CommandResult run_from_page(const fs::path& folder, const std::string& verb) {
 
 /// What the robots that are tracked and sent around must come to, on a 50 cm grid.
 void expect_tracked_and_navigated(const json& said) {
-  EXPECT_EQ(said["track_images"], 20);
+  EXPECT_EQ(said["track_images"], 55);
+  EXPECT_GE(said["track_places_at_first"].get<int>(), 4) << "the corridor's plan is symmetric";
   ASSERT_TRUE(said["track_until_localised"].is_number()) << said;
-  EXPECT_LE(said["track_until_localised"].get<int>(), 5);
+  EXPECT_GE(said["track_until_localised"].get<int>(), 2);
   ASSERT_TRUE(said["track_until_found_again"].is_number()) << said;
-  EXPECT_LE(said["track_until_found_again"].get<int>(), 8);
   EXPECT_GE(said["track_localised"].get<int>(), 10);
-  EXPECT_LE(said["track_wrong"].get<int>(), 3);
+  EXPECT_LE(said["track_wrong"].get<int>(), 8);
   EXPECT_LT(said["track_error_m"].get<double>(), 0.2);
   EXPECT_EQ(said["missions"], 3);
   EXPECT_GE(said["missions_arrived"].get<int>(), 2);
@@ -86,6 +91,20 @@ void expect_tracked_and_navigated(const json& said) {
     }
     EXPECT_GE(run["steps"].get<int>(), 1);
   }
+}
+
+/// The player finds in the run's data whatever it asks of an image.
+void expect_player_knows_its_data(const fs::path& file) {
+  const std::string page = bytes_of(file);
+  const std::size_t begin = page.find("const run = ") + 12;
+  const json run = json::parse(page.substr(begin, page.find(";\n", begin) - begin));
+  const std::regex member("\\b(?:image|i)\\.([a-z_]+)");
+  int count = 0;
+  for (std::sregex_iterator i(page.begin(), page.end(), member), end; i != end; ++i, ++count) {
+    EXPECT_TRUE(run["images"][0].contains((*i)[1].str())) << i->str();
+  }
+  EXPECT_GT(count, 10);
+  EXPECT_FALSE(contains(page, "{{"));
 }
 
 using Demo = InTemporaryFolder;
@@ -108,7 +127,11 @@ TEST_F(Demo, TellsTheWholeStoryTwiceAndLeavesAMemoryThatAnswers) {
   expect_tracked_and_navigated(said);
   const auto log = lines(bytes_of(fs::path(out) / "mission.log"));
   EXPECT_GT(log.size(), said["mission_kidnapped"]["steps"].get<std::size_t>());
-  EXPECT_TRUE(contains(bytes_of(fs::path(out) / "track.html"), "</html>"));
+  expect_player_knows_its_data(fs::path(out) / "track.html");
+  // What a stranger understands: lengths, and the truth about how they were measured.
+  const std::string page = bytes_of(fs::path(out) / "index.html");
+  EXPECT_TRUE(std::regex_search(page, std::regex("How places lie</small><b>[0-9]+ cm</b>")));
+  EXPECT_FALSE(contains(page, "shape difference"));
   EXPECT_LT(said["arranged_procrustes_disparity"].get<double>(), 0.2);
   EXPECT_LT(said["drive_procrustes_disparity"].get<double>(), 0.1);
   EXPECT_EQ(said["route_runs"], 2);

@@ -10,7 +10,6 @@
 
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/io/image_file.hpp"
 #include "support/command_runner.hpp"
 
 namespace panonav::testing {
@@ -149,7 +148,7 @@ TEST_F(TrackOffice, TheReportHoldsPicturesAndARunToPlay) {
   const std::regex source("<img src=\"([^\"]+)\"");
   int pictures = 0;
   for (std::sregex_iterator i(page.begin(), page.end(), source), end; i != end; ++i) {
-    EXPECT_GE(read_image(fs::path(out) / (*i)[1].str()).width(), 500);
+    EXPECT_TRUE(contains(bytes_of(fs::path(out) / (*i)[1].str()), "</svg>"));
     ++pictures;
   }
   EXPECT_EQ(pictures, 4);

@@ -49,6 +49,10 @@ TEST(SuccessRate, WilsonIntervalOfPublishedExample) {
   const Proportion all = success_rate(50, 50);
   EXPECT_LT(all.low, 0.95);
   EXPECT_DOUBLE_EQ(all.high, 1.0);
+  for (std::size_t trials = 1; trials <= 400; ++trials) {
+    EXPECT_EQ(success_rate(0, trials).low, 0.0) << trials;
+    EXPECT_EQ(success_rate(trials, trials).high, 1.0) << trials;
+  }
   EXPECT_THROW((void)success_rate(3, 2), ContractError);
 }
 

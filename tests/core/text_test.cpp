@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace panonav::testing {
 namespace {
 
@@ -45,6 +47,20 @@ TEST(ShellQuoted, LeavesPlainWordsAndQuotesTheRest) {
   EXPECT_EQ(shell_quoted(""), "''");
   EXPECT_EQ(shell_quoted("a b"), "'a b'");
   EXPECT_EQ(shell_quoted("it's $HOME"), "'it'\\''s $HOME'");
+}
+
+TEST(ShortNumber, IsAsPeopleWriteIt) {
+  EXPECT_EQ(short_number(29.999999999999996), "30");
+  EXPECT_EQ(short_number(1.735e-18), "0");
+  EXPECT_EQ(short_number(-1e-18), "0");
+  EXPECT_EQ(short_number(-0.0), "0");
+  EXPECT_EQ(short_number(0.00001), "0.00001");
+  EXPECT_EQ(short_number(12345678.0), "12345678");
+  EXPECT_EQ(short_number(0.00944, "", 4), "0.00944");
+  EXPECT_EQ(short_number(0.0000012, "m", 4), "0") << "a thousandth of a millimetre";
+  EXPECT_EQ(short_number(0.0396712, "m", 4), "0.03967");
+  EXPECT_EQ(short_number(-0.056, "", 4), "-0.056");
+  EXPECT_EQ(short_number(std::nan("")), "none");
 }
 
 }  // namespace

@@ -10,6 +10,8 @@
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/signature/dissimilarity.hpp"
+#include "panonav/simulation/scenes.hpp"
+#include "panonav/simulation/screen.hpp"
 
 namespace panonav {
 namespace {
@@ -97,19 +99,76 @@ TEST(PredictedExtents, AgreeWithStepsThatAreReallyTaken) {
   EXPECT_GT(rank_correlation(predicted, taken), 0.8);
 }
 
-TEST(FurnitureLayers, HoldWhatStandsOnTheFloorAndNoWalls) {
-  const PlaceRecording place = small_office();
-  const auto layers = furniture_layers(place.scene);
-  ASSERT_EQ(layers.size(), 2U);
-  std::size_t pieces = 0;
-  for (const MapLayer& layer : layers) {
-    for (const auto& outline : layer.filled_polygons) {
-      ++pieces;
-      const auto [low, high] = std::ranges::minmax(outline, {}, &Point2::x_m);
-      EXPECT_LT(high.x_m - low.x_m, 4.0);
+/// What stands around, and walls.
+struct Drawn {
+  explicit Drawn(const Scene& scene) {
+    for (const MapLayer& layer : scene_layers(scene)) {
+      things.insert(things.end(), layer.filled_polygons.begin(), layer.filled_polygons.end());
+      walls.insert(walls.end(), layer.lines.begin(), layer.lines.end());
     }
   }
-  EXPECT_GE(pieces, 5U);
+  std::vector<std::vector<Point2>> things;
+  std::vector<std::vector<Point2>> walls;
+};
+
+TEST(SceneLayers, AnOfficeHasFurnitureAndWallsAllAround) {
+  const Scene office = make_scene("office", {.seed = 3});
+  const Drawn drawn(office);
+  EXPECT_GE(drawn.things.size(), 5U);
+  bool turned = false;
+  for (const auto& outline : drawn.things) {
+    ASSERT_GE(outline.size(), 3U);
+    const auto [west, east] = std::ranges::minmax(outline, {}, &Point2::x_m);
+    EXPECT_LE(east.x_m - west.x_m, 4.0);
+    // A chair stands as it was left: not along the walls.
+    const Point2 edge{outline[1].x_m - outline[0].x_m, outline[1].y_m - outline[0].y_m};
+    turned = turned || (outline.size() == 4 && std::abs(edge.x_m * edge.y_m) > 1e-3);
+  }
+  EXPECT_TRUE(turned);
+  double around_m = 0.0;
+  for (const auto& line : drawn.walls) around_m += distance(line.front(), line.back());
+  const double width = office.floor_high.x_m - office.floor_low.x_m;
+  const double depth = office.floor_high.y_m - office.floor_low.y_m;
+  EXPECT_GE(around_m, 2.0 * (width + depth));
+}
+
+TEST(SceneLayers, AScreenIsALineAsItStands) {
+  Scene scene{.floor_low = {-2.0, -2.0}, .floor_high = {2.0, 2.0}};
+  const Pose2 across{0.5, 0.25, 0.6};
+  add_screen(scene, across, 0.8, 1.0);
+  const Drawn drawn(scene);
+  EXPECT_TRUE(drawn.things.empty());
+  ASSERT_EQ(drawn.walls.size(), 1U);
+  const Point2 left = across * Point2{0.0, 0.4};
+  const Point2 right = across * Point2{0.0, -0.4};
+  EXPECT_NEAR(distance(drawn.walls[0].front(), left) + distance(drawn.walls[0].back(), right), 0.0,
+              1e-9);
+}
+
+TEST(SceneLayers, CrownsOfTreesAreRound) {
+  const Drawn drawn(make_scene("garden", {.seed = 1}));
+  EXPECT_TRUE(
+      std::ranges::any_of(drawn.things, [](const auto& outline) { return outline.size() >= 8; }));
+}
+
+TEST(SceneLayers, DoorsAreOpenUnderTheirLintels) {
+  for (const auto* name : {"corridor", "loop"}) {
+    const Scene scene = make_scene(name, {.seed = 1});
+    const Drawn drawn(scene);
+    ASSERT_GE(scene.tour.size(), 3U);
+    for (std::size_t i = 0; i < scene.tour.size(); ++i) {
+      const Point2 a = scene.tour[i];
+      const Point2 b = scene.tour[(i + 1) % scene.tour.size()];
+      const auto side = [](const Point2& p, const Point2& q, const Point2& r) {
+        return (q.x_m - p.x_m) * (r.y_m - p.y_m) - (q.y_m - p.y_m) * (r.x_m - p.x_m);
+      };
+      for (const auto& wall : drawn.walls) {
+        EXPECT_FALSE(side(a, b, wall.front()) * side(a, b, wall.back()) < 0.0 &&
+                     side(wall.front(), wall.back(), a) * side(wall.front(), wall.back(), b) < 0.0)
+            << name << " way " << i;
+      }
+    }
+  }
 }
 
 }  // namespace

@@ -43,6 +43,17 @@ TEST(ResultRow, JsonIsTheDocumentedArray) {
   EXPECT_TRUE(list[0]["interval"].is_null());
 }
 
+TEST(ResultRow, FiguresAreAsPeopleWriteThem) {
+  ResultRow rate = row(0.0, Comparison::at_most, 0.00005);
+  rate.interval = std::pair{1.735e-18, 0.0369935};
+  EXPECT_EQ(shown_figure(rate), "0 (0 .. 0.03699) m");
+  EXPECT_EQ(shown_target(rate), "at most 0.00005");
+  EXPECT_EQ(table_cells(rate)[2], "0 (0 .. 0.03699)");
+  rate.ours = -1e-17;
+  rate.interval = std::nullopt;
+  EXPECT_EQ(shown_figure(rate), "0 m");
+}
+
 ResultRow missed() {
   ResultRow result = row(2.0, Comparison::at_most, 1.0);
   result.interval = std::pair{1.5, 2.5};

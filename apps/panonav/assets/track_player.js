@@ -1,7 +1,7 @@
 const canvas = document.getElementById('map'), context = canvas.getContext('2d');
 const slider = document.getElementById('slider'), button = document.getElementById('play');
 const images = run.images;
-const stateColours = { localised: '#1a7f37', ambiguous: '#b35900', lost: '#c0201b' };
+const stateColours = { localised: '{{sky}}', ambiguous: '{{orange}}', lost: '{{vermilion}}' };
 slider.max = images.length - 1;
 
 // What is sure to be seen: references, true path, localised places.
@@ -12,7 +12,7 @@ function include(point) {
 }
 run.references.forEach(include);
 for (const image of images) {
-  if (image.truth) include(image.truth);
+  if (image.ground_truth) include(image.ground_truth);
   if (image.pose && image.state === 'localised') include(image.pose);
 }
 const margin = Math.max(run.spacing, 0.1);
@@ -67,24 +67,24 @@ function draw() {
   const image = images[shown];
   context.clearRect(0, 0, shownWidth, shownHeight);
   const referenceRadius = Math.max(1.5, Math.min(5, 0.18 * run.spacing * scale));
-  for (const [x, y] of run.references) circle(x, y, referenceRadius, null, '#999');
+  for (const [x, y] of run.references) circle(x, y, referenceRadius, null, '{{grey}}');
   const past = images.slice(0, shown + 1);
-  path(past.map(i => i.truth), '#1f5fd0');
-  path(past.map(i => i.state === 'localised' ? i.pose : null), '#000');
+  path(past.map(i => i.ground_truth), '{{black}}');
+  path(past.map(i => i.state === 'localised' ? i.pose : null), '{{blue}}');
   for (let p = 0; p < image.particles.length; p += 2) {
-    circle(image.particles[p], image.particles[p + 1], 2, '#e0201bb0');
+    circle(image.particles[p], image.particles[p + 1], 2, '{{vermilion}}b0');
   }
   if (image.pose) {
     const x = px(image.pose[0]), y = py(image.pose[1]);
-    pointer(image.pose, 22, '#000');
-    if (image.state === 'localised') { context.fillStyle = '#000'; context.fillRect(x - 6, y - 6, 12, 12); }
-    else { context.strokeStyle = '#000'; context.lineWidth = 2; context.strokeRect(x - 6, y - 6, 12, 12); }
+    pointer(image.pose, 22, '{{blue}}');
+    if (image.state === 'localised') { context.fillStyle = '{{blue}}'; context.fillRect(x - 6, y - 6, 12, 12); }
+    else { context.strokeStyle = '{{blue}}'; context.lineWidth = 2; context.strokeRect(x - 6, y - 6, 12, 12); }
   }
-  if (image.truth) {
-    circle(image.truth[0], image.truth[1], 10, null, '#1f5fd0', 2.5);
-    if (image.truth.length === 3) {
-      const [x, y, h] = image.truth;
-      context.strokeStyle = '#1f5fd0'; context.lineWidth = 2.5; context.beginPath();
+  if (image.ground_truth) {
+    circle(image.ground_truth[0], image.ground_truth[1], 10, null, '{{black}}', 2.5);
+    if (image.ground_truth.length === 3) {
+      const [x, y, h] = image.ground_truth;
+      context.strokeStyle = '{{black}}'; context.lineWidth = 2.5; context.beginPath();
       context.moveTo(px(x) + 10 * Math.cos(h), py(y) - 10 * Math.sin(h));
       context.lineTo(px(x) + 22 * Math.cos(h), py(y) - 22 * Math.sin(h)); context.stroke();
     }
@@ -96,7 +96,7 @@ function draw() {
   if (image.state === 'localised') said.push(`x ${image.pose[0].toFixed(2)} m, y ${image.pose[1].toFixed(2)} m`);
   if (image.state === 'localised' && image.error !== null) said.push(`error ${image.error.toFixed(2)} m`);
   if (image.state === 'ambiguous') said.push(image.modes === 1 ? 'one place, not yet sure' : `${image.modes} places`);
-  said.push(`${image.count} particles` + (image.redrawn > 0 ? `, ${image.redrawn} drawn anew` : ''));
+  said.push(`${image.count} particles` + (image.injected > 0 ? `, ${image.injected} drawn anew` : ''));
   document.getElementById('text').textContent = said.join(' \u00b7 ');
 }
 function show(index) { shown = index; slider.value = index; draw(); }
@@ -113,6 +113,6 @@ button.onclick = () => timer ? stop() : start();
 document.getElementById('speed').onchange = () => { if (timer) { stop(); start(); } };
 slider.oninput = () => { stop(); show(Number(slider.value)); };
 window.onresize = () => { fit(); draw(); };
-if (!images.some(image => image.truth)) document.getElementById('truth-legend').remove();
+if (!images.some(image => image.ground_truth)) document.getElementById('truth-legend').remove();
 fit();
 draw();

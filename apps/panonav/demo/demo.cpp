@@ -17,6 +17,7 @@
 #include "demo/recordings.hpp"
 #include "demo/route.hpp"
 #include "demo/track.hpp"
+#include "experiments/runs/surroundings.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
@@ -51,11 +52,12 @@ void show_camera(const DemoRecordings& recordings, const fs::path& out, Session&
 
   const Camera truth = recordings.true_camera;
   const MirrorCircle& found = recordings.mirror;
-  page.part("What the robot sees", {fixed(std::hypot(found.centre.u_px - truth.centre.u_px,
-                                                     found.centre.v_px - truth.centre.v_px),
-                                          2) +
-                                        " px",
-                                    "off: the centre of the mirror, found in pictures alone"});
+  page.part("What the robot sees",
+            {fixed(std::hypot(found.centre.u_px - truth.centre.u_px,
+                              found.centre.v_px - truth.centre.v_px),
+                   2) +
+                 " pixels",
+             "is how far off it finds the middle of its mirror, in its own pictures alone"});
   page.text(
       "A camera looks up into a curved mirror and sees all around at once. The dark disc in the "
       "middle is the camera "
@@ -144,13 +146,14 @@ std::string median_text(const std::vector<double>& values, double unit, int digi
   return fixed(unit * median(values), digits) + " " + std::string(name);
 }
 
-void show_answers(const VisualMemory& memory, const FloorPlan& plan,
+void show_answers(const VisualMemory& memory, const std::vector<MapLayer>& scene,
                   const std::vector<AskedView>& asked, const Outcome& own, const Outcome& foreign,
                   double spacing_m, const fs::path& out, ReportPage& page) {
-  draw_answers(memory, plan, asked, out / "map.png");
+  draw_answers(memory, scene, asked, out / "map.svg");
   const std::string spacing = fixed(100.0 * spacing_m, 0) + " cm";
   page.part("It remembers and localises itself",
-            {median_text(own.errors_m, 100.0, 1, "cm"), "median error, from one picture"});
+            {median_text(own.errors_m, 100.0, 1, "cm"),
+             "is how far off it says that it is, from one picture (median)"});
   page.text("The robot took a view every " + spacing +
             " and remembered it. Then it was put down at " + std::to_string(asked.size()) +
             " random places between them, facing anywhere, and asked from one new picture each: "
@@ -170,7 +173,7 @@ void show_answers(const VisualMemory& memory, const FloorPlan& plan,
       "view alone would be " +
       median_text(own.nearest_errors_m, 100.0, 1, "cm") +
       " off (median): the position is interpolated between views.");
-  page.pictures({{"map.png", "True places, and the error of each answer"}});
+  page.pictures({{"map.svg", "True places, and the error of each answer"}});
 }
 
 /// The first place that was recognised stands for all.
@@ -180,25 +183,27 @@ const AskedView& shown_view(const std::vector<AskedView>& asked) {
   return known == asked.end() ? asked.front() : *known;
 }
 
-void show_levels(const VisualMemory& memory, const FloorPlan& plan, const AskedView& view,
-                 double spacing_m, const fs::path& out, ReportPage& page) {
-  const auto areas_m2 = draw_areas(memory, plan, view, out / "areas.png");
-  draw_similarity(memory, spacing_m, view, out / "similarity.png");
+void show_levels(const VisualMemory& memory, const std::vector<MapLayer>& scene,
+                 const AskedView& view, double spacing_m, const fs::path& out, ReportPage& page) {
+  const auto areas_m2 = draw_areas(memory, scene, view, out / "areas.svg");
+  draw_similarity(memory, spacing_m, view, out / "similarity.svg");
   page.part("As accurate as needed",
             {fixed(areas_m2.front(), 1) + " to " + fixed(areas_m2.back(), 2) + " m²",
-             "where it may be, with 1 to 15 components compared"});
+             "is the area where it may be: a coarse look is cheap, a fine one exact"});
   page.text(
       "With one Fourier component compared, the robot may be anywhere in a large area (" +
       fixed(areas_m2.front(), 1) +
       " square metres here); with each further component the area shrinks, down to " +
       fixed(areas_m2.back(), 2) +
       ". In the open a coarse answer is enough and costs less; at a door a fine one is needed.");
-  page.pictures({{"areas.png",
-                  "Orange: where the robot may be, after 1, 3, 6 and 15 components. Red cross: "
-                  "where it is."}});
-  page.pictures({{"similarity.png",
-                  "How similar each remembered view is to the one asked for. It falls with "
-                  "distance on all sides."}});
+  page.pictures({{"areas.svg",
+                  "The orange area is where the robot may be, after 1, 3, 6 and 15 components; the "
+                  "cross is where it is."}});
+  page.pictures(
+      {{"similarity.svg",
+        "How similar each remembered view is to the one asked for, taken at the cross: the "
+        "nearest view is the most similar, and similarity falls with distance on all "
+        "sides. That is what the areas are read from."}});
 }
 
 void show_what_next(const DemoOptions& wanted, const DemoRecordings& recordings,
@@ -218,12 +223,13 @@ void show_what_next(const DemoOptions& wanted, const DemoRecordings& recordings,
        "panonav localise " + memory + " " + in_out("elsewhere_run") + "    # another room: unknown",
        "panonav localise " + memory + " " + recordings.query_run.entries.front().path.string() +
            " --areas",
-       "panonav track " + memory + " " + in_out("walk_run") + " --report " + in_out("track_report"),
+       "panonav track " + in_out("corridor.panonav") + " " + in_out("walk_run") + " --report " +
+           in_out("track_report"),
        "panonav home view_00000.png " + recordings.query_run.entries.front().path.string() +
            " --memory " + memory + " --report " + in_out("way_home"),
        "panonav navigate " + memory + " --scene office --scene-seed " +
            std::to_string(seen.simulation.scene.scene_seed) + " --exposure " +
-           short_number(seen.sensor.exposure) + mission + " --picture " + in_out("way.png"),
+           short_number(seen.sensor.exposure) + mission + " --picture " + in_out("way.svg"),
        "panonav unwrap " + recordings.query_run.entries.front().path.string() + " --camera " +
            (recordings.query_run.folder / "camera.toml").string() + " -o panorama.png"});
 }
@@ -265,6 +271,7 @@ ordered_json as_json(const DemoResults& done, const fs::path& out) {
           {"known_elsewhere", done.foreign.known},
           {"bytes_share", done.own.bytes_share},
           {"track_images", done.track.images},
+          {"track_places_at_first", done.track.places_at_first},
           {"track_until_localised", or_null(done.track.until_localised)},
           {"track_until_found_again", or_null(done.track.until_found_again)},
           {"track_localised", done.track.localised},
@@ -310,10 +317,11 @@ void print(const DemoResults& done, Session& session) {
                 "; kidnapped, found again " + images_text(done.track.until_found_again) +
                 "; median error " + median_text(done.track.errors_m, 100.0, 1, "cm") + "; " +
                 of(done.track.wrong, done.track.localised) + " answers wrong");
-  session.print("  arranged without positions: shape difference " +
-                (done.maps.lattice ? fixed(done.maps.lattice->shape_difference, 3) : "none") +
-                "; map from a drive: " + fixed(done.maps.map_error, 3) + ", its wheels alone " +
-                fixed(done.maps.wheels_error, 3));
+  const auto centimetres = [](double metres) { return fixed(100.0 * metres, 0) + " cm"; };
+  session.print("  arranged by similarity alone: " +
+                (done.maps.lattice ? centimetres(done.maps.lattice->rms_m) : "none") +
+                " from the true places; map of a drive: " + centimetres(done.maps.map_rms_m) +
+                " from the true way, its wheels alone " + centimetres(done.maps.wheels_rms_m));
   session.print("  home from one metre away: " + of(done.homing.arrived, done.homing.runs.size()) +
                 " runs ended within 10 cm; median " +
                 fixed(100.0 * median(done.homing.distances_m), 1) + " cm");
@@ -328,6 +336,18 @@ void print(const DemoResults& done, Session& session) {
                 "; kidnapped half way: " + std::string(name_of(navigation.kidnapped.end)) +
                 "; a screen in the way: " +
                 (navigation.screened ? std::string(name_of(navigation.screened->end)) : "none"));
+}
+
+MemoryFile remember(const Dataset& run, const fs::path& path, Executor& executor) {
+  {
+    Memoriser memoriser(path, {.source = run.source});
+    DatasetObservations source(run, executor);
+    std::vector<Observation> seen;
+    while (auto observation = source.next()) seen.push_back(std::move(*observation));
+    memoriser.add(std::move(seen), executor);
+    memoriser.finish(executor);
+  }
+  return MemoryFile::open(path, Access::read_write);
 }
 
 ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
@@ -347,25 +367,26 @@ ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
   if (!recordings) {
     return session.no_answer("panonav demo: no mirror was found in the simulated pictures");
   }
-  ReportPage page("panonav: a robot that remembers what places look like",
-                  "A simulated robot with one mirror camera drives through an office and remembers "
-                  "what it looks like. From that memory alone it says where it is, is found again "
-                  "when it was kidnapped, arranges what it remembers, finds home, repeats a "
-                  "route and goes where it is told. No laser, no GPU, no training. Each figure "
-                  "leads to its part below.");
+  ReportPage page(
+      "panonav: a robot that remembers what places look like",
+      "A robot with one camera that looks all around remembers views of a place, 2.4 kB "
+      "each. By what it sees it then tells where it is and which way it faces, makes "
+      "maps, finds home, repeats a route and goes where it is told: no laser, no GPU, no "
+      "training. Everything below was just simulated and measured against the truth on "
+      "this computer (seed " +
+          std::to_string(wanted.seed) + "). Each figure leads to its part.");
+  page.section("With pictures of your own");
+  page.commands(
+      {"panonav memorise photos place.panonav --kind equirectangular --elevation-deg -30 40",
+       "panonav localise place.panonav now.jpg"});
+  page.text(
+      "The first command remembers a folder of 360 degree pictures, the second tells where another "
+      "one was taken. The end of this page has commands to try on the data of this run; every verb "
+      "has --help.");
   show_camera(*recordings, out, session, page);
 
   next_part("remembers and localises itself");
-  {
-    const Dataset& run = recordings->memory_run;
-    Memoriser memoriser(out / "office.panonav", {.source = run.source});
-    DatasetObservations source(run, session.executor());
-    std::vector<Observation> seen;
-    while (auto observation = source.next()) seen.push_back(std::move(*observation));
-    memoriser.add(std::move(seen), session.executor());
-    memoriser.finish(session.executor());
-  }
-  MemoryFile file = MemoryFile::open(out / "office.panonav", Access::read_write);
+  MemoryFile file = remember(recordings->memory_run, out / "office.panonav", session.executor());
   const auto pipeline =
       std::make_shared<const ViewEncoder>(file.header(), recordings->memory_run.source);
   const VisualMemory memory = file.load();
@@ -375,27 +396,26 @@ ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
   DemoResults done{.views = memory.size(), .questions = asked.size()};
   done.own = outcome_of(asked, memory);
   done.foreign = outcome_of(elsewhere, memory);
-  constexpr double margin_m = 1.2;  // furniture stands around the free floor
-  const FloorPlan plan = floor_plan(
-      *recordings->office, {recordings->low.x_m - margin_m, recordings->low.y_m - margin_m},
-      {recordings->high.x_m + margin_m, recordings->high.y_m + margin_m});
-  show_answers(memory, plan, asked, done.own, done.foreign, wanted.spacing_m(), out, page);
+  const std::vector<MapLayer> scene = scene_layers(recordings->office_scene);
+  show_answers(memory, scene, asked, done.own, done.foreign, wanted.spacing_m(), out, page);
   next_part("as accurate as needed");
-  show_levels(memory, plan, shown_view(asked), wanted.spacing_m(), out, page);
+  show_levels(memory, scene, shown_view(asked), wanted.spacing_m(), out, page);
   next_part("tracks itself");
-  done.track = show_track(wanted, *recordings, file, plan, session, page);
+  const MemoryFile corridor =
+      remember(recordings->corridor_run, out / "corridor.panonav", session.executor());
+  done.track = show_track(wanted, *recordings, corridor, session, page);
   next_part("arranges what it remembers");
   done.maps = show_maps(memory, wanted.seed, wanted.quick, out, session, page);
   store_lattice(done.maps.arranged, memory, file);
   next_part("goes home");
-  done.homing = show_homing(recordings->office_scene, plan, wanted.runs_home(), wanted.seed, out,
-                            session, page);
+  done.homing =
+      show_homing(recordings->office_scene, wanted.runs_home(), wanted.seed, out, session, page);
   next_part("repeats a route");
   done.route =
-      show_route(recordings->office_scene, plan, wanted.route_m(), wanted.seed, out, session, page);
+      show_route(recordings->office_scene, wanted.route_m(), wanted.seed, out, session, page);
   next_part("goes where it is told");
-  done.navigation = show_navigation(wanted, *recordings, memory, done.maps.arranged, pipeline, plan,
-                                    session, page);
+  done.navigation =
+      show_navigation(wanted, *recordings, memory, done.maps.arranged, pipeline, session, page);
   show_what_next(wanted, *recordings, done.navigation, page);
   page.write(out);
   progress.clear();

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "experiments/runs/surroundings.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/positions.hpp"
@@ -35,28 +36,26 @@ std::vector<HomingTask> tasks_in(const HomingPlace& place, int count, std::uint6
   return tasks;
 }
 
-void draw_runs(const FloorPlan& plan, const std::vector<HomingRun>& runs,
+void draw_runs(const Scene& office, const std::vector<HomingRun>& runs,
                const std::filesystem::path& path) {
-  MapLayer homes{.label = "home", .colour = "#e0201b"};
-  MapLayer starts{.label = "start", .colour = "#000000"};
-  MapLayer good{.label = "way home", .colour = "#0072b2"};
-  MapLayer bad{.label = "ended elsewhere", .colour = "#d55e00"};
+  MapLayer homes{.label = "home", .colour = PlotColour::black};
+  MapLayer starts{.label = "start", .colour = PlotColour::green};
+  MapLayer good{.label = "way home", .colour = PlotColour::blue};
+  MapLayer bad{.label = "ended elsewhere", .colour = PlotColour::vermilion};
   for (const HomingRun& run : runs) {
     homes.squares.push_back(run.goal.position());
     starts.circles.push_back(run.path.front().position());
     std::vector<Point2> line = positions_of(run.path);
     if (line.size() > 1) (run.succeeds(close_m) ? good : bad).lines.push_back(std::move(line));
   }
-  write_plot(path, MapPlot{.title = "Runs home in the office, from above: x and y in metres",
-                           .layers = {MapLayer{.label = "furniture",
-                                               .colour = "#999999",
-                                               .filled_polygons = plan.boxes},
-                                      good, bad, starts, homes}});
+  MapPlot map{.title = "Runs home in the office", .layers = scene_layers(office)};
+  for (const MapLayer& layer : {good, bad, starts, homes}) map.layers.push_back(layer);
+  write_plot(path, map);
 }
 
 }  // namespace
 
-DemoHoming show_homing(const Scene& office, const FloorPlan& plan, int runs, std::uint64_t seed,
+DemoHoming show_homing(const Scene& office, int runs, std::uint64_t seed,
                        const std::filesystem::path& out, Session& session, ReportPage& page) {
   const HomingPlace place = make_homing_place(office, {}, session.executor());
   const auto tasks = tasks_in(place, runs, seed);
@@ -68,7 +67,7 @@ DemoHoming show_homing(const Scene& office, const FloorPlan& plan, int runs, std
     homing.distances_m.push_back(run.end_distance_m);
     steps += run.path.size() - 1;
   }
-  draw_runs(plan, homing.runs, out / "homing.png");
+  draw_runs(office, homing.runs, out / "homing.svg");
   const auto seen_from = [&](const Pose2& pose) {
     const HomingCamera& camera = place.camera;
     return take_panorama(*place.renderer, pose, camera.rendering, camera.frame, camera.sensor, seed,
@@ -81,7 +80,7 @@ DemoHoming show_homing(const Scene& office, const FloorPlan& plan, int runs, std
   write_png(out / "way_home.png", picture.view());
 
   page.part("Back home", {std::to_string(homing.arrived) + " of " + std::to_string(runs),
-                          "robots found home from a metre away, and knew it"});
+                          "robots found home from a metre away, by one remembered picture"});
   page.text(
       "From one view of a place the robot finds its way back to it, without a map and without "
       "knowing which way it faces: the Fourier components of both views tell the direction home. "
@@ -98,11 +97,11 @@ DemoHoming show_homing(const Scene& office, const FloorPlan& plan, int runs, std
   page.pictures(
       {{"way_home.png",
         "The first run. Above, the view at home, turned as the robot faces at the start; below, "
-        "what it sees there. Red: the direction home, where things spread out on the way; blue: "
-        "the opposite one; grey: straight ahead."},
-       {"homing.png",
-        "All runs. Red squares: homes; circles: starts. A run that ended elsewhere "
-        "is orange."}});
+        "what it sees there. Orange: the direction home, where things spread out on the way; "
+        "blue: the opposite one; grey: straight ahead."},
+       {"homing.svg",
+        "All runs, from the green circles to the black squares. A run that ended elsewhere is "
+        "orange."}});
   return homing;
 }
 

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "cli/session.hpp"
-#include "demo/pictures.hpp"
 #include "experiments/runs/homing_run.hpp"
 #include "reports/report_page.hpp"
 
@@ -19,7 +18,7 @@ struct DemoHoming {
 };
 
 /// Runs them and adds a section with its pictures to the page. The same seed gives the same runs.
-DemoHoming show_homing(const Scene& office, const FloorPlan& plan, int runs, std::uint64_t seed,
+DemoHoming show_homing(const Scene& office, int runs, std::uint64_t seed,
                        const std::filesystem::path& out, Session& session, ReportPage& page);
 
 }  // namespace panonav::command

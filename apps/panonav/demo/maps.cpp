@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "experiments/runs/surroundings.hpp"
+#include "panonav/geometry/alignment.hpp"
 #include "panonav/geometry/positions.hpp"
 #include "panonav/mapping/lattice.hpp"
 #include "panonav/simulation/scenes.hpp"
@@ -20,16 +21,29 @@ constexpr int components = 15;
 
 void draw_drive(const PlaceRecording& place, const MappingRecording& recording,
                 const MappedRecording& mapped, const std::filesystem::path& path) {
-  MapPlot plot{.title = "A drive through rooms, from above: x and y in metres",
-               .layers = furniture_layers(place.scene)};
-  plot.layers.push_back({.label = "true way", .colour = "#777777", .lines = {mapped.truth}});
+  MapPlot plot{.title = "A drive through rooms", .layers = scene_layers(place.scene)};
+  plot.layers.push_back(
+      {.label = "true way", .colour = PlotColour::black, .lines = {mapped.truth}});
   plot.layers.push_back({.label = "wheels alone",
-                         .colour = "#d55e00",
+                         .colour = PlotColour::vermilion,
                          .lines = {laid_over(positions_of(recording.wheels), mapped.truth)}});
   plot.layers.push_back({.label = "map from the views",
-                         .colour = "#0072b2",
+                         .colour = PlotColour::blue,
                          .lines = {laid_over(mapped.estimate, mapped.truth)}});
   write_plot(path, plot);
+}
+
+/// The longer side of the floor on which the views were taken.
+double room_m(const VisualMemory& office) {
+  std::vector<double> x_m;
+  std::vector<double> y_m;
+  for (const ViewId view : office.views()) {
+    x_m.push_back(office.info(view).pose->x_m);
+    y_m.push_back(office.info(view).pose->y_m);
+  }
+  const auto [west, east] = std::ranges::minmax(x_m);
+  const auto [south, north] = std::ranges::minmax(y_m);
+  return std::max(east - west, north - south);
 }
 
 }  // namespace
@@ -39,7 +53,7 @@ DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick,
   DemoMaps maps;
   maps.arranged = arrange(office, {}, {}, session.executor());
   maps.lattice = compare_with_ground_truth(maps.arranged, office);
-  write_lattice_picture(out / "arranged.png", maps.arranged, office);
+  write_lattice_picture(out / "arranged.svg", maps.arranged, office);
 
   const PlaceRecording place =
       empty_place(make_scene("loop", {.seed = seed}), seed, 256, session.executor());
@@ -50,35 +64,47 @@ DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick,
       map_recording(recording, {.odometry = {.camera_height_m = place.scene.camera_height_m}});
   maps.map_error = shape_error(mapped.estimate, mapped.truth);
   maps.wheels_error = shape_error(positions_of(recording.wheels), mapped.truth);
-  maps.closures = mapped.right_closures + mapped.wrong_closures;
-  draw_drive(place, recording, mapped, out / "drive.png");
+  maps.map_rms_m = align(mapped.estimate, mapped.truth, {.allow_scale = true}).rms_m;
+  maps.wheels_rms_m =
+      align(positions_of(recording.wheels), mapped.truth, {.allow_scale = true}).rms_m;
+  draw_drive(place, recording, mapped, out / "drive.svg");
 
+  const auto centimetres = [](double metres) { return fixed(100.0 * metres, 0) + " cm"; };
+  const std::string arranged = maps.lattice ? centimetres(maps.lattice->rms_m) : "none";
   page.part("How places lie",
-            {maps.lattice ? fixed(maps.lattice->shape_difference, 3) : std::string("none"),
-             "from the true shape: 0 is the same, 1 any other; no position was given"});
+            {arranged, "is how far off a map is that views made by how alike they look alone"});
   page.text(
-      "The remembered views of the office, in no order and without any position, arrange "
-      "themselves by their similarity alone, like balls held by springs. And from one picture "
-      "after "
-      "the other, a robot that drives through rooms it has never seen makes a map of its way; the "
-      "height of the camera tells metres, its wheels tell nothing.");
+      "Can pictures alone make a map? The remembered views of the office were shuffled and their "
+      "positions taken away. Views that look alike pull each other close, like balls on springs, "
+      "and so they find their places by themselves.");
+  page.pictures({{"arranged.svg",
+                  "Left, where the views were taken; right, where they put themselves: turned and "
+                  "scaled as a whole to fit, because pictures know neither north nor metres. Lines "
+                  "are the springs. Were the arrangement perfect, the right picture would be the "
+                  "left one."}});
+  page.text(
+      "In the second picture a robot drives through rooms that it has never seen and makes a map "
+      "of its way, from one picture after the other and without wheels; where it comes by again it "
+      "recognises the place and closes the loop.");
+  page.pictures(
+      {{"drive.svg", "The drive: " + std::to_string(recording.truth.size()) + " views, one every " +
+                         centimetres(spacing_m) +
+                         ". The blue map should lie on the black way; both it and the "
+                         "orange line are laid over that in equal size. The orange one is "
+                         "what the wheels of a cheap robot make of the same drive."}});
   std::vector<std::pair<std::string, std::string>> figures;
   if (maps.lattice) {
-    figures.push_back(
-        {fixed(maps.lattice->shape_difference, 3),
-         "shape difference of the arranged office: 0 is the true shape, 1 any other"});
-    if (maps.lattice->trustworthiness) {
-      figures.push_back({fixed(100.0 * *maps.lattice->trustworthiness, 1) + " %",
-                         "trustworthiness: how far views side by side there are so in truth"});
-    }
+    figures.push_back({arranged,
+                       "from their true places lie the arranged views (root mean "
+                       "square), in a room " +
+                           fixed(room_m(office), 1) + " m long: " +
+                           fixed(100.0 * maps.lattice->rms_m / room_m(office), 1) + " % of it"});
   }
-  figures.push_back({fixed(maps.map_error, 3), "shape difference of the map from the drive"});
-  figures.push_back({fixed(maps.wheels_error, 3), "the same of the wheels of a cheap robot"});
+  figures.push_back({centimetres(maps.map_rms_m),
+                     "from the true way lies the map of a drive of " +
+                         fixed(spacing_m * static_cast<double>(recording.truth.size()), 0) + " m"});
+  figures.push_back({centimetres(maps.wheels_rms_m), "from it lies what the wheels tell"});
   page.figures(figures);
-  page.pictures({{"arranged.png",
-                  "The office as its views arranged themselves, beside where they were taken."},
-                 {"drive.png", "The drive: " + std::to_string(recording.truth.size()) +
-                                   " views, one every " + fixed(100.0 * spacing_m, 0) + " cm."}});
   return maps;
 }
 

@@ -17,7 +17,8 @@ struct DemoMaps {
   std::optional<LatticeComparison> lattice;  ///< beside the truth
   double map_error = 1.0;                    ///< shape difference of a map from a drive
   double wheels_error = 1.0;                 ///< of the wheels on the same drive
-  std::size_t closures = 0;
+  double map_rms_m = 0.0;                    ///< of the map laid over the true way, in equal size
+  double wheels_rms_m = 0.0;
 };
 
 /// Arranges the views of `office` without their poses, makes a map of a drive through rooms of

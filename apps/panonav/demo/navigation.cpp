@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "experiments/runs/mission_picture.hpp"
+#include "experiments/runs/surroundings.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
@@ -94,13 +95,13 @@ std::optional<ScreenedMission> screened_mission(const MissionPlace& place,
 }
 
 void draw_runs(const DemoNavigation& navigation, const RememberedPlace& remembered,
-               const std::vector<Mission>& missions, const FloorPlan& plan, const fs::path& path) {
-  MapLayer views{.label = "remembered views", .colour = "#cccccc"};
+               const std::vector<Mission>& missions, const Scene& office, const fs::path& path) {
+  MapLayer views{.label = "remembered views", .colour = PlotColour::light_grey};
   for (const Pose2& pose : remembered.truth) views.circles.push_back(pose.position());
-  MapLayer good{.label = "way to the goal", .colour = "#0072b2"};
-  MapLayer bad{.label = "ended elsewhere", .colour = "#d55e00"};
-  MapLayer starts{.label = "start", .colour = "#009e73"};
-  MapLayer goals{.label = "goal", .colour = "#000000"};
+  MapLayer good{.label = "way to the goal", .colour = PlotColour::blue};
+  MapLayer bad{.label = "ended elsewhere", .colour = PlotColour::vermilion};
+  MapLayer starts{.label = "start", .colour = PlotColour::green};
+  MapLayer goals{.label = "goal", .colour = PlotColour::black};
   for (std::size_t i = 0; i < navigation.runs.size(); ++i) {
     const MissionRun& run = navigation.runs[i];
     starts.squares.push_back(run.path.front().position());
@@ -111,11 +112,9 @@ void draw_runs(const DemoNavigation& navigation, const RememberedPlace& remember
       (run.arrives(navigation.within_m) ? good : bad).lines.push_back(std::move(line));
     }
   }
-  write_plot(path, MapPlot{.title = "All missions from above: x and y in metres",
-                           .layers = {MapLayer{.label = "furniture",
-                                               .colour = "#999999",
-                                               .filled_polygons = plan.boxes},
-                                      views, good, bad, starts, goals}});
+  MapPlot map{.title = "All missions", .layers = scene_layers(office)};
+  for (const MapLayer& layer : {views, good, bad, starts, goals}) map.layers.push_back(layer);
+  write_plot(path, map);
 }
 
 std::string end_text(const MissionRun& run, double within_m) {
@@ -168,19 +167,19 @@ void add_part(const DemoNavigation& navigation, ReportPage& page) {
         navigation.screened ? "the robot with a screen in its way"
                             : "no screen leaves a way round here"}});
   std::vector<ReportPicture> pictures{
-      {"mission.png",
+      {"mission.svg",
        "The first mission. Arrows: which way each remembered view sends the robot; orange: the way "
-       "planned at the start; red: the way driven."},
-      {"missions.png", "All missions. A way that did not end at its goal is orange."},
-      {"mission_kidnapped.png",
-       "Half way, somebody kidnapped this robot: it was put down at the pink square. " +
+       "planned at the start; red-orange: the way driven."},
+      {"missions.svg", "All missions. A way that did not end at its goal is orange."},
+      {"mission_kidnapped.svg",
+       "Half way, somebody kidnapped this robot: it was put down at the purple square. " +
            sentence_on(navigation.kidnapped, navigation.within_m)}};
   if (navigation.screened) {
-    pictures.push_back({"mission_screen.png",
-                        "A screen stands across the middle of the planned way, which the memory "
-                        "does not know; the "
-                        "robot cannot stand in the grey patch around it. There is a way round. " +
-                            sentence_on(*navigation.screened, navigation.within_m)});
+    pictures.push_back(
+        {"mission_screen.svg",
+         "A screen, the short dark line, stands across the middle of the planned way; "
+         "the memory does not know it. There is a way round. " +
+             sentence_on(*navigation.screened, navigation.within_m)});
   }
   page.pictures(pictures);
   page.link("mission.log", "Read each decision of all missions");
@@ -190,8 +189,8 @@ void add_part(const DemoNavigation& navigation, ReportPage& page) {
 
 DemoNavigation show_navigation(const DemoOptions& options, const DemoRecordings& recordings,
                                const VisualMemory& memory, const Lattice& arranged,
-                               std::shared_ptr<const ViewEncoder> pipeline, const FloorPlan& plan,
-                               Session& session, ReportPage& page) {
+                               std::shared_ptr<const ViewEncoder> pipeline, Session& session,
+                               ReportPage& page) {
   Executor& executor = session.executor();
   const RememberedPlace remembered = remembered_place(memory, arranged, options.spacing_m());
   MissionPlace place = recordings.office_world->place();
@@ -216,13 +215,14 @@ DemoNavigation show_navigation(const DemoOptions& options, const DemoRecordings&
   }
   const auto draw = [&](const char* file, const std::string& what, const MissionPlace& where,
                         const Mission& mission, const MissionRun& run) {
-    write_mission_picture(options.out / file, what + ", from above: x and y in metres", where,
-                          remembered, settings.planner, mission.goal, run);
+    write_mission_picture(options.out / file, what + "", where, remembered, settings.planner,
+                          mission.goal, run);
   };
   const Mission& first = missions.front();
-  draw("mission.png", "To a remembered view", place, first, navigation.runs.front());
-  draw("mission_kidnapped.png", "Kidnapped half way", place, missions.back(), navigation.kidnapped);
-  draw_runs(navigation, remembered, missions, plan, options.out / "missions.png");
+  draw("mission.svg", "To a remembered view", place, first, navigation.runs.front());
+  draw("mission_kidnapped.svg", "Kidnapped half way", place, missions.back(), navigation.kidnapped);
+  draw_runs(navigation, remembered, missions, recordings.office_scene,
+            options.out / "missions.svg");
   std::string log;
   const auto add_log = [&](const std::string& title, const Mission& mission,
                            const MissionRun& run) {
@@ -242,7 +242,7 @@ DemoNavigation show_navigation(const DemoOptions& options, const DemoRecordings&
     navigation.screened =
         run_missions(screened->place, remembered, {screened->mission}, settings, noise, executor)
             .front();
-    draw("mission_screen.png", "A screen in the way", screened->place, screened->mission,
+    draw("mission_screen.svg", "A screen in the way", screened->place, screened->mission,
          *navigation.screened);
     add_log("A screen in the way", screened->mission, *navigation.screened);
   }

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "cli/session.hpp"
-#include "demo/pictures.hpp"
 #include "demo/recordings.hpp"
 #include "experiments/runs/mission.hpp"
 #include "panonav/mapping/lattice.hpp"
@@ -34,7 +33,7 @@ struct DemoNavigation {
 /// runs.
 DemoNavigation show_navigation(const DemoOptions& options, const DemoRecordings& recordings,
                                const VisualMemory& memory, const Lattice& arranged,
-                               std::shared_ptr<const ViewEncoder> pipeline, const FloorPlan& plan,
-                               Session& session, ReportPage& page);
+                               std::shared_ptr<const ViewEncoder> pipeline, Session& session,
+                               ReportPage& page);
 
 }  // namespace panonav::command

@@ -5,18 +5,13 @@
 #include <limits>
 
 #include "panonav/signature/dissimilarity.hpp"
-#include "reporting/plot.hpp"
 
 namespace panonav::command {
 
 namespace {
 
-MapLayer layer_of(const FloorPlan& plan) {
-  return {.label = "furniture", .colour = "#999999", .filled_polygons = plan.boxes};
-}
-
 MapLayer references(const VisualMemory& memory) {
-  MapLayer layer{.label = "remembered views", .colour = "#0072b2"};
+  MapLayer layer{.label = "remembered views", .colour = PlotColour::blue};
   for (const ViewId view : memory.views()) {
     layer.circles.push_back(memory.info(view).pose->position());
   }
@@ -25,51 +20,22 @@ MapLayer references(const VisualMemory& memory) {
 
 }  // namespace
 
-FloorPlan floor_plan(const Renderer& renderer, Point2 low, Point2 high) {
-  // Looking down from above the furniture, below the ceiling of any room.
-  constexpr double eye_m = 1.9;
-  constexpr double counts_from_m = 0.1;  // carpets and sills do not
-  constexpr double cell_m = 0.04;
-  FloorPlan plan;
-  const auto cells = [](double length_m) { return static_cast<int>(std::ceil(length_m / cell_m)); };
-  const int columns = cells(high.x_m - low.x_m);
-  const int rows = cells(high.y_m - low.y_m);
-  for (int j = 0; j < rows; ++j) {
-    const double bottom_m = low.y_m + j * cell_m;
-    int begin = -1;
-    for (int i = 0; i <= columns; ++i) {
-      const Vector3 eye{low.x_m + (i + 0.5) * cell_m, bottom_m + 0.5 * cell_m, eye_m};
-      const bool filled =
-          i < columns && renderer.distance_along(eye, {0.0, 0.0, -1.0}) < eye_m - counts_from_m;
-      if (filled && begin < 0) begin = i;
-      if (filled || begin < 0) continue;
-      const double left_m = low.x_m + begin * cell_m;
-      const double right_m = low.x_m + i * cell_m;
-      plan.boxes.push_back({{left_m, bottom_m},
-                            {right_m, bottom_m},
-                            {right_m, bottom_m + cell_m},
-                            {left_m, bottom_m + cell_m}});
-      begin = -1;
-    }
-  }
-  return plan;
-}
-
-void draw_answers(const VisualMemory& memory, const FloorPlan& plan,
+void draw_answers(const VisualMemory& memory, const std::vector<MapLayer>& scene,
                   const std::vector<AskedView>& asked, const std::filesystem::path& path) {
-  MapLayer truth{.label = "true place", .colour = "#009e73"};
-  MapLayer error{.label = "from there to the answer", .colour = "#d55e00"};
+  MapLayer truth{.label = "true place", .colour = PlotColour::green};
+  MapLayer error{.label = "from there to the answer", .colour = PlotColour::vermilion};
   for (const auto& view : asked) {
     truth.crosses.push_back(view.truth.position());
     if (view.found.position) {
       error.lines.push_back({view.truth.position(), view.found.position->position});
     }
   }
-  write_plot(path, MapPlot{.title = "The office from above: x and y in metres",
-                           .layers = {layer_of(plan), references(memory), truth, error}});
+  MapPlot map{.title = "The office from above", .layers = scene};
+  for (const MapLayer& layer : {references(memory), error, truth}) map.layers.push_back(layer);
+  write_plot(path, map);
 }
 
-std::vector<double> draw_areas(const VisualMemory& memory, const FloorPlan& plan,
+std::vector<double> draw_areas(const VisualMemory& memory, const std::vector<MapLayer>& scene,
                                const AskedView& asked, const std::filesystem::path& path) {
   // Views within a quarter of the best dissimilarity stay candidates, as in `reproduce m04`: with
   // none the first component alone would drop the true place for noise.
@@ -83,16 +49,19 @@ std::vector<double> draw_areas(const VisualMemory& memory, const FloorPlan& plan
     const bool shown = level.components == 1 || level.components == 3 || level.components == 6 ||
                        level.components == memory.shape().components;
     if (!shown) continue;
-    MapLayer area{.label = "where the robot may be", .colour = "#e69f00"};
+    MapLayer area{.label = "where the robot may be", .colour = PlotColour::orange};
     for (const auto& candidate : level.candidates) {
       area.filled_polygons.push_back(areas.cell(candidate.view));
     }
     const MapLayer robot{
-        .label = "the robot", .colour = "#d55e00", .crosses = {asked.truth.position()}};
+        .label = "the robot", .colour = PlotColour::vermilion, .crosses = {asked.truth.position()}};
     areas_m2.push_back(level.area_m2.value_or(std::numeric_limits<double>::quiet_NaN()));
     panels.push_back({.title = std::to_string(level.components) +
                                (level.components == 1 ? " component" : " components"),
-                      .layers = {layer_of(plan), area, references(memory), robot}});
+                      .layers = scene});
+    for (const MapLayer& layer : {area, references(memory), robot}) {
+      panels.back().layers.push_back(layer);
+    }
   }
   write_plot(path, panels, 2);
   return areas_m2;

@@ -7,7 +7,7 @@
 #include "panonav/localisation/hierarchical.hpp"
 #include "panonav/localisation/localiser.hpp"
 #include "panonav/memory/visual_memory.hpp"
-#include "panonav/simulation/renderer.hpp"
+#include "reporting/plot.hpp"
 
 namespace panonav::command {
 
@@ -18,19 +18,13 @@ struct AskedView {
   Localisation found;
 };
 
-/// What stands on the floor, seen from above: boxes of one row of small squares each.
-struct FloorPlan {
-  std::vector<std::vector<Point2>> boxes;
-};
-[[nodiscard]] FloorPlan floor_plan(const Renderer& renderer, Point2 low, Point2 high);
-
-/// True places, and a line from each to where the memory says it is.
-void draw_answers(const VisualMemory& memory, const FloorPlan& plan,
+/// True places, and a line from each to where the memory says it is, over the layers of the scene.
+void draw_answers(const VisualMemory& memory, const std::vector<MapLayer>& scene,
                   const std::vector<AskedView>& asked, const std::filesystem::path& path);
 
 /// Where the robot may be after 1, 3, 6 and all components, side by side [M04 figure 9]. Gives the
 /// areas of these levels in square metres.
-std::vector<double> draw_areas(const VisualMemory& memory, const FloorPlan& plan,
+std::vector<double> draw_areas(const VisualMemory& memory, const std::vector<MapLayer>& scene,
                                const AskedView& asked, const std::filesystem::path& path);
 
 /// How similar every remembered view is to the one asked for [M04 figure 8].

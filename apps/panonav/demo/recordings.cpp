@@ -22,33 +22,37 @@ namespace fs = std::filesystem;
 constexpr std::string_view mark = "made_by_panonav_demo.txt";
 
 /// Everything else that a demo makes.
-constexpr std::array<std::string_view, 28> made{"memory_run",
+constexpr std::array<std::string_view, 32> made{"memory_run",
                                                 "query_run",
                                                 "elsewhere_run",
+                                                "corridor_run",
                                                 "walk_run",
                                                 "office.panonav",
                                                 "office.panonav-wal",
                                                 "office.panonav-shm",
+                                                "corridor.panonav",
+                                                "corridor.panonav-wal",
+                                                "corridor.panonav-shm",
                                                 "mirror.png",
                                                 "calibration.png",
                                                 "cylinder.png",
-                                                "map.png",
-                                                "areas.png",
-                                                "similarity.png",
-                                                "tracked.png",
-                                                "particles.png",
+                                                "map.svg",
+                                                "areas.svg",
+                                                "similarity.svg",
+                                                "tracked.svg",
+                                                "particles.svg",
                                                 "track.html",
-                                                "arranged.png",
-                                                "drive.png",
-                                                "homing.png",
+                                                "arranged.svg",
+                                                "drive.svg",
+                                                "homing.svg",
                                                 "way_home.png",
-                                                "route.png",
-                                                "route_panorama.png",
-                                                "mission.png",
+                                                "route.svg",
+                                                "route_panorama.svg",
+                                                "mission.svg",
                                                 "mission.log",
-                                                "mission_kidnapped.png",
-                                                "mission_screen.png",
-                                                "missions.png",
+                                                "mission_kidnapped.svg",
+                                                "mission_screen.svg",
+                                                "missions.svg",
                                                 "index.html"};
 
 /// A world with the places of one recording.
@@ -98,24 +102,29 @@ std::optional<MirrorCircle> find_mirror_in(const Dataset& recording, int count) 
   return find_mirror(views);
 }
 
-/// Two walks as one recording. Between them somebody carries the robot far away, to the farthest
-/// place in the first half of `after`; its odometry knows nothing of that.
-std::vector<RecordedPose> kidnapped_walk(std::vector<RecordedPose> walk,
-                                         const std::vector<RecordedPose>& after) {
+/// Drives as one recording. Between them somebody carries the robot away; its odometry knows
+/// nothing of that.
+std::vector<RecordedPose> joined(std::vector<RecordedPose> walk,
+                                 const std::vector<RecordedPose>& after) {
   const RecordedPose last = walk.back();
-  const std::size_t images = (after.size() + 1) / 2;
-  const auto first =
-      std::ranges::max_element(after.begin(), after.begin() + static_cast<std::ptrdiff_t>(images),
-                               {}, [&](const RecordedPose& there) {
-                                 return distance(there.pose.position(), last.pose.position());
-                               });
-  for (auto there = first; there < first + static_cast<std::ptrdiff_t>(after.size() / 2); ++there) {
-    RecordedPose next = *there;
-    next.stamp_s += last.stamp_s - first->stamp_s + 1.0;
-    next.odometry = last.odometry * (inverse(first->odometry) * there->odometry);
+  for (RecordedPose next : after) {
+    next.stamp_s += last.stamp_s + 1.0;
+    next.odometry = last.odometry * (inverse(after.front().odometry) * next.odometry);
     walk.push_back(next);
   }
   return walk;
+}
+
+/// Along straight lines, facing forward.
+PlannedRun drive_through(const SimulatedWorld& world, double spacing_m, int seed,
+                         const std::vector<Point2>& way_points) {
+  SimulatedWorld there = world.with(
+      {.path = RecordingPath::tour, .heading = RecordingHeading::path, .spacing_m = spacing_m},
+      seed);
+  const SimulationArguments& settled = there.arguments();
+  auto poses = plan_recording(there.scene(), there.free_space(), settled.recording,
+                              settled.odometry, static_cast<std::uint64_t>(seed), way_points);
+  return {std::move(there), std::move(poses), true};
 }
 
 }  // namespace
@@ -161,11 +170,6 @@ std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& s
   const RecordingOptions anywhere{.path = RecordingPath::random,
                                   .heading = RecordingHeading::random,
                                   .poses = options.questions()};
-  // Twice as long as needed: where the second half begins is chosen.
-  const RecordingOptions walking{.path = RecordingPath::walk,
-                                 .heading = RecordingHeading::path,
-                                 .spacing_m = 0.2,
-                                 .poses = options.walk_images()};
   const auto seed_of = [&](int stream) {
     return simulation_of(options, stream).simulation.scene.seed;
   };
@@ -173,15 +177,33 @@ std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& s
   const PlannedRun asked = plan(office.world.with(anywhere, seed_of(1)));
   const PlannedRun elsewhere =
       plan(world_of("lab", simulation_of(options, 2), executor).with(anywhere, seed_of(2)));
-  PlannedRun walk = plan(office.world.with(walking, seed_of(3)));
-  const PlannedRun after = plan(office.world.with(walking, seed_of(4)));
-  walk.poses.resize((walk.poses.size() + 1) / 2);
+  // The corridor is a ring, 12 m by 8 m, and two narrow ones across it. In one of these the robot
+  // could as well be in the other one, and either way round, as the plan is the same turned by half
+  // and each of them the same as its neighbour. It drives a hand's breadth beside the remembered
+  // line.
+  const SimulatedWorld corridor = world_of("corridor", simulation_of(options, 5), executor);
+  constexpr double remembered_every_m = 0.35;
+  PlannedRun ring = drive_through(corridor, remembered_every_m, seed_of(5),
+                                  {{0.0, 0.0}, {12.0, 0.0}, {12.0, 8.0}, {0.0, 8.0}, {0.0, 0.4}});
+  for (const double x : {4.0, 8.0}) {
+    const auto across =
+        drive_through(corridor, remembered_every_m, seed_of(5), {{x, 0.4}, {x, 7.6}});
+    ring.poses = joined(std::move(ring.poses), across.poses);
+  }
+  constexpr double driven_every_m = 0.25;
+  PlannedRun walk =
+      drive_through(corridor, driven_every_m, seed_of(3), {{4.1, 6.0}, {4.1, 7.9}, {12.0, 7.9}});
+  auto after =
+      drive_through(corridor, driven_every_m, seed_of(4), {{7.9, 2.0}, {7.9, 0.1}, {12.0, 0.1}});
+  const auto images = static_cast<std::size_t>(options.walk_images() / 2);
+  walk.poses.resize(std::min(walk.poses.size(), images));
+  after.poses.resize(std::min(after.poses.size(), images));
   const std::size_t kidnapped_after = walk.poses.size() - 1;
-  walk.poses = kidnapped_walk(std::move(walk.poses), after.poses);
+  walk.poses = joined(std::move(walk.poses), after.poses);
 
-  Progress progress(
-      session, "rendering",
-      office.poses.size() + asked.poses.size() + elsewhere.poses.size() + walk.poses.size());
+  Progress progress(session, "rendering",
+                    office.poses.size() + asked.poses.size() + elsewhere.poses.size() +
+                        ring.poses.size() + walk.poses.size());
   const auto record_run = [&](const PlannedRun& run, const char* name) {
     return record_dataset(run.world, options.out / name, run.poses, run.with_path, executor,
                           [&] { progress.advance(); });
@@ -190,6 +212,7 @@ std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& s
   recordings.memory_run = record_run(office, "memory_run");
   recordings.query_run = record_run(asked, "query_run");
   recordings.elsewhere_run = record_run(elsewhere, "elsewhere_run");
+  recordings.corridor_run = record_run(ring, "corridor_run");
   recordings.walk_run = record_run(walk, "walk_run");
   recordings.kidnapped_after = kidnapped_after;
   progress.clear();
@@ -206,19 +229,19 @@ std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& s
                                    .direction = recordings.true_camera.direction,
                                    .forward_angle_rad = recordings.true_camera.forward_angle_rad});
   for (Dataset* run : {&recordings.memory_run, &recordings.query_run, &recordings.elsewhere_run,
-                       &recordings.walk_run}) {
+                       &recordings.corridor_run, &recordings.walk_run}) {
     run->source.camera = camera;
     write_dataset(*run);
   }
 
-  recordings.low = office.world.free_space().low();
-  recordings.high = office.world.free_space().high();
   recordings.office_scene = office.world.scene();
-  recordings.office = std::make_shared<const Renderer>(office.world.scene(),
-                                                       RendererOptions{.channels = 3}, executor);
-  recordings.colour_picture = [renderer = recordings.office, frame = office.world.arguments().frame,
-                               sensor = grid.sensor, seen_by = recordings.true_camera](
-                                  const DatasetEntry& entry, Executor& threads) {
+  recordings.corridor_scene = corridor.scene();
+  auto in_colour = std::make_shared<const Renderer>(office.world.scene(),
+                                                    RendererOptions{.channels = 3}, executor);
+  recordings.colour_picture = [renderer = std::move(in_colour),
+                               frame = office.world.arguments().frame, sensor = grid.sensor,
+                               seen_by = recordings.true_camera](const DatasetEntry& entry,
+                                                                 Executor& threads) {
     const Viewpoint viewpoint{.pose = {entry.pose->x_m, entry.pose->y_m, *entry.pose->heading_rad},
                               .height_m = frame.camera_height_m};
     return apply_sensor(renderer->render_image(viewpoint, seen_by, 3, threads), seen_by, sensor, 1);

@@ -25,7 +25,7 @@ struct DemoOptions {
   [[nodiscard]] int questions() const noexcept { return quick ? 8 : 40; }
   [[nodiscard]] int runs_home() const noexcept { return quick ? 3 : 12; }
   /// Images of the robot that is tracked, half of them before it is kidnapped.
-  [[nodiscard]] int walk_images() const noexcept { return quick ? 20 : 60; }
+  [[nodiscard]] int walk_images() const noexcept { return 60; }
   [[nodiscard]] int missions() const noexcept { return quick ? 3 : 12; }
   [[nodiscard]] double route_m() const noexcept { return quick ? 3.0 : 10.0; }
 };
@@ -36,15 +36,15 @@ struct DemoRecordings {
   Dataset memory_run;               ///< the office on a grid
   Dataset query_run;                ///< the same office at random places
   Dataset elsewhere_run;            ///< another room
-  Dataset walk_run;                 ///< a walk through the office, with odometry
+  Dataset corridor_run;             ///< a corridor of identical doors and junctions
+  Dataset walk_run;                 ///< a drive through it, with odometry
   std::size_t kidnapped_after = 0;  ///< the image of the walk; odometry does not know
   MirrorCircle mirror;              ///< what calibration found
   int calibrated_on = 0;            ///< pictures
   Camera true_camera;
   Scene office_scene;
   std::shared_ptr<const SimulatedWorld> office_world;  ///< in grey, as the robot sees it
-  std::shared_ptr<const Renderer> office;              ///< in colour
-  Point2 low, high;                                    ///< corners of the office's floor
+  Scene corridor_scene;
   /// What the camera sees at an entry of the office, in colour, for people.
   std::function<Image(const DatasetEntry&, Executor&)> colour_picture;
 };

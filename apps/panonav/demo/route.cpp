@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "experiments/runs/surroundings.hpp"
 #include "panonav/core/statistics.hpp"
 #include "reporting/picture_plot.hpp"
 #include "reporting/plot.hpp"
@@ -12,11 +13,9 @@ namespace panonav::command {
 
 namespace {
 
-void draw_runs(const FloorPlan& plan, std::span<const Pose2> way, const std::vector<RouteRun>& runs,
+void draw_runs(const Scene& office, std::span<const Pose2> way, const std::vector<RouteRun>& runs,
                const std::filesystem::path& path) {
-  MapPlot map{.title = "A route through the office, from above: x and y in metres",
-              .layers = {MapLayer{
-                  .label = "furniture", .colour = "#999999", .filled_polygons = plan.boxes}}};
+  MapPlot map{.title = "A route through the office", .layers = scene_layers(office)};
   std::ranges::move(route_layers(way, runs), std::back_inserter(map.layers));
   write_plot(path, map);
 }
@@ -43,9 +42,8 @@ void draw_panorama(const RoutePanorama& route, const std::filesystem::path& path
 
 }  // namespace
 
-DemoRoute show_route(const Scene& office, const FloorPlan& plan, double length_m,
-                     std::uint64_t seed, const std::filesystem::path& out, Session& session,
-                     ReportPage& page) {
+DemoRoute show_route(const Scene& office, double length_m, std::uint64_t seed,
+                     const std::filesystem::path& out, Session& session, ReportPage& page) {
   constexpr double spacing_m = 0.1;
   Executor& executor = session.executor();
   RouteScene place = make_route_scene(office, "office", executor);
@@ -72,14 +70,15 @@ DemoRoute show_route(const Scene& office, const FloorPlan& plan, double length_m
     }
     route.position_m.insert(route.position_m.end(), run.position_m.begin(), run.position_m.end());
   }
-  draw_panorama(panorama, out / "route_panorama.png");
-  draw_runs(plan, way, route.runs, out / "route.png");
+  draw_panorama(panorama, out / "route_panorama.svg");
+  draw_runs(office, way, route.runs, out / "route.svg");
 
   const auto median_cm = [](const std::vector<double>& values) {
     return values.empty() ? std::string("none") : fixed(100.0 * median(values), 1) + " cm";
   };
   page.part("A route, again and again",
-            {median_cm(route.lateral_m), "from the route, when driven again (median)"});
+            {median_cm(route.lateral_m),
+             "is how far a robot strays from a route it was shown once (median)"});
   page.text(
       "Of a route the robot remembers one line of pixels every 10 cm: its horizon, a byte a "
       "degree. "
@@ -96,10 +95,15 @@ DemoRoute show_route(const Scene& office, const FloorPlan& plan, double length_m
                 {fixed(1e-3 * static_cast<double>(route.bytes), 0) + " kB",
                  "what the route takes, before packing"}});
   page.pictures(
-      {{"route_panorama.png",
-        "The route panorama: each row is the horizon at one place of the route, the start "
-        "at the bottom."},
-       {"route.png", "The remembered route and both drives, which lie on it."}});
+      {{"route_panorama.svg",
+        "All that the robot keeps of the route. Each row is what it saw at one place, all around, "
+        "straight ahead in the middle: the start is the lowest row, the end the highest. A thing "
+        "that the robot passes is a curve that begins in the middle and runs out to a side; bends "
+        "of the way shift all curves together."},
+       {"route.svg",
+        "The remembered route in black, under both drives: one there, one back. Each was put down "
+        "at a circle, 0.3 m beside the route, and comes to it by itself; where only one colour is "
+        "seen the drives lie on the route."}});
   return route;
 }
 

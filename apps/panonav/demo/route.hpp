@@ -4,7 +4,6 @@
 #include <filesystem>
 
 #include "cli/session.hpp"
-#include "demo/pictures.hpp"
 #include "experiments/y03/routes.hpp"
 #include "reports/report_page.hpp"
 
@@ -22,8 +21,7 @@ struct DemoRoute {
 
 /// Records and repeats it and adds a section with its pictures to the page. The same seed gives the
 /// same runs.
-DemoRoute show_route(const Scene& office, const FloorPlan& plan, double length_m,
-                     std::uint64_t seed, const std::filesystem::path& out, Session& session,
-                     ReportPage& page);
+DemoRoute show_route(const Scene& office, double length_m, std::uint64_t seed,
+                     const std::filesystem::path& out, Session& session, ReportPage& page);
 
 }  // namespace panonav::command

@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "experiments/runs/surroundings.hpp"
 #include "panonav/core/statistics.hpp"
 #include "reports/track_animation.hpp"
 #include "reports/track_pictures.hpp"
@@ -44,17 +45,19 @@ DemoTrack outcome_of(const std::vector<TrackedImage>& images, std::size_t kidnap
   return track;
 }
 
-/// The first image, that at which it is localised, the last before it is kidnapped, the first
-/// after it, that at which it is found again, and the last.
+/// The first images, those around which it is localised, kidnapped and found again.
 std::set<std::size_t> moments_of(const DemoTrack& track, std::size_t kidnapped_after) {
-  std::set<std::size_t> moments{0, kidnapped_after, kidnapped_after + 1, track.images - 1};
-  if (track.until_localised) moments.insert(*track.until_localised - 1);
+  std::set<std::size_t> moments{0, kidnapped_after + 1};
+  if (track.until_localised) {
+    moments.insert(*track.until_localised / 2);
+    moments.insert(*track.until_localised - 1);
+  }
   if (track.until_found_again) moments.insert(kidnapped_after + *track.until_found_again);
   return moments;
 }
 
 std::string images_text(const std::optional<std::size_t>& images) {
-  return images ? std::to_string(*images) + (*images == 1 ? " image" : " images") : "never";
+  return images ? std::to_string(*images) + (*images == 1 ? " picture" : " pictures") : "never";
 }
 
 void add_part(const DemoTrack& track, double spacing_m, std::size_t kidnapped_after,
@@ -62,37 +65,42 @@ void add_part(const DemoTrack& track, double spacing_m, std::size_t kidnapped_af
   const std::string median_text =
       track.errors_m.empty() ? "none" : fixed(100.0 * median(track.errors_m), 1) + " cm";
   page.part("It tracks itself",
-            {images_text(track.until_found_again), "until a robot that was kidnapped knew it"});
+            {images_text(track.until_localised), "until a robot knew which of " +
+                                                     std::to_string(track.places_at_first) +
+                                                     " places it was at, several of them alike"});
   page.text(
-      "A robot that does not know where it is, nor which way it faces, drives through the office. "
-      "Red dots are particles: places where it may be. Its odometry, which drifts, moves them, and "
-      "each picture keeps those that explain it. After " +
-      std::to_string(kidnapped_after + 1) +
-      " pictures somebody carries the robot elsewhere and tells it nothing. It counts as localised "
-      "when it says so and is right to " +
-      fixed(100.0 * spacing_m, 0) + " cm, the spacing of the views.");
-  page.figures({{images_text(track.until_localised), "until it was localised"},
+      "A corridor with identical doors and eight identical junctions. The robot does not know "
+      "where it is, nor which way it faces, and it starts in one of two narrow crossings: its plan "
+      "is the same when turned by half, so that at first several places explain what it sees. "
+      "Each dot is a particle, a place where the robot may be. Its odometry, which drifts, moves "
+      "them, and each picture keeps those that explain it: they gather in a few places, and in one "
+      "once small differences have added up.");
+  page.text("After " + std::to_string(kidnapped_after + 1) +
+            " pictures somebody carries the robot to the other crossing and tells it nothing. It "
+            "counts as localised when it says so and is right to " +
+            fixed(100.0 * spacing_m, 0) + " cm.");
+  page.figures({{std::to_string(track.places_at_first), "places possible after the first picture"},
+                {images_text(track.until_localised), "until it was localised"},
                 {images_text(track.until_found_again), "until it was found again, once kidnapped"},
                 {median_text, "median error where it says that it is localised"},
                 {std::to_string(track.wrong) + " of " + std::to_string(track.localised),
-                 "of these answers farther off than the spacing"}});
+                 "of these answers wrong; a kidnapped robot needs some pictures to notice"}});
   page.pictures(
-      {{"particles.png",
-        "Before the first image, when localised, before and after it was kidnapped, when found "
-        "again, at the "
-        "end. Blue cross: where it is; black square: where it says that it is, orange while it is "
-        "not sure. Grey circles are remembered views, grey areas furniture."},
-       {"tracked.png",
-        "The whole run: true way in blue, which begins anew where the robot was put down, and the "
-        "estimated one in black."}});
+      {{"particles.svg",
+        "From the top left: before the first picture the particles are everywhere; then they "
+        "gather; then the robot is localised, kidnapped, and found again. Black cross: where it "
+        "is; square: where it says that it is, orange while it is not sure."}});
+  page.pictures(
+      {{"tracked.svg",
+        "The whole run. The true way in black begins anew where the robot was put down; the "
+        "estimated one in blue lies on it, but for the pictures after it was kidnapped."}});
   page.link("track.html", "Play the run, image by image");
 }
 
 }  // namespace
 
 DemoTrack show_track(const DemoOptions& options, const DemoRecordings& recordings,
-                     const MemoryFile& file, const FloorPlan& plan, Session& session,
-                     ReportPage& page) {
+                     const MemoryFile& file, Session& session, ReportPage& page) {
   const Dataset& run = recordings.walk_run;
   const OdometryNoise odometry = simulation_of(options, 0).odometry;
   Tracker tracker(file, {.filter = {.seed = static_cast<int>(options.seed % 1000000000)},
@@ -105,12 +113,12 @@ DemoTrack show_track(const DemoOptions& options, const DemoRecordings& recording
   track(tracker, run, {.particles_kept = particles_kept}, session.executor(),
         [&](TrackedImage&& image) { images.push_back(std::move(image)); });
   DemoTrack result = outcome_of(images, recordings.kidnapped_after, options.spacing_m());
-  const TrackBackground background{
-      {MapLayer{.label = "furniture", .colour = "#cccccc", .filled_polygons = plan.boxes}},
-      recordings.kidnapped_after};
+  result.places_at_first = images.front().estimate.modes.size();
+  const TrackBackground background{scene_layers(recordings.corridor_scene),
+                                   recordings.kidnapped_after};
   draw_track_snapshots(memory, images, moments_of(result, recordings.kidnapped_after), background,
-                       options.out / "particles.png", at_first);
-  draw_track_map(memory, images, background, options.out / "tracked.png");
+                       options.out / "particles.svg", at_first);
+  draw_track_map(memory, images, background, options.out / "tracked.svg");
   write_track_animation(options.out / "track.html", memory, options.spacing_m(), images);
   add_part(result, options.spacing_m(), recordings.kidnapped_after, page);
   return result;

@@ -5,16 +5,17 @@
 #include <vector>
 
 #include "cli/session.hpp"
-#include "demo/pictures.hpp"
 #include "demo/recordings.hpp"
-#include "panonav/pipeline/view_encoder.hpp"
+#include "panonav/storage/memory_file.hpp"
 #include "reports/report_page.hpp"
 
 namespace panonav::command {
 
-/// A robot that does not know where it is drives through the office and is kidnapped half way.
+/// A robot that does not know where it is drives through a corridor of places that look alike and
+/// is kidnapped half way.
 struct DemoTrack {
   std::size_t images = 0;
+  std::size_t places_at_first = 0;  ///< where it may be after the first image
   /// Images until it says that it is localised and is within the views' spacing of the truth, that
   /// one included; empty: never before it was kidnapped.
   std::optional<std::size_t> until_localised;
@@ -28,7 +29,6 @@ struct DemoTrack {
 /// Tracks it by Monte-Carlo localisation and adds a part with pictures and an animation to the
 /// page. The same seed gives the same run.
 DemoTrack show_track(const DemoOptions& options, const DemoRecordings& recordings,
-                     const MemoryFile& file, const FloorPlan& plan, Session& session,
-                     ReportPage& page);
+                     const MemoryFile& file, Session& session, ReportPage& page);
 
 }  // namespace panonav::command

@@ -15,9 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* homeward_file = "homeward.png";
-constexpr const char* blue = "#0072b2";
-constexpr const char* red = "#e0201b";
+constexpr const char* homeward_file = "homeward.svg";
 
 /// Places as cells of a raster of their spacing. Places that share a cell show the last one.
 HeatMap raster(const std::vector<Pose2>& places, double spacing_m,
@@ -62,7 +60,7 @@ void draw_curves(const CatchmentResult& result, const fs::path& folder) {
                                               .y_label = "homeward component",
                                               .series = {homeward},
                                               .y_range = std::pair{-0.2, 1.0}});
-  write_plot(folder / "orientation.png",
+  write_plot(folder / "orientation.svg",
              LinePlot{.title = "Error of the heading",
                       .x_label = "distance from home [m]",
                       .y_label = "circular standard deviation [degrees]",
@@ -72,7 +70,7 @@ void draw_curves(const CatchmentResult& result, const fs::path& folder) {
   for (std::size_t i = 0; i < result.areas.size(); ++i) {
     areas.add(result.accepted_m[i], 100.0 * result.areas[i] / places);
   }
-  write_plot(folder / "areas.png", LinePlot{.title = "Mean catchment area",
+  write_plot(folder / "areas.svg", LinePlot{.title = "Mean catchment area",
                                             .x_label = "accepted distance from home [m]",
                                             .y_label = "share of all places [%]",
                                             .series = {areas},
@@ -83,8 +81,8 @@ void draw_field(const RecordedViews& places, const std::vector<HomeVector>& vect
                 const CatchmentResult& result, std::size_t goal, const fs::path& path) {
   const double side_m = 0.5 * result.spacing_m;
   const double arrow_m = 0.8 * result.spacing_m;
-  MapLayer inside{.label = "catchment area", .colour = "#b7e4c7"};
-  MapLayer arrows{.label = "home vector", .colour = blue};
+  MapLayer inside{.label = "catchment area", .colour = PlotColour::green};
+  MapLayer arrows{.label = "home vector", .colour = PlotColour::blue};
   for (std::size_t p = 0; p < places.views.size(); ++p) {
     const Pose2& place = result.survey.places[p];
     const float end_m = result.final_m[goal * places.views.size() + p];
@@ -101,10 +99,10 @@ void draw_field(const RecordedViews& places, const std::vector<HomeVector>& vect
         {place.position(),
          {place.x_m + arrow_m * std::cos(towards), place.y_m + arrow_m * std::sin(towards)}});
   }
-  const MapLayer home{
-      .label = "home", .colour = red, .squares = {result.survey.goals[goal].position()}};
-  write_plot(path, MapPlot{.title = "Home vectors from above: x and y in metres",
-                           .layers = {inside, arrows, home}});
+  const MapLayer home{.label = "home",
+                      .colour = PlotColour::black,
+                      .squares = {result.survey.goals[goal].position()}};
+  write_plot(path, MapPlot{.title = "Home vectors from above", .layers = {inside, arrows, home}});
 }
 
 }  // namespace
@@ -124,7 +122,7 @@ void write_catchment_report(const fs::path& folder, const RecordedViews& goals,
   });
   sizes.title = "Catchment area of the view at each place";
   sizes.value_label = "share of all places [%]";
-  write_plot(folder / "catchment.png", sizes);
+  write_plot(folder / "catchment.svg", sizes);
 
   std::vector<HomeVector> vectors;
   std::vector<double> differences;
@@ -132,20 +130,20 @@ void write_catchment_report(const fs::path& folder, const RecordedViews& goals,
     vectors.push_back(home_vector(goals.views[goal], view, homing));
     differences.push_back(image_difference(goals.views[goal], view, homing.highest));
   }
-  draw_field(places, vectors, result, goal, folder / "field.png");
+  draw_field(places, vectors, result, goal, folder / "field.svg");
   auto difference =
       raster(result.survey.places, result.spacing_m, [&](std::size_t p) { return differences[p]; });
   difference.title = "Difference from the view at home (cross)";
   difference.value_label = "image difference, 0 to 1";
   difference.crosses = {result.survey.goals[goal].position()};
-  write_plot(folder / "difference.png", difference);
+  write_plot(folder / "difference.svg", difference);
   auto ends = raster(result.survey.places, result.spacing_m, [&](std::size_t p) {
     return static_cast<double>(result.final_m[goal * places.views.size() + p]);
   });
   ends.title = "Where runs home end, by where they start (home: cross)";
   ends.value_label = "distance from home at the end [m]";
   ends.crosses = difference.crosses;
-  write_plot(folder / "ends.png", ends);
+  write_plot(folder / "ends.svg", ends);
 
   ReportPage page("From how far do views lead home?",
                   "Every view of a recording as a home, every view of " +
@@ -162,17 +160,17 @@ void write_catchment_report(const fs::path& folder, const RecordedViews& goals,
   page.pictures({{homeward_file,
                   "Cosine between home vector and true direction: 1 straight home, "
                   "0 chance [S06 figure 10]"},
-                 {"orientation.png", "Error of the heading that comes with it [S06 figure 8]"},
-                 {"areas.png",
+                 {"orientation.svg", "Error of the heading that comes with it [S06 figure 8]"},
+                 {"areas.svg",
                   "Runs from place to place: share of starts from which a run ends "
                   "within a distance of home [S06 figure 11]"}});
   page.section("Place by place");
-  page.pictures({{"catchment.png", "Share of all places from which runs end within " +
+  page.pictures({{"catchment.svg", "Share of all places from which runs end within " +
                                        fixed(result.spacing_m, 2) + " m of home, home by home"}});
   page.section("One home: " + goals.files[goal]);
-  page.pictures({{"field.png", "Home vectors, and the catchment area [S06 figure 9]"},
-                 {"difference.png", "How far views differ from home's [S06 figure 9]"},
-                 {"ends.png", "How far from home runs end [S06 figure 14]"}});
+  page.pictures({{"field.svg", "Home vectors, and the catchment area [S06 figure 9]"},
+                 {"difference.svg", "How far views differ from home's [S06 figure 9]"},
+                 {"ends.svg", "How far from home runs end [S06 figure 14]"}});
   page.section("Numbers");
   std::vector<std::vector<std::string>> rows;
   for (const CatchmentBin& bin : result.bins) {

@@ -4,19 +4,24 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <string>
 
 #include "panonav/geometry/angles.hpp"
+#include "reporting/plot.hpp"
 
 namespace panonav::command {
 
 namespace {
 
 using Colour = std::array<std::uint8_t, 3>;
-constexpr Colour red{224, 32, 27};
-constexpr Colour blue{31, 95, 208};
-constexpr Colour grey{128, 128, 128};
 constexpr int width = 1024;
 constexpr int band_px = 26;  // above, between and below the views, for the marks
+
+Colour rgb(PlotColour colour) {
+  const unsigned long value = std::stoul(std::string(hex(colour).substr(1)), nullptr, 16);
+  return {static_cast<std::uint8_t>(value >> 16U), static_cast<std::uint8_t>(value >> 8U),
+          static_cast<std::uint8_t>(value)};
+}
 
 int height_of(const Panorama& panorama) {
   // As wide as high in angle would be true to the eye, but a small view must be seen at all.
@@ -72,11 +77,11 @@ Image picture_of_homing(const std::optional<Panorama>& home, const Panorama& cur
   std::fill(image.pixels().begin(), image.pixels().end(), std::uint8_t{255});
   const auto show = [&](const Panorama& panorama, int top) {
     paste(image, panorama, top + band_px);
-    mark(image, 0.0, top, grey);
+    mark(image, 0.0, top, rgb(PlotColour::grey));
     if (!points) return;
     for (const auto& [azimuth, colour] :
-         {std::pair{found.direction_rad(), red},
-          std::pair{wrap_angle(found.direction_rad() + std::numbers::pi), blue}}) {
+         {std::pair{found.direction_rad(), rgb(PlotColour::vermilion)},
+          std::pair{wrap_angle(found.direction_rad() + std::numbers::pi), rgb(PlotColour::blue)}}) {
       mark(image, azimuth, top, colour);
       line(image, azimuth, top + band_px, height_of(panorama), colour);
     }
@@ -98,7 +103,7 @@ Image picture_of_views(const std::vector<Panorama>& views) {
   int top = 0;
   for (const Panorama& view : views) {
     paste(image, view, top + band_px);
-    mark(image, 0.0, top, grey);
+    mark(image, 0.0, top, rgb(PlotColour::grey));
     top += band_px + height_of(view);
   }
   return image;

@@ -47,8 +47,8 @@ double arrow_length_m(const std::vector<HomeAnswer>& answers) {
 }
 
 bool draw_field(const Goal& goal, const std::vector<HomeAnswer>& answers, const fs::path& path) {
-  MapLayer arrows{.label = "way home", .colour = "#0072b2"};
-  MapLayer silent{.label = "no direction", .colour = "#d55e00"};
+  MapLayer arrows{.label = "way home", .colour = PlotColour::blue};
+  MapLayer silent{.label = "no direction", .colour = PlotColour::vermilion};
   const double length_m = arrow_length_m(answers);
   for (const auto& answer : answers) {
     if (!answer.pose || !answer.pose->heading_rad) continue;
@@ -63,10 +63,9 @@ bool draw_field(const Goal& goal, const std::vector<HomeAnswer>& answers, const 
         {at, {at.x_m + length_m * std::cos(towards), at.y_m + length_m * std::sin(towards)}});
   }
   if (arrows.lines.empty()) return false;
-  MapLayer home{.label = "home", .colour = "#e0201b"};
+  MapLayer home{.label = "home", .colour = PlotColour::black};
   if (goal.pose) home.squares.push_back(goal.pose->position());
-  write_plot(path, MapPlot{.title = "Home vectors from above: x and y in metres",
-                           .layers = {arrows, silent, home}});
+  write_plot(path, MapPlot{.title = "Home vectors from above", .layers = {arrows, silent, home}});
   return true;
 }
 
@@ -97,7 +96,7 @@ void write_home_report(const fs::path& folder, const Goal& goal,
                       ? "Above, the view at home, turned as if the robot there faced the same way "
                         "as here; below, what it sees now. "
                       : "") +
-      "Forward is in the middle (grey). Red: the direction home, where things spread out on the "
+      "Forward is in the middle (grey). Orange: the direction home, where things spread out on the "
       "way; blue: the opposite one, where they close up.");
   std::vector<ReportPicture> pictures;
   for (const std::size_t i : shown_of(answers.size())) {
@@ -108,9 +107,9 @@ void write_home_report(const fs::path& folder, const Goal& goal,
     pictures.push_back({file, caption_of(answers[i])});
   }
   page.pictures(pictures);
-  if (draw_field(goal, answers, folder / "field.png")) {
+  if (draw_field(goal, answers, folder / "field.svg")) {
     page.section("From above");
-    page.pictures({{"field.png",
+    page.pictures({{"field.svg",
                     "The direction home at each place whose position and heading are "
                     "known"}});
   }

@@ -33,7 +33,7 @@ Known known_of(const Lattice& lattice, const VisualMemory& memory) {
 /// Springs that were not rejected, as lines between `positions`.
 MapLayer springs_between(const Lattice& lattice,
                          const std::vector<std::optional<Point2>>& positions) {
-  MapLayer layer{.label = "springs", .colour = "#c7c7c7"};
+  MapLayer layer{.label = "springs", .colour = PlotColour::light_grey};
   for (const LatticeSpring& spring : lattice.springs) {
     const auto& a = positions[spring.a];
     const auto& b = positions[spring.b];

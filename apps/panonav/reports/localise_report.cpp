@@ -69,15 +69,15 @@ std::string draw_views(const fs::path& path, const MemoryFile& file, const Panor
 
 /// False where the memory knows no positions.
 bool draw_map(const fs::path& path, const VisualMemory& memory, const LocalisedQuery& query) {
-  MapLayer references{.label = "references", .colour = "#999999"};
+  MapLayer references{.label = "references", .colour = PlotColour::grey};
   const std::size_t step = memory.size() / max_references + 1;
   for (std::size_t i = 0; i < memory.size(); i += step) {
     const auto& pose = memory.info(memory.views()[i]).pose;
     if (pose) references.dots.push_back(pose->position());
   }
   if (references.dots.empty()) return false;
-  MapLayer others{.label = "next candidates", .colour = "#e69f00"};
-  MapLayer best{.label = "best match", .colour = "#0072b2"};
+  MapLayer others{.label = "next candidates", .colour = PlotColour::orange};
+  MapLayer best{.label = "best match", .colour = PlotColour::blue};
   for (const PlaceMatch& match : query.place.matches) {
     const auto& pose = memory.info(match.view).pose;
     if (!pose) continue;
@@ -86,7 +86,7 @@ bool draw_map(const fs::path& path, const VisualMemory& memory, const LocalisedQ
   }
   std::vector<MapLayer> layers{references, others, best};
   if (const auto& found = query.place.position) {
-    MapLayer answer{.label = "answer", .colour = "#d55e00"};
+    MapLayer answer{.label = "answer", .colour = PlotColour::vermilion};
     const Point2 at{found->x_m, found->y_m};
     answer.crosses.push_back(at);
     if (const auto& heading = query.place.heading_rad) {
@@ -99,13 +99,10 @@ bool draw_map(const fs::path& path, const VisualMemory& memory, const LocalisedQ
     layers.push_back(answer);
   }
   if (query.pose) {
-    layers.push_back(
-        {.label = "ground truth", .colour = "#009e73", .circles = {query.pose->position()}});
+    layers.push_back({.label = "ground truth",
+                      .colour = PlotColour::black,
+                      .circles = {query.pose->position()}});
   }
-  std::erase_if(layers, [](const MapLayer& layer) {
-    return layer.dots.empty() && layer.circles.empty() && layer.squares.empty() &&
-           layer.crosses.empty();
-  });
   write_plot(path, MapPlot{.title = "From above", .layers = layers});
   return true;
 }
@@ -213,19 +210,18 @@ void write_localise_report(const fs::path& folder, const MemoryFile& file,
   for (std::size_t n = 0; n < shown; ++n) {
     const std::size_t i = readable[n * (readable.size() - 1) / std::max<std::size_t>(1, shown - 1)];
     const LocalisedQuery& query = queries[i];
-    const std::string number = std::to_string(n + 1) + ".png";
+    const std::string picture = "query_" + std::to_string(n + 1) + ".png";
+    const std::string map = "map_" + std::to_string(n + 1) + ".svg";
     page.section(query.file + ": " + answer_text(query));
     page.figures(figures_of(query));
     std::vector<ReportPicture> pictures{
-        {"query_" + number,
-         draw_views(folder / ("query_" + number), file, panorama(i), query.place)}};
-    if (draw_map(folder / ("map_" + number), recogniser.memory(), query)) {
+        {picture, draw_views(folder / picture, file, panorama(i), query.place)}};
+    if (draw_map(folder / map, recogniser.memory(), query)) {
       pictures.push_back(
-          {"map_" + number,
-           "From above: all references, those most similar to the picture" +
-               std::string(query.place.position
-                               ? ", and the answer, with its heading where it has one."
-                               : ". There is no answer.")});
+          {map, "From above: all references, those most similar to the picture" +
+                    std::string(query.place.position
+                                    ? ", and the answer, with its heading where it has one."
+                                    : ". There is no answer.")});
     } else if (n == 0) {
       page.text("The memory knows no positions, so there is no map.");
     }

@@ -87,14 +87,15 @@ void write_map_picture(const std::filesystem::path& path, const Dataset& recordi
   if (is_comparable(nodes.map, nodes.truth)) {
     map = moved(nodes.map, align(nodes.map, nodes.truth, {.allow_scale = !run.wheels}));
     plot.title = "map beside the ground truth";
-    plot.layers.push_back({.label = "ground truth", .colour = "#999999", .lines = {nodes.truth}});
+    plot.layers.push_back(
+        {.label = "ground truth", .colour = PlotColour::black, .lines = {nodes.truth}});
     if (is_comparable(nodes.odometry, nodes.truth)) {
       plot.layers.push_back({.label = "wheels",
-                             .colour = "#d62728",
+                             .colour = PlotColour::vermilion,
                              .lines = {moved(nodes.odometry, align(nodes.odometry, nodes.truth))}});
     }
   }
-  MapLayer closures{.label = "closures", .colour = "#2ca02c"};
+  MapLayer closures{.label = "closures", .colour = PlotColour::green};
   for (const MapEdge& edge : run.map.edges) {
     const auto a = nodes.number.find(edge.a);
     const auto b = nodes.number.find(edge.b);
@@ -103,7 +104,7 @@ void write_map_picture(const std::filesystem::path& path, const Dataset& recordi
     }
     closures.lines.push_back({map[a->second], map[b->second]});
   }
-  plot.layers.push_back({.label = "map", .colour = "#1f77b4", .lines = {map}, .dots = map});
+  plot.layers.push_back({.label = "map", .colour = PlotColour::blue, .lines = {map}, .dots = map});
   if (!closures.lines.empty()) plot.layers.push_back(std::move(closures));
   write_plot(path, plot);
 }

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* path_file = "path.png";
+constexpr const char* path_file = "path.svg";
 
 /// Columns of a line as a person sees them: clockwise, forward in the middle. `to` is the first of
 /// `columns` values.
@@ -31,7 +31,7 @@ void put_line(std::span<const float> line, float* to) {
 }
 
 MapLayer path_layer(std::span<const Pose2> path) {
-  MapLayer layer{.label = "remembered route", .colour = "#999999"};
+  MapLayer layer{.label = "remembered route", .colour = PlotColour::grey};
   layer.lines.push_back(positions_of(path));
   return layer;
 }
@@ -118,10 +118,10 @@ void draw_lines(const fs::path& path, const RouteLines& route,
 
 void draw_path(const fs::path& path, const RouteLines& route,
                const std::vector<FollowedImage>& images) {
-  MapLayer truth{.label = "ground truth", .colour = "#1f5fd0"};
-  MapLayer fixes{.label = "fixes", .colour = "#000000"};
-  MapLayer changed{.label = "something changed in view", .colour = "#d55e00"};
-  MapLayer off{.label = "true place where not on the route", .colour = "#e0201b"};
+  MapLayer truth{.label = "ground truth", .colour = PlotColour::black};
+  MapLayer fixes{.label = "fixes", .colour = PlotColour::blue};
+  MapLayer changed{.label = "something changed in view", .colour = PlotColour::orange};
+  MapLayer off{.label = "true place where not on the route", .colour = PlotColour::vermilion};
   std::vector<Point2> true_path;
   for (const FollowedImage& image : images) {
     if (image.truth) true_path.push_back(image.truth->position());
@@ -132,7 +132,7 @@ void draw_path(const fs::path& path, const RouteLines& route,
     if (!image.fix && image.truth) off.crosses.push_back(image.truth->position());
   }
   if (true_path.size() > 1) truth.lines.push_back(std::move(true_path));
-  write_plot(path, MapPlot{.title = "From above: x and y in metres",
+  write_plot(path, MapPlot{.title = "From above",
                            .layers = {path_layer(route.poses()), truth, changed, fixes, off}});
 }
 
@@ -184,12 +184,11 @@ void prepare_route_report(const fs::path& folder, std::string_view verb) {
 
 void write_record_report(const fs::path& folder, const std::string& name,
                          const RoutePanorama& route, double bytes_per_km) {
-  draw_panorama(folder / "panorama.png", route);
+  draw_panorama(folder / "panorama.svg", route);
   MapLayer path = path_layer(route.poses());
-  MapLayer start{.label = "start", .colour = "#009e73"};
+  MapLayer start{.label = "start", .colour = PlotColour::green};
   start.squares.push_back(route.poses().front().position());
-  write_plot(folder / path_file,
-             MapPlot{.title = "From above: x and y in metres", .layers = {path, start}});
+  write_plot(folder / path_file, MapPlot{.title = "From above", .layers = {path, start}});
   ReportPage page("Route '" + name + "'",
                   "A robot drove this way once. From each place it keeps one line of pixels, what "
                   "its camera sees at its own height, and that is all it needs to follow the way "
@@ -203,7 +202,7 @@ void write_record_report(const fs::path& folder, const std::string& name,
       "Each row is one place, the start at the bottom, the end on top; from left to right all "
       "around the robot, straight ahead in the middle. Things beside the way go from the middle "
       "outwards as the robot passes them, the slower the farther they are.");
-  page.pictures({{"panorama.png", "Omnidirectional route panorama"}});
+  page.pictures({{"panorama.svg", "Omnidirectional route panorama"}});
   page.section("The way");
   page.pictures({{path_file, "Where the lines were taken"}});
   page.write(folder);
@@ -226,20 +225,20 @@ void write_follow_report(const fs::path& folder, const std::string& name, const 
   page.section("The way");
   page.pictures({{path_file, "Remembered route, fixes, and the true path where it is known"}});
   if (!chosen.empty()) {
-    draw_lines(folder / "lines.png", route, images, chosen);
-    draw_correlations(folder / "correlations.png", images);
+    draw_lines(folder / "lines.svg", route, images, chosen);
+    draw_correlations(folder / "correlations.svg", images);
     page.section("Seen and shown");
     page.text(
         "For some pictures, spread over the run, what the robot saw (upper band of each pair) and "
         "what the route shows from where it believes to be (lower band), put together from the "
         "lines of many places. Light blue: in this direction the route shows nothing.");
-    page.pictures({{"lines.png", "Lines seen, and lines made from the route"},
-                   {"correlations.png", "Correlation of the two, picture by picture"}});
+    page.pictures({{"lines.svg", "Lines seen, and lines made from the route"},
+                   {"correlations.svg", "Correlation of the two, picture by picture"}});
   }
   if (!summary.position_m.empty()) {
-    draw_errors(folder / "errors.png", images);
+    draw_errors(folder / "errors.svg", images);
     page.section("Errors");
-    page.pictures({{"errors.png", "Distance of each fix from the data set's own pose"}});
+    page.pictures({{"errors.svg", "Distance of each fix from the data set's own pose"}});
   }
   const auto stretches = changed_stretches(images);
   if (!stretches.empty()) {

@@ -4,9 +4,11 @@
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "assets.hpp"
 #include "panonav/io/atomic_file.hpp"
+#include "reporting/plot.hpp"
 
 namespace panonav::command {
 
@@ -63,8 +65,11 @@ std::string script_text(const ordered_json& json) {
   return safe;
 }
 
+/// Everywhere where the template names it.
 void fill(std::string& page, std::string_view place, std::string_view text) {
-  page.replace(page.find(place), place.size(), text);
+  for (std::size_t at = 0; (at = page.find(place, at)) != std::string::npos; at += text.size()) {
+    page.replace(at, place.size(), text);
+  }
 }
 
 }  // namespace
@@ -85,7 +90,13 @@ void write_track_animation(const std::filesystem::path& path, const VisualMemory
   std::string page(assets::track_player_html);
   fill(page, "{{style}}", assets::track_player_css);
   fill(page, "{{script}}", assets::track_player_js);
-  fill(page, "{{run}}", script_text(run));
+  for (const auto& [name, colour] :
+       {std::pair{"{{black}}", PlotColour::black}, std::pair{"{{blue}}", PlotColour::blue},
+        std::pair{"{{grey}}", PlotColour::grey}, std::pair{"{{orange}}", PlotColour::orange},
+        std::pair{"{{sky}}", PlotColour::sky}, std::pair{"{{vermilion}}", PlotColour::vermilion}}) {
+    fill(page, name, hex(colour));
+  }
+  page.replace(page.find("{{run}}"), 7, script_text(run));  // last: names in it may be anything
   write_file(path, std::string_view(page));
 }
 

@@ -10,14 +10,8 @@ namespace {
 
 using Lines = std::vector<std::vector<Point2>>;
 
-constexpr const char* black = "#000000";
-constexpr const char* blue = "#1f5fd0";
-constexpr const char* grey = "#999999";
-constexpr const char* orange = "#d55e00";
-constexpr const char* red = "#e0201b";
-
 MapLayer references(const VisualMemory& memory) {
-  MapLayer layer{.label = "remembered views", .colour = grey};
+  MapLayer layer{.label = "remembered views", .colour = PlotColour::grey};
   for (const ViewId view : memory.views()) {
     if (const auto& pose = memory.info(view).pose) layer.circles.push_back(pose->position());
   }
@@ -45,7 +39,7 @@ MapLayer true_path(const std::vector<TrackedImage>& images, std::size_t count,
     if (images[i].truth) positions[i] = images[i].truth->position();
   }
   return {.label = "ground truth",
-          .colour = blue,
+          .colour = PlotColour::black,
           .lines = lines_of(positions, background.kidnapped_after)};
 }
 
@@ -56,7 +50,7 @@ MapLayer estimated_path(const std::vector<TrackedImage>& images, std::size_t cou
     if (is_localised(images[i])) positions[i] = images[i].estimate.pose->position();
   }
   return {.label = "estimated path",
-          .colour = black,
+          .colour = PlotColour::blue,
           .lines = lines_of(positions, background.kidnapped_after)};
 }
 
@@ -64,12 +58,12 @@ MapLayer estimated_path(const std::vector<TrackedImage>& images, std::size_t cou
 
 void draw_track_map(const VisualMemory& memory, const std::vector<TrackedImage>& images,
                     const TrackBackground& background, const std::filesystem::path& path) {
-  MapLayer localised{.label = "localised here", .colour = black};
-  MapLayer guessed{.label = "ambiguous: likeliest place", .colour = orange};
-  MapLayer lost{.label = "true place where lost", .colour = red};
-  MapLayer start{.label = "start", .colour = "#009e73"};
+  MapLayer localised{.label = "localised here", .colour = PlotColour::blue};
+  MapLayer guessed{.label = "ambiguous: likeliest place", .colour = PlotColour::orange};
+  MapLayer lost{.label = "true place where lost", .colour = PlotColour::vermilion};
+  MapLayer start{.label = "start", .colour = PlotColour::green};
   if (images.front().truth) start.squares.push_back(images.front().truth->position());
-  MapLayer kidnapped{.label = "kidnapped to here", .colour = "#cc79a7"};
+  MapLayer kidnapped{.label = "kidnapped to here", .colour = PlotColour::purple};
   if (background.kidnapped_after && images.at(*background.kidnapped_after + 1).truth) {
     kidnapped.squares.push_back(images[*background.kidnapped_after + 1].truth->position());
   }
@@ -83,8 +77,7 @@ void draw_track_map(const VisualMemory& memory, const std::vector<TrackedImage>&
       lost.crosses.push_back(image.truth->position());
     }
   }
-  MapPlot plot{.title = "The whole run from above: x and y in metres",
-               .layers = background.surroundings};
+  MapPlot plot{.title = "The whole run from above", .layers = background.surroundings};
   for (MapLayer& layer :
        std::vector{references(memory), true_path(images, images.size(), background),
                    estimated_path(images, images.size(), background), localised, guessed, lost,
@@ -101,16 +94,18 @@ void draw_track_snapshots(const VisualMemory& memory, const std::vector<TrackedI
   if (!at_first.empty()) {
     MapPlot panel{.title = "before the first image", .layers = background.surroundings};
     panel.layers.push_back(references(memory));
-    panel.layers.push_back({.label = "particles", .colour = red, .dots = at_first});
+    panel.layers.push_back(
+        {.label = "particles", .colour = PlotColour::vermilion, .dots = at_first});
     panels.push_back(std::move(panel));
   }
   for (const std::size_t number : shown) {
     const TrackedImage& image = images[number];
-    const MapLayer particles{.label = "particles", .colour = red, .dots = image.particles};
+    const MapLayer particles{
+        .label = "particles", .colour = PlotColour::vermilion, .dots = image.particles};
     MapLayer estimate{.label = is_localised(image) ? "estimate" : "likeliest place",
-                      .colour = is_localised(image) ? black : orange};
+                      .colour = is_localised(image) ? PlotColour::blue : PlotColour::orange};
     if (image.estimate.pose) estimate.squares.push_back(image.estimate.pose->position());
-    MapLayer truth{.label = "true place", .colour = blue};
+    MapLayer truth{.label = "true place", .colour = PlotColour::black};
     if (image.truth) truth.crosses.push_back(image.truth->position());
     std::string title =
         "image " + std::to_string(number + 1) + ": " + std::string(name_of(image.estimate.state));

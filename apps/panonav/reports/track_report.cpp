@@ -115,6 +115,10 @@ std::string share_text(std::size_t count, std::size_t total) {
   return fixed(100.0 * static_cast<double>(count) / static_cast<double>(total), 0) + " %";
 }
 
+std::string length_text(double length_m) {
+  return length_m < 1.0 ? fixed(100.0 * length_m, 1) + " cm" : fixed(length_m, 1) + " m";
+}
+
 std::vector<std::pair<std::string, std::string>> main_figures(const TrackSummary& summary,
                                                               std::size_t total) {
   std::vector<std::pair<std::string, std::string>> figures{
@@ -122,9 +126,8 @@ std::vector<std::pair<std::string, std::string>> main_figures(const TrackSummary
       {summary.first_localised ? std::to_string(*summary.first_localised) : "never",
        summary.first_localised ? "images until it was first localised" : "localised"}};
   if (!summary.errors_m.empty()) {
-    figures.emplace_back(fixed(100.0 * median(summary.errors_m), 1) + " cm",
-                         "median error where localised");
-    figures.emplace_back(fixed(100.0 * quantile(summary.errors_m, 0.95), 1) + " cm",
+    figures.emplace_back(length_text(median(summary.errors_m)), "median error where localised");
+    figures.emplace_back(length_text(quantile(summary.errors_m, 0.95)),
                          "holds 95 % of these errors");
   }
   if (!summary.heading_errors_rad.empty()) {
@@ -150,10 +153,10 @@ std::size_t particles_shown(std::size_t images) {
 void write_track_report(const fs::path& folder, const VisualMemory& memory, double spacing_m,
                         const std::vector<TrackedImage>& images, const TrackSummary& summary) {
   write_track_animation(folder / animation_file, memory, spacing_m, images);
-  draw_track_snapshots(memory, images, snapshots(images), {}, folder / "snapshots.png");
-  draw_track_map(memory, images, {}, folder / "map.png");
-  draw_errors(images, spacing_m, folder / "errors.png");
-  draw_particles(images, folder / "particles.png");
+  draw_track_snapshots(memory, images, snapshots(images), {}, folder / "snapshots.svg");
+  draw_track_map(memory, images, {}, folder / "map.svg");
+  draw_errors(images, spacing_m, folder / "errors.svg");
+  draw_particles(images, folder / "particles.svg");
 
   const bool truth_known =
       std::ranges::any_of(images, [](const auto& image) { return image.truth.has_value(); });
@@ -167,28 +170,28 @@ void write_track_report(const fs::path& folder, const VisualMemory& memory, doub
   page.link(animation_file, "Play the run, image by image");
   page.section("Snapshots");
   page.text(
-      "Red dots are particles: places where the robot may be. Grey circles are the remembered "
+      "Each dot is a particle, a place where the robot may be. Grey circles are the remembered "
       "views, " +
       fixed(100.0 * spacing_m, 0) +
-      " cm apart. The black square is the estimate, the mean of the heaviest group of particles; "
+      " cm apart. The blue square is the estimate, the mean of the heaviest group of particles; "
       "it is orange while several places or a large area are possible, and missing when the robot "
-      "is lost. The black line is the estimated path" +
-      std::string(truth_known ? ", the blue line the true one; the blue cross is where the robot "
+      "is lost. The blue line is the estimated path" +
+      std::string(truth_known ? ", the black line the true one; the black cross is where the robot "
                                 "truly is."
                               : "."));
-  page.pictures({{"snapshots.png",
+  page.pictures({{"snapshots.svg",
                   "The first images, images at which the state changes, and others between"}});
   page.section("The whole run");
-  page.pictures({{"map.png",
-                  truth_known ? "True and estimated path; red crosses: true places where the robot "
-                                "was lost"
-                              : "The estimated path; it breaks off where the robot was not "
-                                "localised"},
-                 {"errors.png",
-                  truth_known ? "Error of each estimate, and how far the particles spread around "
-                                "their mean, on a logarithmic scale"
-                              : "How far the particles spread around their mean, on a logarithmic "
-                                "scale"}});
+  page.pictures(
+      {{"map.svg", truth_known ? "True and estimated path; crosses: true places where the robot "
+                                 "was lost"
+                               : "The estimated path; it breaks off where the robot was not "
+                                 "localised"},
+       {"errors.svg", truth_known
+                          ? "Error of each estimate, and how far the particles spread around "
+                            "their mean, on a logarithmic scale"
+                          : "How far the particles spread around their mean, on a logarithmic "
+                            "scale"}});
   page.section("State by state");
   page.table({"images", "state", "median error", "largest error"}, stretches(images));
   page.section("Particles");
@@ -196,7 +199,7 @@ void write_track_report(const fs::path& folder, const VisualMemory& memory, doub
       "More are used while much is possible, fewer once they lie close together. By those drawn "
       "anew a robot that was kidnapped is found again.");
   page.pictures(
-      {{"particles.png", "Number of particles after each image, on a logarithmic scale"}});
+      {{"particles.svg", "Number of particles after each image, on a logarithmic scale"}});
   page.write(folder);
 }
 

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <iomanip>
 #include <sstream>
+#include <utility>
 #include <vector>
 
 namespace panonav {
@@ -68,10 +70,32 @@ std::string fixed(double value, int digits) {
   return nothing && shown.front() == '-' ? shown.substr(1) : shown;
 }
 
-std::string short_number(double value) {
-  std::ostringstream text;
-  text << std::setprecision(6) << value;
-  return text.str();
+std::string short_number(double value, std::string_view unit, int significant) {
+  if (!std::isfinite(value)) return "none";
+  if (std::abs(value) >= 1e15) return (std::ostringstream() << value).str();
+  constexpr std::array<std::pair<std::string_view, int>, 9> places_of{{{"m", 5},
+                                                                       {"cm", 3},
+                                                                       {"mm", 2},
+                                                                       {"deg", 3},
+                                                                       {"degrees", 3},
+                                                                       {"px", 3},
+                                                                       {"%", 2},
+                                                                       {"ms", 5},
+                                                                       {"us", 4}}};
+  int places = 9;
+  for (const auto& [name, count] : places_of) {
+    if (unit == name) places = count;
+  }
+  if (value != 0.0) {
+    const double magnitude = std::floor(std::log10(std::abs(value)));
+    places = std::clamp(significant - 1 - static_cast<int>(magnitude), 0, places);
+  }
+  std::string text = fixed(value, places);
+  if (text.find('.') != std::string::npos) {
+    text.erase(text.find_last_not_of('0') + 1);
+    if (text.back() == '.') text.pop_back();
+  }
+  return text;
 }
 
 std::string readable_line(std::string_view text) {

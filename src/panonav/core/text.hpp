@@ -10,8 +10,12 @@ namespace panonav {
 /// A number with this many digits after the point, for people.
 [[nodiscard]] std::string fixed(double value, int digits);
 
-/// A number with up to six significant digits, for people: 30, not 29.999999999999996.
-[[nodiscard]] std::string short_number(double value);
+/// A number as people write it, with up to `significant` digits and no exponent below 1e15:
+/// 30, not 29.999999999999996. What rounds to nothing at the resolution of its unit (a hundredth
+/// of a millimetre for "m", a thousandth of a degree for "deg", nine places for
+/// numbers without unit) is 0, without sign. "none" where it is not finite.
+[[nodiscard]] std::string short_number(double value, std::string_view unit = {},
+                                       int significant = 6);
 
 /// Text of any origin, such as a file's name, for people: one line of valid UTF-8. Control
 /// characters become spaces, bytes that are not UTF-8 the replacement character U+FFFD.
