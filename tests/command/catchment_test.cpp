@@ -111,8 +111,9 @@ TEST_F(Catchment, AheadPointsAlongTheWay) {
 TEST_F(Catchment, BadInputIsOneLine) {
   EXPECT_TRUE(contains(refusal({"catchment", run, "--up-to-m", "0"}), "> 0"));
   EXPECT_TRUE(contains(refusal({"catchment", run, "--bin-m", "-1"}), "> 0"));
-  EXPECT_TRUE(contains(refusal({"catchment", run, "--goal", "none.png"}), "none.png"));
-  EXPECT_TRUE(contains(refusal({"catchment", run, "--ahead", "2", "--goal", "x"}), "leave out"));
+  EXPECT_TRUE(contains(refusal({"catchment", run, "--goal", "none.png", "--report", folder / "r"}),
+                       "none.png"));
+  EXPECT_TRUE(contains(refusal({"catchment", run, "--ahead", "2", "--goal", "x"}), "leave it out"));
   EXPECT_TRUE(contains(refusal({"catchment", run, "--max-step-m", "0"}), "max_step_m"));
   std::ofstream(std::filesystem::path(run) / "poses.csv") << "file,x_m,y_m\n"
                                                           << view_name(0) << ",0,0\n";

@@ -131,12 +131,26 @@ TEST_F(Map, AHeightOfTheCameraThatHasNoEffectIsRefused) {
   EXPECT_FALSE(fs::exists(memory()));
 }
 
+TEST_F(Map, ARecordingWithoutPositionsCanBeMappedAgain) {
+  for (const char* table : {"dataset.toml", "poses.csv"})
+    fs::remove(folder_.path() / "run" / table);
+  const std::vector<std::string> line{"map",      folder_ / "run",   memory(), "--kind",
+                                      "panorama", "--elevation-deg", "-30",    "40",
+                                      "--json"};
+  const auto first = answer_of(line);
+  EXPECT_GT(answer_of({"info", memory(), "--json"})["views_with_position"], 0) << "the map's";
+  const auto again = answer_of(line);
+  EXPECT_EQ(again["nodes"], first["nodes"]);
+  EXPECT_EQ(again["closures"], first["closures"]);
+}
+
 TEST_F(Map, WrongUseIsRefused) {
   EXPECT_TRUE(contains(refusal({"map", folder_ / "run", memory(), "--scale-m", "0"}), "scale_m"));
   EXPECT_FALSE(fs::exists(memory()));
   EXPECT_TRUE(contains(refusal({"map", folder_ / "none", memory()}), "none"));
   static_cast<void>(map());
-  EXPECT_TRUE(contains(refusal({"map", folder_ / "run", memory(), "--components", "9"}), "keeps"));
+  EXPECT_TRUE(contains(refusal({"map", folder_ / "run", memory(), "--components", "9"}),
+                       "--components is 9; allowed: 15, as"));
   EXPECT_TRUE(contains(refusal({"prune", folder_ / "none.panonav"}), "none.panonav"));
 }
 

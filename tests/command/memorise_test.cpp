@@ -76,9 +76,30 @@ TEST_F(Memorise, PanoramasAreResampledToTheSizeAskedFor) {
   write_picture(data() / view_name(5), world_, {0.0, 0.0, 0.0}, 48, 6);
   auto line = refusal({"localise", memory(), data()});
   EXPECT_TRUE(contains(line, view_name(5) + ": rows is 6; allowed: 12"));
-  line = refusal({"memorise", data(), folder_ / "o.panonav", "--rows", "6", "--columns", "48"});
+  line = refusal(
+      {"memorise", data(), folder_ / "o.panonav", "--rows", "6", "--columns", "48", "--strict"});
   EXPECT_TRUE(contains(line, view_name(5)));
   EXPECT_FALSE(fs::exists(folder_ / "o.panonav"));
+}
+
+TEST_F(Memorise, APictureOfAnotherSizeIsSkippedAndNamed) {
+  for (const std::size_t odd : {std::size_t{0}, std::size_t{5}}) {
+    const std::string memory = folder_ / ("odd" + std::to_string(odd) + ".panonav");
+    write_dataset(data(), world_, grid_poses(4));
+    write_picture(data() / view_name(odd), world_, {0.0, 0.0, 0.0}, 80, 6);
+    EXPECT_FALSE(fs::exists(memory));
+    EXPECT_TRUE(contains(refusal({"memorise", data(), memory, "--strict"}), "rows is "));
+    fs::remove(memory);
+    const auto result = run_panonav({"memorise", data(), memory, "--json"});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const auto said = json::parse(result.out);
+    EXPECT_EQ(said["appended"], 15);
+    ASSERT_EQ(said["skipped"].size(), 1U);
+    EXPECT_EQ(said["skipped"][0]["file"], view_name(odd));
+    EXPECT_TRUE(contains(result.err, "skipped: "));
+    EXPECT_TRUE(contains(result.err, view_name(odd) + ": rows is 6; allowed: 12"));
+    EXPECT_EQ(answer_of({"memorise", data(), memory, "--json"})["appended"], 0);
+  }
 }
 
 TEST_F(Memorise, AResumedMemoryTakesNoOtherPictureUnderAKnownName) {

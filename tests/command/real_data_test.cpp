@@ -100,6 +100,20 @@ TEST_F(RealData, SussexRouteEvenImagesRememberedOddOnesAsked) {
   EXPECT_LE(quantile(interpolated_m, 0.95), 0.09);
 }
 
+// 455 pictures over the 68 lines that they became: most lie between lines.
+TEST_F(RealData, SussexRouteIsNotChangedAgainstItself) {
+  const auto data = real_data("sussex_route");
+  PANONAV_REQUIRE_DATA(data, "sussex_route");
+  const std::string memory = folder / "route.panonav";
+  run_well({"route", "record", *data, memory});
+  const auto all = answers_of({"route", "follow", memory, *data, "--json"});
+  ASSERT_EQ(all.size(), 455U);
+  for (const auto& answer : all) {
+    EXPECT_TRUE(answer["on_route"].get<bool>());
+    EXPECT_TRUE(answer["changed"].empty()) << answer["file"];
+  }
+}
+
 TEST_F(RealData, IndoorWalkTurnedFindsItselfAndItsTurn) {
   const auto data = real_data("indoor_walk_360");
   PANONAV_REQUIRE_DATA(data, "indoor_walk_360");

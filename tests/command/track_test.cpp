@@ -285,13 +285,6 @@ TEST_F(Track, PositionsThatCannotBeMetresAreRefused) {
   EXPECT_LE(run_panonav(start).exit_code, 1);
 }
 
-TEST_F(Track, ARunWithoutOdometryIsRefusedWithTheColumnsThatAreMissing) {
-  const auto line = refusal({"track", memory(), *folder_ / "grid"});
-  for (const char* word : {"grid", "odom_x_m", "odom_y_m", "odom_heading_deg"}) {
-    EXPECT_TRUE(contains(line, word));
-  }
-}
-
 TEST_F(Track, AMemoryWithTooFewPositionsIsRefusedByName) {
   const std::string small = *folder_ / "small.panonav";
   write_dataset(*folder_ / "few", *world_, grid_poses(2));
@@ -323,6 +316,32 @@ TEST_F(Track, WrongValuesAreNamedWithTheirRange) {
   EXPECT_TRUE(contains(refusal({"track", memory(), *folder_ / "nowhere"}), "nowhere"));
   EXPECT_TRUE(contains(refusal({"track", *folder_ / "no.panonav", run()}), "no.panonav"));
   EXPECT_TRUE(contains(refused({"--tum", *folder_ / "nowhere/estimate.tum"}), "estimate.tum"));
+}
+
+TEST_F(Track, WithoutOdometryMotionIsReadFromThePicturesAndItSaysSo) {
+  const auto folder = *folder_ / "no_odometry";
+  write_run(folder, *world_, circle_poses(count), {}, {.odometry = false});
+  const auto result = run_panonav({"track", memory(), folder});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_TRUE(contains(result.err,
+                       "has no odometry (columns odom_x_m,odom_y_m,odom_heading_deg); "
+                       "motion is read from the pictures"));
+  std::vector<double> errors;
+  for (const json& image : tracked({folder})) {
+    if (image["state"] != "localised") continue;
+    errors.push_back(std::hypot(
+        image["pose"]["x_m"].get<double>() - image["ground_truth"]["x_m"].get<double>(),
+        image["pose"]["y_m"].get<double>() - image["ground_truth"]["y_m"].get<double>()));
+  }
+  ASSERT_GE(errors.size(), count / 2U);
+  std::ranges::sort(errors);
+  EXPECT_LE(errors[errors.size() / 2], 0.3);
+
+  // A folder of pictures alone does, too: they lie as the memory's own.
+  for (const char* table : {"dataset.toml", "poses.csv"}) std::filesystem::remove(folder / table);
+  const auto bare = run_panonav({"track", memory(), folder});
+  EXPECT_EQ(bare.exit_code, 0) << bare.err;
+  EXPECT_TRUE(contains(bare.err, "motion is read from the pictures"));
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -10,6 +11,8 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/relative_pose/chance_match.hpp"
+#include "support/random_views.hpp"
 #include "support/toy_world.hpp"
 
 namespace panonav::testing {
@@ -383,6 +386,63 @@ TEST(HomingView, HorizonViewIsTheMeanOfTheRowsAroundTheHorizon) {
     EXPECT_NEAR(middle.a(0, k), 0.5F * (all.a(5, k) + all.a(6, k)), 1e-6F);
     EXPECT_NEAR(middle.b(0, k), 0.5F * (all.b(5, k) + all.b(6, k)), 1e-6F);
   }
+}
+
+/// Pictures of nothing: white noise, noise smoothed along rows, columns or both, and surroundings
+/// of the spectrum of rooms.
+Panorama picture_of_nothing(int kind, std::uint64_t seed) {
+  Random random(seed, static_cast<std::uint64_t>(kind));
+  if (kind >= 4) return seen_from(random_surroundings(seed, kind == 4 ? 0.0 : 3.0), 0, 0, 0, 24);
+  Panorama panorama = random_panorama(random, 24, 96, band);
+  const int along = kind % 2 == 1 ? 12 : 1;
+  const int down = kind >= 2 ? 8 : 1;
+  Panorama smooth(24, 96, band);
+  for (int y = 0; y < 24; ++y) {
+    for (int c = 0; c < 96; ++c) {
+      for (int i = 0; i < along * down; ++i) {
+        smooth.at(y, c) += panorama.at(std::min(23, y + i / along), (c + i % along) % 96) /
+                           static_cast<float>(along * down);
+      }
+    }
+  }
+  return smooth;
+}
+
+TEST(ChanceMatch, PicturesOfNothingMatchNoBetterThanNoise) {
+  int known = 0;
+  int confident = 0;
+  constexpr int pairs = 60;
+  for (int kind = 0; kind < 6; ++kind) {
+    for (std::uint64_t pair = 0; pair < pairs; ++pair) {
+      const HomingView a = view_of(picture_of_nothing(kind, 2 * pair + 100));
+      const HomingView b = view_of(picture_of_nothing(kind, 2 * pair + 101));
+      known += chance_match(a, b).beyond_chance() ? 1 : 0;
+      confident += home_vector(a, b).confidence > 0.9 ? 1 : 0;
+    }
+  }
+  EXPECT_LE(known, 7) << "2 % of 360 pairs";
+  EXPECT_GE(confident, 180) << "or they are no trap for a confidence";
+}
+
+TEST(ChanceMatch, ViewsOfOnePlaceAreKnownWhicheverWayTheRobotFaces) {
+  int known = 0;
+  int asked = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const ToyWorld around = random_surroundings(seed, 2.0);
+    const HomingView home = view_of(seen_from(around, 0, 0, 0, 24));
+    for (const double far : {0.0, 0.1, 0.2}) {
+      const double towards = static_cast<double>(seed);
+      const HomingView here = view_of(
+          seen_from(around, far * std::cos(towards), far * std::sin(towards), 2.0 * towards, 24));
+      const ChanceMatch match = chance_match(home, here);
+      known += match.beyond_chance() ? 1 : 0;
+      ++asked;
+      const ChanceMatch turned = chance_match(turn(home, 1.0), turn(here, -2.0));
+      EXPECT_NEAR(turned.match, match.match, 2e-3);
+      EXPECT_NEAR(turned.chance, match.chance, 2e-2);
+    }
+  }
+  EXPECT_GE(10 * known, 8 * asked);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "panonav/geometry/angles.hpp"
 #include "panonav/route/route_fit.hpp"
@@ -28,8 +29,8 @@ struct Named {
   int right = 0;
   int ranges = 0;
 };
-Named drive(const RouteLines& lines, const ToyWorld& room, Point2 thing) {
-  RouteChanges changes;
+Named drive(const RouteLines& lines, const ToyWorld& room, Point2 thing,
+            RouteChanges changes = {}) {
   Named named;
   for (int i = 0; i <= 40; ++i) {
     const Pose2 pose = Pose2{-1.2, -0.2, 0.15} * Pose2{0.05 * i, 0.0, 0.0};
@@ -58,11 +59,37 @@ TEST(RouteChanges, UnchangedRoomsShowNothingAndAMovedPillarIsNamedWhereItStands)
     ToyWorld changed = room;
     const Point2 before = room.pillar(0);
     changed.move_pillar({0.5, 0.0});
-    const Named named = drive(lines, changed, {before.x_m + 0.25, before.y_m});
+    const Named named =
+        drive(lines, changed, {before.x_m + 0.25, before.y_m}, RouteChanges(lines.poses()));
     rooms_with_change += named.pictures > 0 ? 1 : 0;
     EXPECT_GE(10 * named.right, 9 * named.ranges) << seed;
   }
   EXPECT_GE(rooms_with_change, 7);
+}
+
+// What lies between two lines is interpolated: pictures from one gap share its error.
+TEST(RouteChanges, PicturesNearestToTheSameLineCountOnce) {
+  std::vector<Pose2> line_poses;
+  for (int i = 0; i < 12; ++i) line_poses.push_back({0.1 * i, 0.0, 0.0});
+  RouteFix fix;
+  fix.noise = 0.01;
+  fix.unexplained.assign(360, 0.0F);
+  for (std::size_t c = 90; c < 110; ++c) fix.unexplained[c] = 0.031F;
+  RouteChanges by_pictures;
+  RouteChanges by_lines{line_poses};
+  int first_by_pictures = 0;
+  int first_by_lines = 0;
+  for (int picture = 1; picture <= 60; ++picture) {
+    fix.pose.x_m = 0.02 * picture;
+    if (!by_pictures.add(fix).empty() && first_by_pictures == 0) first_by_pictures = picture;
+    if (!by_lines.add(fix).empty() && first_by_lines == 0) first_by_lines = picture;
+  }
+  EXPECT_EQ(first_by_pictures, 5);
+  EXPECT_GE(first_by_lines, 16) << "0.32 m, where the fifth line begins to be nearest";
+  EXPECT_LE(first_by_lines, 24);
+  // The same line again and again is no new witness.
+  RouteChanges standing{line_poses};
+  for (int picture = 0; picture < 20; ++picture) EXPECT_TRUE(standing.add(fix).empty());
 }
 
 TEST(RouteChanges, TakesFivePicturesAndStartsAnewAfterAMiss) {

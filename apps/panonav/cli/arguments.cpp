@@ -5,6 +5,7 @@
 #include <deque>
 #include <filesystem>
 #include <iostream>
+#include <set>
 #include <system_error>
 #include <utility>
 
@@ -24,6 +25,12 @@ struct Arguments::Implementation {
     Visit visit;
     std::function<void()> check;
     OptionEntries entries;
+    std::string prefix;  ///< of the flags
+  };
+  struct UsedOnly {
+    std::vector<std::string> options;
+    std::function<bool()> used;
+    std::string why;
   };
   struct Former {
     std::string flag;
@@ -35,6 +42,8 @@ struct Arguments::Implementation {
   std::vector<Take> takes = {};       ///< one for each of the infos
   std::deque<Section> sections = {};  ///< a deque: takes keep references into it
   std::vector<Former> former = {};
+  std::vector<UsedOnly> used_only = {};
+  std::set<std::string, std::less<>> typed = {};  ///< flags
 };
 
 namespace {
@@ -210,9 +219,9 @@ void Arguments::flag(const std::string& flag, bool& value, const std::string& he
 
 void Arguments::add_section(const std::string& section, const std::string& prefix, Visit visit,
                             std::function<void()> check) {
-  auto& added = implementation_->sections.emplace_back(
-      Implementation::Section{section, std::move(visit), std::move(check), {}});
   const std::string before = prefix.empty() ? "" : prefix + "_";
+  auto& added = implementation_->sections.emplace_back(
+      Implementation::Section{section, std::move(visit), std::move(check), {}, before});
   OptionLister lister([&](const ListedOption& option) {
     auto& text = added.entries[std::string(option.info.name)].text;
     std::string help(option.info.help);
@@ -343,6 +352,7 @@ std::vector<std::string> Arguments::read(std::vector<std::string> words, std::st
     const auto number = static_cast<std::size_t>(found - infos.begin());
     if (seen[number] && wanted > 0) throw UsageError(found->name + " is given twice");
     seen[number] = true;
+    implementation_->typed.insert(found->name);
     implementation_->takes[number](values);
   }
   take_positionals(loose, verb, may_miss);
@@ -411,7 +421,47 @@ std::vector<std::string> Arguments::resolve(
     section.visit(applier);
     section.check();
   }
+  for (const auto& [options, used, why] : implementation_->used_only) {
+    if (!used()) refuse_unused(options, why);
+  }
   return file ? file->warnings() : std::vector<std::string>{};
+}
+
+void Arguments::used_only(std::vector<std::string> options, std::function<bool()> used,
+                          std::string why) {
+  implementation_->used_only.push_back({std::move(options), std::move(used), std::move(why)});
+}
+
+void Arguments::refuse_unused(std::span<const std::string> options, const std::string& why) const {
+  const auto refuse = [&](const std::string& flag) {
+    throw UsageError(flag + " has no effect " + why + "; leave it out");
+  };
+  for (const std::string& wanted : options) {
+    if (implementation_->typed.contains(wanted)) refuse(wanted);
+    for (const auto& section : implementation_->sections) {
+      if ("[" + section.name + "]" != wanted) continue;
+      for (const auto& [name, entry] : section.entries) {
+        if (entry.text) refuse(flag_of(section.prefix + name));
+      }
+    }
+  }
+}
+
+void Arguments::compare(const std::string& section, const Visit& wanted, const Visit& kept,
+                        const std::string& as) const {
+  std::vector<std::pair<std::string, std::string>> asked;
+  OptionLister list_wanted(
+      [&](const ListedOption& option) { asked.emplace_back(option.info.name, option.value); });
+  wanted(list_wanted);
+  std::size_t next = 0;
+  OptionLister list_kept([&](const ListedOption& option) {
+    const auto& [name, value] = asked[next++];
+    if (value == option.value || !given(section, name)) return;
+    const auto declared =
+        std::ranges::find(implementation_->sections, section, &Implementation::Section::name);
+    throw ContractError(flag_of(declared->prefix + name), value, option.value + as);
+  });
+  kept(list_kept);
 }
 
 std::vector<std::string> Arguments::sections() const {
@@ -532,6 +582,8 @@ std::shared_ptr<Declared> declare(const Verb& verb) {
                  "were written for the last version");
   arguments.flag("-h,--help", declared->ignored, "Print a short help and stop");
   arguments.flag("--help-all", declared->ignored, "Print the help with all options and stop");
+  arguments.used_only(
+      {"--former-keys"}, [&common] { return common.session.json; }, "without --json");
   arguments.uncommon({"--threads", "--config", "--config-template", "--former-keys"});
   return declared;
 }

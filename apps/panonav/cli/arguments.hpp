@@ -113,6 +113,27 @@ class Arguments {
   /// Meaningful once the verb runs.
   [[nodiscard]] bool given(const std::string& section, const std::string& name = "") const;
 
+  /// Of options that count only where `used` holds: typed elsewhere they are refused once
+  /// everything is read, in one line that ends in `why` ("without --areas"). An entry is a flag, or
+  /// "[section]" for each option of one. What a --config file says is left alone: it may serve
+  /// several verbs.
+  void used_only(std::vector<std::string> options, std::function<bool()> used, std::string why);
+  /// The same where the input decides: throws UsageError when one of the options was typed.
+  void refuse_unused(std::span<const std::string> options, const std::string& why) const;
+  void refuse_unused(std::initializer_list<std::string> options, const std::string& why) const {
+    refuse_unused(std::span(options.begin(), options.size()), why);
+  }
+
+  /// Throws ContractError when the user gave an option of the section, by flag or file, another
+  /// value than what is there already has. `as` ends the line: whose value counts, and what to do.
+  template <class Options>
+  void require_kept(const std::string& section, Options wanted, Options kept,
+                    const std::string& as) const {
+    compare(
+        section, [&](OptionVisitor& visitor) { visit_options(wanted, visitor); },
+        [&](OptionVisitor& visitor) { visit_options(kept, visitor); }, as);
+  }
+
   /// Reads the words behind the verb into the values; with `may_miss` also where required ones are
   /// missing. Gives warnings of former names. Throws UsageError.
   std::vector<std::string> read(std::vector<std::string> words, std::string_view verb,
@@ -135,6 +156,8 @@ class Arguments {
                     Take take);
   void add_section(const std::string& section, const std::string& prefix, Visit visit,
                    std::function<void()> check);
+  void compare(const std::string& section, const Visit& wanted, const Visit& kept,
+               const std::string& as) const;
   void set_common(std::initializer_list<std::string_view> flags, bool common);
   [[nodiscard]] std::vector<std::string> rename(std::vector<std::string>& words) const;
   [[nodiscard]] std::string unknown_flag(const std::string& typed) const;

@@ -31,10 +31,10 @@ std::set<std::size_t> shown_of(std::size_t count) {
 }
 
 std::string caption_of(const HomeAnswer& answer) {
-  const HomeVector& found = answer.vector;
-  if (!points_home(found)) return answer.file + ": no direction home, " + why_none(found);
-  return answer.file + ": home is " + in_words(found.direction_rad()) + ", about " +
-         fixed(found.length(), 2) + " R away; " + turn_in_words(found.heading_rad);
+  const WayHome& way = answer.way;
+  if (!way.direction_rad) return answer.file + ": no direction home, " + why_none(way);
+  return answer.file + ": home is " + in_words(*way.direction_rad) + ", about " +
+         fixed(way.distance_r, 2) + " R away; " + turn_in_words(way.vector.heading_rad);
 }
 
 /// Arrows as long as the nearest views are apart.
@@ -53,11 +53,11 @@ bool draw_field(const Goal& goal, const std::vector<HomeAnswer>& answers, const 
   for (const auto& answer : answers) {
     if (!answer.pose || !answer.pose->heading_rad) continue;
     const Point2 at = answer.pose->position();
-    if (!points_home(answer.vector)) {
+    if (!answer.way.direction_rad) {
       silent.crosses.push_back(at);
       continue;
     }
-    const double towards = *answer.pose->heading_rad + answer.vector.direction_rad();
+    const double towards = *answer.pose->heading_rad + *answer.way.direction_rad;
     arrows.dots.push_back(at);
     arrows.lines.push_back(
         {at, {at.x_m + length_m * std::cos(towards), at.y_m + length_m * std::sin(towards)}});
@@ -82,13 +82,15 @@ void write_home_report(const fs::path& folder, const Goal& goal,
                   "From one view of a place, " + goal.name +
                       ", and what the robot sees now: which way to go, without a map and without "
                       "knowing the heading.");
-  const HomeVector& first = answers.front().vector;
-  if (answers.size() == 1) {
-    page.figures({{points_home(first) ? in_words(first.direction_rad()) : "none", "direction home"},
-                  {fixed(first.length(), 2) + " R", "distance, R that of the things around"},
-                  {fixed(degrees(wrap_angle(-first.heading_rad)), 0) + " degrees",
-                   "turn of the robot since, left positive"},
-                  {fixed(first.confidence, 2), "confidence, 0 to 1"}});
+  const WayHome& first = answers.front().way;
+  if (answers.size() == 1 && !first.known) {
+    page.figures({{"no answer", why_none(first)}});
+  } else if (answers.size() == 1) {
+    page.figures(
+        {{first.direction_rad ? in_words(*first.direction_rad) : "none", "direction home"},
+         {fixed(first.distance_r, 2) + " R", "distance, R that of the things around"},
+         {fixed(degrees(first.turn_rad), 0) + " degrees", "turn of the robot since, left positive"},
+         {fixed(first.confidence, 2), "confidence, 0 to 1"}});
   }
   page.section(goal.panorama ? "Both views" : "What the robot sees");
   page.text(
@@ -101,8 +103,8 @@ void write_home_report(const fs::path& folder, const Goal& goal,
   std::vector<ReportPicture> pictures;
   for (const std::size_t i : shown_of(answers.size())) {
     const std::string file = "home_" + std::to_string(pictures.size() + 1) + ".png";
-    const Image picture = picture_of_homing(goal.panorama, current(i), answers[i].vector,
-                                            points_home(answers[i].vector));
+    const Image picture = picture_of_homing(goal.panorama, current(i), answers[i].way.vector,
+                                            answers[i].way.direction_rad.has_value());
     write_png(folder / file, picture.view());
     pictures.push_back({file, caption_of(answers[i])});
   }
@@ -116,11 +118,14 @@ void write_home_report(const fs::path& folder, const Goal& goal,
   page.section("Numbers");
   std::vector<std::vector<std::string>> rows;
   for (const HomeAnswer& answer : answers) {
-    const HomeVector& found = answer.vector;
-    rows.push_back({answer.file, points_home(found) ? in_words(found.direction_rad()) : "none",
-                    fixed(found.length(), 3), fixed(degrees(wrap_angle(-found.heading_rad)), 1),
-                    fixed(found.correlation, 3), fixed(found.residual, 3),
-                    fixed(found.confidence, 3)});
+    const WayHome& way = answer.way;
+    const auto if_known = [&](double value, int digits) {
+      return way.known ? fixed(value, digits) : std::string("no answer");
+    };
+    rows.push_back({answer.file, way.direction_rad ? in_words(*way.direction_rad) : "none",
+                    if_known(way.distance_r, 3), if_known(degrees(way.turn_rad), 1),
+                    fixed(way.vector.correlation, 3), fixed(way.vector.residual, 3),
+                    if_known(way.confidence, 3)});
   }
   page.table({"view", "direction home", "distance [R]", "turned [degrees]", "correlation",
               "residual", "confidence"},

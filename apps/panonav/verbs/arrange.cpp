@@ -12,6 +12,7 @@
 #include "panonav/mapping/lattice_map.hpp"
 #include "panonav/pipeline/graph_file.hpp"
 #include "panonav/storage/memory_file.hpp"
+#include "verbs/recording.hpp"
 #include "verbs/stored_lattice.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES
 #include "reports/lattice_picture.hpp"
@@ -36,7 +37,8 @@ struct ArrangeArguments {
 std::vector<CoarseMotion> motions_of(const ArrangeArguments& wanted, const VisualMemory& memory) {
   std::vector<CoarseMotion> motions;
   if (!wanted.odometry) return motions;
-  const Dataset recording = read_dataset(*wanted.odometry);
+  const Dataset recording =
+      read_described(*wanted.odometry, "odom_x_m,odom_y_m,odom_heading_deg", "1.5,0.25,90");
   std::optional<std::pair<ViewId, Pose2>> before;
   for (const DatasetEntry& entry : recording.entries) {
     const auto view = memory.find(entry.file);
@@ -216,6 +218,8 @@ Run declare(Arguments& arguments) {
   arguments.options("lattice", wanted->lattice);
   arguments.options("coarse_motion", wanted->motion, "motion");
   arguments.common({"--neighbours"});
+  arguments.used_only(
+      {"[coarse_motion]"}, [wanted] { return wanted->odometry.has_value(); }, "without --odometry");
   return [wanted](Session& session) { return arrange_views(*wanted, session); };
 }
 

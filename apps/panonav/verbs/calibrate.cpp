@@ -183,6 +183,13 @@ Run declare(Arguments& arguments) {
   arguments.options("mirror_search", wanted->search);
   arguments.common({"--profile", "--inner-elevation-deg", "--rim-elevation-deg", "--direction",
                     "--forward-angle-deg"});
+  const auto shaped = [wanted](int profile) {
+    return [wanted, profile] { return wanted->mirror.profile == profile; };
+  };
+  arguments.used_only({"--inner-elevation-deg"}, shaped(0), "without --profile equiangular");
+  arguments.used_only({"--mirror-a-mm", "--mirror-b-mm"}, shaped(1),
+                      "without --profile hyperboloidal");
+  arguments.used_only({"--xi"}, shaped(2), "without --profile unified");
   return [wanted, &arguments](Session& session) { return calibrate(arguments, *wanted, session); };
 }
 

@@ -19,6 +19,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* pose_columns = "x_m,y_m,heading_deg";
+constexpr const char* pose_values = "1.5,0.25,90";
+
 struct CatchmentArguments {
   std::string dataset;
   std::optional<std::string> current;
@@ -152,7 +155,8 @@ void check_posed(const RecordedViews& views, const std::string& name) {
     if (views.poses[i] && views.poses[i]->heading_rad) continue;
     throw FileError(name, "picture " + views.files[i] + " has no " +
                               (views.poses[i] ? "heading" : "position") +
-                              ", and directions are judged by both; --ahead N needs neither");
+                              ", and directions are judged by both; --ahead N needs neither" +
+                              how_to_add(name, pose_columns, pose_values));
   }
 }
 
@@ -198,11 +202,6 @@ std::vector<int> read_stages(const std::string& text, int most) {
 }
 
 ExitCode catchment(const Arguments& arguments, const CatchmentArguments& wanted, Session& session) {
-  if (wanted.ahead && (wanted.current || wanted.report || wanted.goal)) {
-    throw UsageError(
-        "--ahead compares the pictures of one recording in their order; leave out "
-        "--current, --goal and --report");
-  }
   if (wanted.settings.up_to_m && !(*wanted.settings.up_to_m > 0.0)) {
     throw UsageError("--up-to-m is " + short_number(*wanted.settings.up_to_m) + "; allowed: > 0");
   }
@@ -213,14 +212,16 @@ ExitCode catchment(const Arguments& arguments, const CatchmentArguments& wanted,
   settings.homing =
       homing_options(arguments, wanted.homing, wanted.homing.views.signature.components);
   if (wanted.stages) {
-    if (wanted.ahead) throw UsageError("--stages are stages of runs, and --ahead makes none");
     settings.stages =
         read_stages(*wanted.stages, std::min(62, wanted.homing.views.signature.components - 2));
   }
   settings.typical_distance_given = arguments.given("run", "typical_distance_m");
   settings.longest_step_given = arguments.given("run", "max_step_m");
   settings.obstacle_given = arguments.given("run", "obstacle_m");
-  const auto recording = open_recording(wanted.dataset, wanted.pictures, std::nullopt, session);
+  const auto recording =
+      wanted.ahead || picture_source(wanted.pictures)
+          ? open_recording(wanted.dataset, wanted.pictures, std::nullopt, session)
+          : read_described(wanted.dataset, pose_columns, pose_values);
   std::optional<Dataset> second;
   if (wanted.current)
     second = open_recording(*wanted.current, wanted.pictures, recording.source, session);
@@ -282,6 +283,12 @@ Run declare(Arguments& arguments) {
   declare_homing(arguments, wanted->homing);
   arguments.options("run", wanted->settings.run);
   arguments.uncommon({"--bin-m", "--goal"});
+  arguments.used_only(
+      {"--current", "--report", "--up-to-m", "--bin-m", "--stages", "[run]"},
+      [wanted] { return !wanted->ahead; },
+      "with --ahead, which compares the pictures of one recording in their order");
+  arguments.used_only(
+      {"--goal"}, [wanted] { return wanted->report.has_value(); }, "without --report");
   return [wanted, &arguments](Session& session) { return catchment(arguments, *wanted, session); };
 }
 

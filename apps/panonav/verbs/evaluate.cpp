@@ -221,6 +221,9 @@ Run declare(Arguments& arguments) {
   arguments.positional("GROUND_TRUTH", wanted->truth, "Trajectory as TUM text or CSV");
   arguments.options("evaluation", wanted->options);
   arguments.common({"--align", "--align-scale"});
+  arguments.used_only(
+      {"--align-scale", "--align-reflection"}, [wanted] { return wanted->options.align; },
+      "with --align false");
   return [wanted](Session& session) { return evaluate(*wanted, session); };
 }
 

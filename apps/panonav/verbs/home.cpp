@@ -12,6 +12,7 @@
 #include "panonav/storage/memory_file.hpp"
 #include "reports/home_answer.hpp"
 #include "verbs/homing_pictures.hpp"
+#include "verbs/memorising.hpp"
 #include "verbs/recording.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES
 #include "reports/home_report.hpp"
@@ -34,29 +35,34 @@ struct HomeArguments {
 };
 
 ordered_json as_json(const std::string& goal, const HomeAnswer& answer) {
-  const HomeVector& found = answer.vector;
-  const bool points = points_home(found);
+  const WayHome& way = answer.way;
+  const HomeVector& found = way.vector;
+  const auto if_known = [&](double value) {
+    return way.known ? ordered_json(value) : ordered_json();
+  };
   return {{"goal", goal},
           {"current", answer.file},
-          {"direction_rad", points ? ordered_json(found.direction_rad()) : ordered_json()},
-          {"length", found.length()},
-          {"xi", found.xi},
-          {"eta", found.eta},
-          {"heading_rad", found.heading_rad},
+          {"known", way.known},
+          {"direction_rad", or_null(way.direction_rad)},
+          {"length", if_known(found.length())},
+          {"xi", if_known(found.xi)},
+          {"eta", if_known(found.eta)},
+          {"heading_rad", if_known(found.heading_rad)},
           {"correlation", found.correlation},
           {"residual", found.residual},
-          {"confidence", found.confidence},
+          {"confidence", if_known(found.confidence)},
           {"frequencies", found.frequencies}};
 }
 
 std::string as_text(const HomeAnswer& answer, Session& session) {
-  const HomeVector& found = answer.vector;
-  const std::string sure = "; confidence " + fixed(found.confidence, 2);
-  if (points_home(found)) {
-    return answer.file + "  home is " + session.good(in_words(found.direction_rad())) + ", about " +
-           fixed(found.length(), 2) + " R away; " + turn_in_words(found.heading_rad) + sure;
+  const WayHome& way = answer.way;
+  if (!way.known) return answer.file + "  " + session.bad("no answer") + ": " + why_none(way);
+  const std::string sure = "; confidence " + fixed(way.confidence, 2);
+  if (way.direction_rad) {
+    return answer.file + "  home is " + session.good(in_words(*way.direction_rad)) + ", about " +
+           fixed(way.distance_r, 2) + " R away; " + turn_in_words(way.vector.heading_rad) + sure;
   }
-  return answer.file + "  " + session.bad("no direction home") + ": " + why_none(found) + sure;
+  return answer.file + "  " + session.bad("no direction home") + ": " + why_none(way) + sure;
 }
 
 /// A picture beside a dataset.toml lies as that says.
@@ -79,11 +85,11 @@ ExitCode answer_all(const HomeArguments& wanted, const HomingGuide& guide, const
       total, session.executor(),
       [&](std::size_t i) {
         const DatasetEntry& entry = recording.entries[i];
-        return HomeAnswer{entry.file, entry.pose, guide.home(read_observation(entry)).vector};
+        return HomeAnswer{entry.file, entry.pose, guide.home(read_observation(entry))};
       },
       [&](std::size_t, HomeAnswer&& answer) {
         progress.clear();
-        pointing += points_home(answer.vector) ? 1 : 0;
+        pointing += answer.way.direction_rad ? 1 : 0;
         session.print(session.json() ? json_line(as_json(goal.name, answer))
                                      : as_text(answer, session));
         answers.push_back(std::move(answer));
@@ -111,18 +117,15 @@ ExitCode home_from_memory(const Arguments& arguments, const HomeArguments& wante
                           Session& session) {
   const auto file = MemoryFile::open(*wanted.memory, Access::read_only);
   const auto& header = file.header();
-  if (arguments.given("signature", "rows") || arguments.given("signature", "columns") ||
-      arguments.given("preprocessing")) {
-    throw UsageError(
-        "the memory says how pictures become views; leave out --rows, --columns and "
-        "the options of preprocessing");
-  }
+  SignatureOptions kept = wanted.homing.views.signature;
+  kept.components = header.shape.components;  // fewer of them may be compared
+  require_kept_options(arguments, kept, wanted.homing.views.preprocessing, file);
   int components = header.shape.components;
   if (arguments.given("signature", "components")) {
     components = wanted.homing.views.signature.components;
   }
   const ViewId view = named_view(file, wanted.goal);
-  const auto recording = open_recording(wanted.current, wanted.pictures, header.source, session);
+  const auto recording = open_recording(wanted.current, wanted.pictures, file, session);
   const HomingGuide guide(file, wanted.goal, recording.source,
                           homing_options(arguments, wanted.homing, components), components,
                           wanted.homing.views.horizon);
@@ -180,7 +183,7 @@ Verb home_verb() {
           "Directions are seen from the robot as it stands now; the heading need not be known. The "
           "distance is in units of R, the typical distance of the things around. A picture in the\n"
           "folder of a data set lies as its dataset.toml says. The exit code is 1 when no view "
-          "tells the way.",
+          "tells the way: at home itself, or where the views match no better than chance.",
           "  panonav home door.png now.png --kind panorama --elevation-deg -30 40\n"
           "  panonav home view_00012.png now.png --memory office.panonav --report way_home\n"
           "  panonav home office_run/view_00012.png office_run --json",

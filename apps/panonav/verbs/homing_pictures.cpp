@@ -16,6 +16,14 @@ void declare_homing(Arguments& arguments, HomingArguments& wanted) {
   arguments.options("preprocessing", wanted.views.preprocessing);
   arguments.options("homing", wanted.homing);
   arguments.uncommon({"--horizon"});
+  arguments.used_only(
+      {"--rising"}, [&wanted] { return wanted.homing.iterations > 0; }, "without --iterations");
+  arguments.used_only(
+      {"--starting-estimates"}, [&wanted] { return wanted.homing.turn == TurnEstimate::global; },
+      "with --turn sequential");
+  const std::vector<std::string> rise{"--vertical-motion", "--tilt"};
+  arguments.used_only(
+      rise, [&wanted] { return !wanted.views.horizon; }, "with --horizon");
 }
 
 FourierHomingOptions homing_options(const Arguments& arguments, const HomingArguments& wanted,

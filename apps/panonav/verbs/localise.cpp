@@ -166,7 +166,7 @@ LocalisedQuery answer(const PlaceRecogniser& recogniser, const LocaliseArguments
 /// A recording, or several pictures, of which some may be missing.
 Dataset open_queries(const LocaliseArguments& wanted, const MemoryFile& file, Session& session) {
   const auto open = [&](const std::string& input) {
-    return open_recording(input, wanted.pictures, file.header().source, session);
+    return open_recording(input, wanted.pictures, file, session);
   };
   if (wanted.inputs.size() == 1) return open(wanted.inputs.front());
   std::error_code ignored;
@@ -300,6 +300,8 @@ Run declare(Arguments& arguments) {
   arguments.options("localiser", wanted->localiser);
   arguments.options("accuracy", wanted->accuracy, "area");
   arguments.common({"--top"});
+  arguments.used_only(
+      {"[accuracy]"}, [wanted] { return wanted->areas; }, "without --areas");
   return [wanted, &arguments](Session& session) { return localise(arguments, *wanted, session); };
 }
 

@@ -178,24 +178,33 @@ MappedRun map_recording(const Dataset& recording, Mapper& mapper, Session& sessi
   return mapper.finish();
 }
 
-/// Refuses a height of the camera where lengths cannot be read from the ground.
-void require_ground(const Arguments& arguments, const MapArguments& wanted,
-                    const Dataset& recording, const MemoryHeader& header) {
-  if (!arguments.given("visual_odometry", "camera_height_m")) return;
-  if (!header.elevations) {
+/// Refuses what is typed and does nothing with this recording, and a height of the camera, also of
+/// a file, where lengths cannot be read from the ground.
+void refuse_without_effect(const Arguments& arguments, const MapArguments& wanted,
+                           const Dataset& recording, const MemoryHeader& header) {
+  const auto has_odometry = [](const DatasetEntry& entry) { return entry.odometry.has_value(); };
+  const bool all = std::ranges::all_of(recording.entries, has_odometry);
+  const bool wheels = wanted.mapper.mapping.wheel_lengths && all;
+  if (arguments.given("visual_odometry", "camera_height_m") && !header.elevations) {
     throw FileError(wanted.dataset,
                     "does not tell the elevations of its pictures' rows, without which the ground "
                     "is not found; allowed with --camera-height-m: panoramas with elevation_deg, "
                     "equirectangular pictures, and mirror pictures with a camera");
   }
-  const bool wheels = wanted.mapper.mapping.wheel_lengths &&
-                      std::ranges::all_of(recording.entries, [](const DatasetEntry& entry) {
-                        return entry.odometry.has_value();
-                      });
-  if (wheels) {
+  if (arguments.given("visual_odometry", "camera_height_m") && wheels) {
     throw FileError(wanted.dataset,
                     "has odometry, which tells the lengths of all steps; allowed with "
                     "--camera-height-m: recordings without it, or --wheel-lengths false");
+  }
+  if (wheels) {
+    arguments.refuse_unused({"--scale-m", "--step-deviation"},
+                            "where odometry tells the lengths of all steps");
+  }
+  if (all) arguments.refuse_unused({"--bridge-m"}, "where odometry tells of all steps");
+  if (std::ranges::none_of(recording.entries, has_odometry)) {
+    const std::string why = "as " + wanted.dataset + " has no odometry";
+    arguments.refuse_unused({"--wheel-deviation"}, why);
+    if (wanted.mapper.mapping.wheel_lengths) arguments.refuse_unused({"--wheel-lengths"}, why);
   }
 }
 
@@ -204,19 +213,15 @@ ExitCode map(const Arguments& arguments, const MapArguments& wanted, Session& se
   std::optional<MemoryFile> memory;
   if (there) memory = MemoryFile::open(wanted.memory, Access::read_write);
   const Dataset recording =
-      open_recording(wanted.dataset, wanted.pictures,
-                     memory ? std::optional(memory->header().source) : std::nullopt, session);
+      memory ? open_recording(wanted.dataset, wanted.pictures, *memory, session)
+             : open_recording(wanted.dataset, wanted.pictures, std::nullopt, session);
   if (memory) {
-    if (arguments.given("signature")) {
-      throw FileError(wanted.memory,
-                      "is there already and keeps its shape of signatures; leave "
-                      "these options out or start a new memory");
-    }
-    require_ground(arguments, wanted, recording, memory->header());
+    require_kept_options(arguments, wanted.signature, memory->header().preprocessing, *memory);
+    refuse_without_effect(arguments, wanted, recording, memory->header());
   } else {
     const MemoryHeader header =
         header_from_first_views(recording, wanted.signature, {}, session.executor());
-    require_ground(arguments, wanted, recording, header);
+    refuse_without_effect(arguments, wanted, recording, header);
     memory = MemoryFile::create(wanted.memory, header);
   }
   MapperOptions options = wanted.mapper;
@@ -263,6 +268,17 @@ Run declare(Arguments& arguments) {
   arguments.options("loop_closure", wanted->mapper.closure, "closure");
   arguments.options("pose_graph", wanted->mapper.graph, "graph");
   arguments.common({"--camera-height-m", "--capture-difference"});
+  arguments.used_only(
+      {"[loop_closure]", "[pose_graph]"}, [wanted] { return wanted->mapper.mapping.close_loops; },
+      "with --close-loops false");
+  arguments.used_only(
+      {"--distance-components", "--turn-components"},
+      [wanted] { return wanted->mapper.odometry.rule == StepRule::published; },
+      "without --rule published");
+  arguments.used_only(
+      {"--iterations", "--nearer-side"},
+      [wanted] { return wanted->mapper.odometry.rule == StepRule::home_vector; },
+      "with --rule published");
   return [wanted, &arguments](Session& session) { return map(arguments, *wanted, session); };
 }
 

@@ -11,6 +11,7 @@
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/observation_source.hpp"
+#include "verbs/memorising.hpp"
 #include "verbs/recording.hpp"
 
 namespace panonav::command {
@@ -35,38 +36,16 @@ struct Skipped {
   std::string why;
 };
 
-/// A resumed memory keeps its own options; other ones that the user asks for are refused.
-void check_same_options(const Arguments& arguments, const MemoriseArguments& wanted,
-                        const MemoryFile& memory) {
-  const auto& header = memory.header();
-  const auto refuse = [&](const std::string& option, int value, int kept) {
-    throw ContractError(option, value,
-                        std::to_string(kept) + ", as " + memory.path().string() +
-                            " was made with; leave the option out or start a new memory");
-  };
-  if (arguments.given("signature", "components") &&
-      wanted.signature.components != header.shape.components) {
-    refuse("components", wanted.signature.components, header.shape.components);
-  }
-  if (arguments.given("signature", "rows") && wanted.signature.rows != 0 &&
-      wanted.signature.rows != header.shape.rows) {
-    refuse("rows", wanted.signature.rows, header.shape.rows);
-  }
-  if (arguments.given("signature", "columns") && wanted.signature.columns != 0 &&
-      wanted.signature.columns != header.panorama_columns) {
-    refuse("columns", wanted.signature.columns, header.panorama_columns);
-  }
-  if (arguments.given("preprocessing") && wanted.preprocessing != header.preprocessing) {
-    throw FileError(memory.path().string(),
-                    "was made with other preprocessing; leave these options out or start a new "
-                    "memory");
-  }
+void skip(const std::string& file, const Error& error, std::vector<Skipped>& skipped,
+          Session& session) {
+  session.note("skipped: " + readable_line(error.what()));
+  skipped.push_back({file, error.what()});
 }
 
-/// Appends what is missing; notes which recording it is of as soon as there is a file. Gives the
-/// pictures that cannot be read; with `strict` the first of them ends it.
-std::vector<Skipped> add_all(const Dataset& missing, const Dataset& recording, bool strict,
-                             Memoriser& memoriser, Session& session) {
+/// Appends what is missing; notes which recording it is of as soon as there is a file. Adds the
+/// pictures that cannot be read to `skipped`; with `strict` the first of them ends it.
+void add_all(const Dataset& missing, const Dataset& recording, bool strict, Memoriser& memoriser,
+             std::vector<Skipped>& skipped, Session& session) {
   bool noted = false;
   const auto note = [&] {
     if (!noted && memoriser.file() != nullptr) remember_recording(recording, *memoriser.file());
@@ -75,7 +54,6 @@ std::vector<Skipped> add_all(const Dataset& missing, const Dataset& recording, b
   note();
   Progress progress(session, "memorising", missing.entries.size());
   DatasetObservations source(missing, session.executor());
-  std::vector<Skipped> skipped;
   std::exception_ptr failure;
   std::size_t read = 0;
   while (!failure && read < missing.entries.size()) {
@@ -91,8 +69,7 @@ std::vector<Skipped> add_all(const Dataset& missing, const Dataset& recording, b
           break;
         }
         progress.clear();
-        session.note("skipped: " + readable_line(error.what()));
-        skipped.push_back({entry.file, error.what()});
+        skip(entry.file, error, skipped, session);
       }
     }
     progress.advance(batch.size());
@@ -103,21 +80,31 @@ std::vector<Skipped> add_all(const Dataset& missing, const Dataset& recording, b
   if (memoriser.file() == nullptr && skipped.size() == missing.entries.size()) {
     throw FileError(recording.folder.string(), "holds no picture that can be read");
   }
-  return skipped;
 }
 
 ExitCode memorise(const Arguments& arguments, const MemoriseArguments& wanted, Session& session) {
   const bool resumes = fs::exists(wanted.memory);
-  std::optional<PictureSource> remembered;
-  if (resumes) remembered = MemoryFile::open(wanted.memory, Access::read_write).header().source;
-  const auto recording = open_recording(wanted.input, wanted.pictures, remembered, session);
-  Memoriser memoriser(wanted.memory, {.source = recording.source,
-                                      .signature = wanted.signature,
-                                      .preprocessing = wanted.preprocessing,
-                                      .thumbnails = !wanted.no_thumbnails});
+  const auto open = [&] {
+    if (!resumes) return open_recording(wanted.input, wanted.pictures, std::nullopt, session);
+    const auto memory = MemoryFile::open(wanted.memory, Access::read_write);
+    require_kept_options(arguments, wanted.signature, wanted.preprocessing, memory);
+    return open_recording(wanted.input, wanted.pictures, memory, session);
+  };
+  const Dataset recording = open();
+  std::vector<Skipped> skipped;
+  MemoriserOptions options{.source = recording.source,
+                           .signature = wanted.signature,
+                           .preprocessing = wanted.preprocessing,
+                           .thumbnails = !wanted.no_thumbnails,
+                           .left_out = {}};
+  if (!wanted.strict) {
+    options.left_out = [&](const Observation& seen, const Error& error) {
+      skip(seen.name, error, skipped, session);
+    };
+  }
+  Memoriser memoriser(wanted.memory, options);
   Dataset missing = recording;
   if (resumes) {
-    check_same_options(arguments, wanted, *memoriser.file());
     Progress comparing(session, "comparing", recording.entries.size());
     check_known_views(recording, *memoriser.file(), *memoriser.encoder(), session.executor(),
                       [&](std::size_t compared) { comparing.advance(compared); });
@@ -126,7 +113,7 @@ ExitCode memorise(const Arguments& arguments, const MemoriseArguments& wanted, S
     });
   }
   const std::size_t known_before = recording.entries.size() - missing.entries.size();
-  const auto skipped = add_all(missing, recording, wanted.strict, memoriser, session);
+  add_all(missing, recording, wanted.strict, memoriser, skipped, session);
   const auto counts = memoriser.finish(session.executor());
   const MemoryFile* const memory = memoriser.file();
   const auto info = memory->info();
@@ -164,8 +151,10 @@ Run declare(Arguments& arguments) {
   declare_pictures(arguments, wanted->pictures);
   arguments.flag("--no-thumbnails", wanted->no_thumbnails,
                  "Do not keep small pictures of the views");
-  arguments.flag("--strict", wanted->strict,
-                 "End at the first picture that cannot be read; otherwise it is named and skipped");
+  arguments.flag(
+      "--strict", wanted->strict,
+      "End at the first picture that cannot be read or is of another size; otherwise it is "
+      "named and skipped");
   arguments.flag("--recursive", wanted->pictures.recursive,
                  "A folder of pictures: take those of the folders within, too");
   arguments.options("signature", wanted->signature);

@@ -16,4 +16,9 @@ namespace panonav::command {
                                                    const PreprocessingOptions& preprocessing,
                                                    Executor& executor);
 
+/// A memory keeps the options that it was made with: throws ContractError on other values of
+/// [signature] and, where the verb has them, of [preprocessing] that the user gave.
+void require_kept_options(const Arguments& arguments, const SignatureOptions& signature,
+                          const PreprocessingOptions& preprocessing, const MemoryFile& memory);
+
 }  // namespace panonav::command

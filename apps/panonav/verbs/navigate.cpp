@@ -216,6 +216,9 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
                                 .known_route = wanted.known_route};
   if (wanted.edges) options.edges = graph_origin(*wanted.edges);
   RobotNavigator robot(wanted.memory, wanted.goal, options, std::nullopt, &session.executor());
+  if (robot.memory().header().source.kind != PictureKind::mirror) {
+    arguments.refuse_unused({"--vignetting"}, "on the panoramas of this memory");
+  }
   const std::string goal_file = robot.info(robot.goal()).name;
   const RememberedPlace remembered = remembered_by(robot);
   if (wanted.kidnap &&
@@ -291,6 +294,19 @@ Run declare(Arguments& arguments) {
   arguments.options("sensor", wanted->simulation.sensor);
   arguments.options("free_space", wanted->simulation.free_space);
   arguments.common({"--seed", "--light"});
+  require_effects(arguments, wanted->simulation);
+  arguments.used_only(
+      {"[known_route]"}, [wanted] { return wanted->route.has_value(); }, "without --route");
+  arguments.used_only(
+      {"--route-coarse-deg"}, [wanted] { return wanted->known_route.fit.levels > 1; },
+      "with --route-levels 1");
+  const auto& homing = wanted->mission.navigator.homing;
+  arguments.used_only(
+      {"--coarse", "--middle"}, [&homing] { return homing.strategy != PursuitStrategy::steady; },
+      "with --strategy steady");
+  arguments.used_only(
+      {"--fine"}, [&homing] { return homing.strategy == PursuitStrategy::coarse_to_fine; },
+      "without --strategy coarse_to_fine");
   return [wanted, &arguments](Session& session) { return navigate(arguments, *wanted, session); };
 }
 

@@ -37,11 +37,25 @@ void require_unchanged(const MemoryFile& file, const VisualMemory& memory) {
   }
 }
 
-ExitCode prune(const PruneArguments& wanted, Session& session) {
+/// Places are near each other by their positions, or by links where those are not known.
+void refuse_without_effect(const Arguments& arguments, const std::string& file,
+                           const VisualMemory& memory) {
+  const auto posed = std::ranges::count_if(
+      memory.views(), [&](ViewId view) { return memory.info(view).pose.has_value(); });
+  if (posed == 0) {
+    arguments.refuse_unused({"--reach-m", "--outdated-within-m"},
+                            "as " + file + " knows no positions");
+  } else if (posed == std::ssize(memory.views())) {
+    arguments.refuse_unused({"--reach-links"}, "as " + file + " knows the positions of all views");
+  }
+}
+
+ExitCode prune(const Arguments& arguments, const PruneArguments& wanted, Session& session) {
   auto file =
       MemoryFile::open(wanted.memory, wanted.dry_run ? Access::read_only : Access::read_write);
   const VisualMemory memory = file.load();
   session.detail(std::to_string(memory.size()) + " views loaded");
+  refuse_without_effect(arguments, wanted.memory, memory);
   const SparseSelection selection = select_references(memory, wanted.options);
   session.detail("redundant views: " + std::to_string(selection.redundant.size()));
   const SparseLoss loss = measure_loss(memory, selection);
@@ -114,7 +128,7 @@ Run declare(Arguments& arguments) {
   arguments.flag("--dry-run", wanted->dry_run, "Say what would be dropped, and drop nothing");
   arguments.options("prune", wanted->options);
   arguments.common({"--max-difference", "--reach-m", "--outdated-within-m"});
-  return [wanted](Session& session) { return prune(*wanted, session); };
+  return [wanted, &arguments](Session& session) { return prune(arguments, *wanted, session); };
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "verbs/recording.hpp"
 
+#include <cmath>
 #include <filesystem>
 
 #include "panonav/core/error.hpp"
@@ -172,12 +173,71 @@ Dataset open_recording(const std::string& input, const PictureArguments& picture
     throw UsageError(input + " has no dataset.toml; say what the pictures show with --kind");
   }
   const bool is_folder = fs::is_directory(input, ignored);
+  if (pictures.recursive && !is_folder) {
+    throw UsageError(input + " is one picture; --recursive goes with a folder");
+  }
   Dataset recording = is_folder
                           ? read_picture_folder(input, *source, {.recursive = pictures.recursive})
                           : single_picture(input, *source);
   note_left_out(recording, session);
   if (stated) note_other_kind(recording, session);
   return recording;
+}
+
+Dataset open_recording(const std::string& input, const PictureArguments& pictures,
+                       const MemoryFile& memory, Session& session) {
+  const MemoryHeader& header = memory.header();
+  Dataset recording = open_recording(input, pictures, header.source, session);
+  if (!pictures.elevation_deg) return recording;
+  const auto [low, high] = *pictures.elevation_deg;
+  const std::string typed =
+      "--elevation-deg is " + short_number(low) + " " + short_number(high) + "; allowed: ";
+  if (!header.elevations) {
+    throw UsageError(typed + "none, as " + memory.path().string() +
+                     " does not know the elevations of its views; leave it out or start a new "
+                     "memory");
+  }
+  const double kept_low = degrees(header.elevations->bottom_rad);
+  const double kept_high = degrees(header.elevations->top_rad);
+  constexpr double rounding_deg = 1e-4;
+  if (std::abs(low - kept_low) > rounding_deg || std::abs(high - kept_high) > rounding_deg) {
+    throw UsageError(typed + short_number(kept_low) + " " + short_number(kept_high) +
+                     ", the band of " + memory.path().string() +
+                     "; leave it out or start a new memory");
+  }
+  return recording;
+}
+
+Dataset read_run(const std::string& input, const MemoryFile& memory, Session& session) {
+  std::error_code ignored;
+  if (fs::exists(fs::path(input) / "dataset.toml", ignored)) return read_dataset(input);
+  return open_recording(input, {}, memory, session);
+}
+
+std::string how_to_add(const std::string& folder, const std::string& columns,
+                       const std::string& values) {
+  std::error_code ignored;
+  const bool described = fs::exists(fs::path(folder) / "dataset.toml", ignored);
+  const Dataset recording = described ? read_dataset(folder) : read_picture_folder(folder, {});
+  const std::string table = "the columns file," + columns +
+                            " and a line for each picture, such as " +
+                            readable_line(recording.entries.front().file) + "," + values;
+  if (described) return "; its table needs " + table;
+  return "; write " + (fs::path(folder) / "dataset.toml").string() +
+         " with [images] kind = \"panorama\" (or equirectangular, mirror) and [poses] file = "
+         "\"poses.csv\", and poses.csv with " +
+         table;
+}
+
+Dataset read_described(const std::string& folder, const std::string& columns,
+                       const std::string& values) {
+  std::error_code ignored;
+  if (fs::is_directory(folder, ignored) &&
+      !fs::exists(fs::path(folder) / "dataset.toml", ignored)) {
+    throw FileError(folder, "has no dataset.toml, so nothing tells where its pictures were taken" +
+                                how_to_add(folder, columns, values));
+  }
+  return read_dataset(folder);
 }
 
 std::vector<Pose2> dataset_poses(const Dataset& dataset) {

@@ -12,6 +12,7 @@
 #include "panonav/core/executor.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/pipeline/observation.hpp"
+#include "panonav/storage/memory_file.hpp"
 
 namespace panonav::command {
 
@@ -39,6 +40,23 @@ void declare_pictures(Arguments& arguments, PictureArguments& pictures);
 [[nodiscard]] Dataset open_recording(const std::string& input, const PictureArguments& pictures,
                                      const std::optional<PictureSource>& remembered,
                                      Session& session);
+/// The same beside a memory, whose pictures lie as its header says. The memory's views keep their
+/// band: another --elevation-deg throws UsageError.
+[[nodiscard]] Dataset open_recording(const std::string& input, const PictureArguments& pictures,
+                                     const MemoryFile& memory, Session& session);
+
+/// The recording of a run: a data set, or a folder of pictures that lie as those of the memory.
+[[nodiscard]] Dataset read_run(const std::string& input, const MemoryFile& memory,
+                               Session& session);
+
+/// How to make a recording tell more, for the end of an error's line: the table of a data set gets
+/// these columns, a folder of pictures alone a dataset.toml first. `values`: of an example.
+[[nodiscard]] std::string how_to_add(const std::string& folder, const std::string& columns,
+                                     const std::string& values);
+/// A data set. A folder of pictures alone throws a FileError that says how to make it one with
+/// these columns.
+[[nodiscard]] Dataset read_described(const std::string& folder, const std::string& columns,
+                                     const std::string& values);
 
 /// Poses of all entries in the data set's frame. Where it knows positions but no headings, those
 /// along the way: the tangent fitted to the positions within 0.3 m of way to either side. Empty

@@ -131,9 +131,14 @@ std::vector<double> seconds_of(const Dataset& run, const FollowArguments& wanted
   return seconds;
 }
 
-ExitCode follow_run(const FollowArguments& wanted, Session& session) {
-  const Dataset run = read_dataset(wanted.dataset);
-  RouteFollower follower(MemoryFile::open(wanted.memory, Access::read_only), run.source,
+ExitCode follow_run(const Arguments& arguments, const FollowArguments& wanted, Session& session) {
+  const auto memory = MemoryFile::open(wanted.memory, Access::read_only);
+  const Dataset run = read_run(wanted.dataset, memory, session);
+  if (odometry_poses(run).empty()) {
+    arguments.refuse_unused({"--recovery-m", "--surprise-m"},
+                            "as " + wanted.dataset + " has no odometry");
+  }
+  RouteFollower follower(memory, run.source,
                          {.name = wanted.name,
                           .tracker = wanted.tracker,
                           .fit = wanted.fit,
@@ -179,7 +184,8 @@ ExitCode follow_run(const FollowArguments& wanted, Session& session) {
 Run declare(Arguments& arguments) {
   auto wanted = std::make_shared<FollowArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file with a route");
-  arguments.positional("DATASET", wanted->dataset, "Data set of a later drive, in its order");
+  arguments.positional("DATASET", wanted->dataset,
+                       "Data set or folder of pictures of a later drive, in its order");
   arguments.option("--name NAME", wanted->name,
                    "Name of the route; the only one where none is given");
   arguments.option("--every N", wanted->every, 1,
@@ -196,7 +202,12 @@ Run declare(Arguments& arguments) {
 #endif
   arguments.options("route_tracker", wanted->tracker);
   arguments.options("route_fit", wanted->fit);
-  return [wanted](Session& session) { return follow_run(*wanted, session); };
+  arguments.used_only(
+      {"--recovery-m", "--surprise-m"}, [wanted] { return !wanted->no_odometry; },
+      "with --no-odometry");
+  arguments.used_only(
+      {"--coarse-deg"}, [wanted] { return wanted->fit.levels > 1; }, "with --levels 1");
+  return [wanted, &arguments](Session& session) { return follow_run(arguments, *wanted, session); };
 }
 
 }  // namespace

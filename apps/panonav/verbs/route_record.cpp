@@ -23,6 +23,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* position_columns = "x_m,y_m,heading_deg";
+constexpr const char* position_values = "1.5,0.25,90";
+
 struct RecordArguments {
   std::string dataset;
   std::string memory;
@@ -85,8 +88,9 @@ std::vector<Pose2> recorded_poses(const RecordArguments& wanted, const Dataset& 
                     wanted.odometry
                         ? "has no odometry; allowed for --odometry: a table with the columns "
                           "'odom_x_m', 'odom_y_m' and 'odom_heading_deg'"
-                        : "has neither positions nor odometry; allowed: a table with the columns "
-                          "'x_m' and 'y_m', or 'odom_x_m', 'odom_y_m' and 'odom_heading_deg'");
+                        : "has neither positions nor odometry" +
+                              how_to_add(wanted.dataset, position_columns, position_values) +
+                              "; or odom_x_m,odom_y_m,odom_heading_deg instead");
   }
   from_odometry = true;
   return poses;
@@ -116,24 +120,53 @@ RecordedRoute record_lines(const RecordArguments& wanted, const Dataset& dataset
   return recorder.finish();
 }
 
+std::string rows_text(const std::optional<std::pair<int, int>>& rows) {
+  return rows ? std::to_string(rows->first) + "-" + std::to_string(rows->second) : "none";
+}
+
+/// What of the route's lines the user said: lines that a route has already can only go on as they
+/// are.
+void choose_lines(const Arguments& arguments, const RecordArguments& wanted,
+                  const PictureSource& pictures, const std::optional<MemoryFile>& memory,
+                  RouteRecorderOptions& options) {
+  if (wanted.horizon_rows) options.horizon_rows = rows_from_text(*wanted.horizon_rows);
+  if (pictures.kind == PictureKind::panorama && !pictures.layout.elevations) {
+    arguments.refuse_unused({"--half-band-rad"},
+                            "as the elevations of the pictures are not known (--horizon-rows)");
+  }
+  const auto route = memory ? memory->route(wanted.name) : std::nullopt;
+  if (!route) {
+    options.line = wanted.line;
+    return;
+  }
+  const RouteSource before = route_source(*memory, wanted.name, route->columns());
+  const std::string as = ", as the route '" + wanted.name + "' in " + wanted.memory +
+                         " was recorded; leave it out or take another --name";
+  arguments.require_kept("line", wanted.line, before.line, as);
+  if (options.horizon_rows && options.horizon_rows != before.horizon_rows) {
+    throw ContractError("--horizon-rows", *wanted.horizon_rows,
+                        rows_text(before.horizon_rows) + as);
+  }
+}
+
 ExitCode record(const Arguments& arguments, const RecordArguments& wanted, Session& session) {
   if (wanted.every_m && !(*wanted.every_m >= 0.0)) {
     throw UsageError("--every-m is " + to_text(*wanted.every_m) + "; allowed: 0 or more");
   }
-  const Dataset dataset = read_dataset(wanted.dataset);
+  const Dataset dataset = read_described(wanted.dataset, position_columns, position_values);
   RouteRecorderOptions options{.name = wanted.name, .every_m = wanted.every_m.value_or(0.1)};
-  if (arguments.given("line")) options.line = wanted.line;
-  if (wanted.horizon_rows) options.horizon_rows = rows_from_text(*wanted.horizon_rows);
+  std::optional<MemoryFile> memory;
+  if (fs::exists(wanted.memory)) memory = MemoryFile::open(wanted.memory, Access::read_write);
+  choose_lines(arguments, wanted, dataset.source, memory, options);
   const auto poses = recorded_poses(wanted, dataset, options.odometry, session);
 #ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) prepare_route_report(*wanted.report, "route record");
 #endif
   // Views can be memorised into a new file later; what they need of the pictures is known now.
   RouteRecorder recorder(
-      fs::exists(wanted.memory)
-          ? MemoryFile::open(wanted.memory, Access::read_write)
-          : MemoryFile::create(wanted.memory,
-                               header_from_first_views(dataset, {}, {}, session.executor())),
+      memory ? std::move(*memory)
+             : MemoryFile::create(wanted.memory,
+                                  header_from_first_views(dataset, {}, {}, session.executor())),
       dataset.source, options);
   const auto recorded = record_lines(wanted, dataset, poses, options.odometry, recorder, session);
   const double length_m = recorded.route.length_m();

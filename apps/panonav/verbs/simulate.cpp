@@ -138,6 +138,32 @@ Run declare(Arguments& arguments) {
   declare_simulation(arguments, wanted->simulation);
   arguments.common(
       {"--path", "--spacing-m", "--poses", "--kind", "--seed", "--light", "--moved-objects"});
+  const auto path = [wanted] {
+    return wanted->random ? RecordingPath::random : wanted->simulation.recording.path;
+  };
+  arguments.used_only(
+      {"[recording]"}, [wanted] { return !wanted->trajectory; },
+      "with --trajectory, which says places and times");
+  arguments.used_only(
+      {"--spacing-m"}, [wanted] { return !wanted->grid_m; }, "with --grid, which is the spacing");
+  arguments.used_only(
+      {"--poses"}, [wanted] { return !wanted->random; }, "with --random, which is their number");
+  arguments.used_only(
+      {"--poses"},
+      [path] { return path() == RecordingPath::walk || path() == RecordingPath::random; },
+      "without --path walk or random");
+  arguments.used_only(
+      {"--spacing-m", "--speed-m-s", "[odometry]"},
+      [wanted, path] { return wanted->trajectory || path() != RecordingPath::random; },
+      "on random places, which are no way");
+  arguments.used_only(
+      {"--heading-rad"},
+      [wanted, path, &arguments] {
+        return arguments.given("recording", "heading")
+                   ? wanted->simulation.recording.heading == RecordingHeading::fixed
+                   : path() == RecordingPath::grid || path() == RecordingPath::zigzag;
+      },
+      "without --heading fixed");
   return [wanted, &arguments](Session& session) { return simulate(arguments, *wanted, session); };
 }
 

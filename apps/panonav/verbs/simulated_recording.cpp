@@ -197,6 +197,29 @@ void declare_simulation(Arguments& arguments, SimulationArguments& wanted) {
   arguments.options("sensor", wanted.sensor);
   arguments.options("free_space", wanted.free_space);
   arguments.options("odometry", wanted.odometry, "odometry");
+  require_effects(arguments, wanted);
+  const auto& simulation = wanted.simulation;
+  arguments.used_only(
+      {"--rows", "--columns", "--elevation-low-deg", "--elevation-high-deg"},
+      [&simulation] { return simulation.kind == 1; }, "without --kind panorama");
+  arguments.used_only(
+      {"--vignetting"}, [&simulation] { return simulation.kind == 0; }, "with --kind panorama");
+}
+
+void require_effects(Arguments& arguments, const SimulationArguments& wanted) {
+  const auto& sensor = wanted.sensor;
+  arguments.used_only(
+      {"--moved-seed"}, [&wanted] { return wanted.simulation.scene.moved_objects > 0.0; },
+      "without --moved-objects");
+  arguments.used_only(
+      {"--light-azimuth-rad"}, [&sensor] { return sensor.directional_light > 0.0; },
+      "without --directional-light");
+  arguments.used_only(
+      {"--occluders"}, [&sensor] { return sensor.occluded_fraction > 0.0; },
+      "without --occluded-fraction");
+  arguments.used_only(
+      {"--eight-bit"}, [&sensor] { return sensor.eight_bit; },
+      "on pictures, whose values always have eight bits");
 }
 
 SimulatedWorld::SimulatedWorld(

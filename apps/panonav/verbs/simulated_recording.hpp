@@ -50,6 +50,8 @@ struct SimulationArguments {
   std::optional<Camera> mirror;  ///< of mirror pictures; empty: `simulated_mirror_camera`
 };
 void declare_simulation(Arguments& arguments, SimulationArguments& wanted);
+/// What the options of scene and sensor need of each other, for verbs that declare both.
+void require_effects(Arguments& arguments, const SimulationArguments& wanted);
 
 /// A scene with a robot in it.
 class SimulatedWorld {

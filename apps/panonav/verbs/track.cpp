@@ -9,8 +9,10 @@
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/trajectory_file.hpp"
+#include "verbs/recording.hpp"
 #include "verbs/tracked_run.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES
 #include "reports/report_page.hpp"
@@ -78,21 +80,14 @@ void check(const Arguments& arguments, const TrackArguments& wanted) {
   }
 }
 
-Dataset read_run(const std::string& folder) {
-  Dataset run = read_dataset(folder);
+void check_odometry(const Dataset& run, const std::string& folder) {
   for (const auto& entry : run.entries) {
-    if (!entry.odometry) {
-      throw FileError(folder,
-                      "has no odometry; allowed: a table with the columns 'odom_x_m', 'odom_y_m' "
-                      "and 'odom_heading_deg'");
-    }
     const double largest = std::max(std::abs(entry.odometry->x_m), std::abs(entry.odometry->y_m));
     if (largest > farthest_m) {
       throw FileError(folder, "odometry of " + entry.file + " is " + to_text(largest) +
                                   " m from its origin; allowed: at most " + to_text(farthest_m));
     }
   }
-  return run;
 }
 
 /// Seconds of each entry: its stamp, or its number where there are no stamps.
@@ -225,10 +220,21 @@ void print_summary(const TrackSummary& summary, Session& session) {
 ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Session& session) {
   check(arguments, wanted);
   const auto file = MemoryFile::open(wanted.memory, Access::read_only);
-  const Dataset run = read_run(wanted.dataset);
+  Dataset run = read_run(wanted.dataset, file, session);
+  const bool visual = odometry_poses(run).empty();
+  if (!visual) check_odometry(run, wanted.dataset);
   std::vector<double> seconds;
   if (wanted.tum) seconds = seconds_of(run, wanted, session);
-  Tracker tracker(file, {wanted.filter, wanted.odometry, run.source});
+  Tracker tracker(
+      file, {wanted.filter,
+             visual && !arguments.given("odometry") ? visual_odometry_noise() : wanted.odometry,
+             run.source});
+  if (visual) {
+    session.note("panonav track: " + readable_line(wanted.dataset) +
+                 " has no odometry (columns odom_x_m,odom_y_m,odom_heading_deg); motion is read "
+                 "from the pictures, " +
+                 add_visual_odometry(run, tracker, session.executor()));
+  }
   start(tracker, wanted);
   TrackSettings settings{.every = wanted.every};
 #ifdef PANONAV_COMMAND_SIMULATES
@@ -270,8 +276,10 @@ ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Ses
 Run declare(Arguments& arguments) {
   auto wanted = std::make_shared<TrackArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file");
-  arguments.positional("DATASET", wanted->dataset,
-                       "Data set with odometry, in the order of the run");
+  arguments.positional(
+      "DATASET", wanted->dataset,
+      "Data set or folder of pictures, in the order of the run; without odometry motion is "
+      "read from the pictures");
   arguments.option("--every N", wanted->every, 1,
                    "Look at every N-th picture only and go by odometry between");
   arguments.option("--start-x-m", wanted->start_x_m,
@@ -291,6 +299,13 @@ Run declare(Arguments& arguments) {
   arguments.options("monte_carlo", wanted->filter);
   arguments.options("odometry", wanted->odometry, "odometry");
   arguments.common({"--seed"});
+  const auto injects = [wanted](ParticleInjection way) {
+    return [wanted, way] { return wanted->filter.injection == way; };
+  };
+  arguments.used_only({"--injection-share"}, injects(ParticleInjection::topological),
+                      "without --injection topological");
+  arguments.used_only({"--injection-number"}, injects(ParticleInjection::uniform),
+                      "without --injection uniform");
   return [wanted, &arguments](Session& session) { return track_run(arguments, *wanted, session); };
 }
 

@@ -52,6 +52,15 @@ struct TrackSettings {
 void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, Executor& executor,
            const std::function<void(TrackedImage&&)>& report);
 
+/// The noise of odometry that is read from pictures, as a map takes it to be.
+[[nodiscard]] OdometryNoise visual_odometry_noise();
+/// Fills the odometry of all entries from the pictures themselves (`VisualOdometry`); metres as
+/// views of the memory differ over known ways. Says how many steps could not be read, where the
+/// robot then seems to stand, and which scale it took. Throws FileError on a picture that cannot be
+/// read.
+[[nodiscard]] std::string add_visual_odometry(Dataset& run, const Tracker& tracker,
+                                              Executor& executor);
+
 /// `count` positions drawn evenly by weight; all of them where there are fewer. No randomness.
 [[nodiscard]] std::vector<Point2> even_sample(const Particles& particles, std::size_t count);
 

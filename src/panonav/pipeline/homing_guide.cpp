@@ -5,6 +5,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/pipeline/named_view.hpp"
+#include "panonav/relative_pose/chance_match.hpp"
 
 namespace panonav {
 
@@ -126,8 +127,14 @@ WayHome HomingGuide::home(const Observation& observation) const {
                           std::to_string(goal_.rows()) + ", as in " + goal_name_);
     }
     const HomeVector found = home_vector(goal_, view, options_);
-    return WayHome{points_home(found) ? std::optional(found.direction_rad()) : std::nullopt,
-                   found.length(), wrap_angle(-found.heading_rad), found.confidence, found};
+    const bool known = chance_match(goal_, view, options_).beyond_chance();
+    return WayHome{
+        known,
+        known && points_home(found) ? std::optional(found.direction_rad()) : std::nullopt,
+        found.length(),
+        wrap_angle(-found.heading_rad),
+        known ? found.confidence : 0.0,
+        found};
   });
 }
 

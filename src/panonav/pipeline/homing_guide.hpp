@@ -60,18 +60,22 @@ class HomingEncoder {
 
 /// What an observation tells of the way home.
 struct WayHome {
+  /// Whether the observation and the goal have more in common than chance gives (`chance_match`);
+  /// noise and other places do not. If not, nothing is said: no direction, no confidence, and
+  /// distance and turn mean nothing.
+  bool known = false;
   /// In the frame of the robot as it stands now, counter-clockwise from straight ahead. Empty where
-  /// the views tell no direction: at home itself, or with too little in common (`points_home`).
+  /// nothing is known, and at home itself (`points_home`).
   std::optional<double> direction_rad;
   double distance_r = 0.0;  ///< in units of R, the typical distance of the things around
   double turn_rad = 0.0;    ///< by which the robot has turned since it was home
   double confidence = 0.0;  ///< 0 .. 1
-  HomeVector vector;        ///< all that was found
+  HomeVector vector;        ///< all that was found, known or not
 };
 
 /// Tells the way back to a goal from one observation: a view of a memory, or an observation made
 /// there. The heading need not be known. Several threads may ask one at a time. Cost: that of the
-/// encoding, and of `home_vector`.
+/// encoding, of `home_vector`, and some milliseconds for `chance_match`.
 class HomingGuide {
  public:
   /// The goal: a view of the memory file, by name or id; the memory's own camera takes the

@@ -93,7 +93,8 @@ void check_known_views(const Dataset& recording, const MemoryFile& memory,
     if (!view) continue;
     known.push_back(&entry);
     const auto& info = views.info(*view);
-    if (info.pose != entry.pose || info.stamp_s != entry.stamp_s) {
+    // A map may have given the view its pose.
+    if ((entry.pose && info.pose != entry.pose) || info.stamp_s != entry.stamp_s) {
       refuse_known_view(memory.path(), entry.file,
                         "a view with another pose or stamp under the name");
     }

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <exception>
 #include <iterator>
+#include <map>
 #include <string>
 #include <utility>
 
@@ -101,11 +102,32 @@ void Memoriser::add(std::vector<Observation> observations, Executor& executor) {
   if (waiting_.size() >= scale_views) make_file(executor);
 }
 
+// Where one of the first does not fit, those of the most frequent size decide.
+MemoryHeader Memoriser::header_of_waiting(Executor& executor) const {
+  const auto first = std::span(waiting_).first(std::min(scale_views, waiting_.size()));
+  const auto header_of = [&](std::span<const Observation> some) {
+    return header_from_first(some, *options_.source, options_.signature, options_.preprocessing,
+                             executor);
+  };
+  try {
+    return header_of(first);
+  } catch (const Error&) {
+    if (!options_.left_out) throw;
+    std::map<std::pair<int, int>, std::vector<Observation>> by_size;
+    for (const Observation& observation : first) {
+      if (const auto* image = std::get_if<Image>(&observation.picture)) {
+        by_size[{image->width(), image->height()}].push_back(observation);
+      }
+    }
+    if (by_size.size() < 2) throw;
+    return header_of(std::ranges::max_element(by_size, {}, [](const auto& one) {
+                       return one.second.size();
+                     })->second);
+  }
+}
+
 void Memoriser::make_file(Executor& executor) {
-  const std::span<const Observation> all(waiting_);
-  file_ = MemoryFile::create(
-      path_, header_from_first(all.first(std::min(scale_views, all.size())), *options_.source,
-                               options_.signature, options_.preprocessing, executor));
+  file_ = MemoryFile::create(path_, header_of_waiting(executor));
   encoder_.emplace(file_->header(), *options_.source);
   store(std::exchange(waiting_, {}), executor);
 }
@@ -134,7 +156,15 @@ void Memoriser::store(std::span<const Observation> observations, Executor& execu
   };
   for (std::size_t i = 0; i < views.size(); ++i) {
     try {
-      if (failures[i]) std::rethrow_exception(failures[i]);
+      if (failures[i]) {
+        try {
+          std::rethrow_exception(failures[i]);
+        } catch (const Error& error) {
+          if (!options_.left_out) throw;
+          options_.left_out(observations[i], error);
+          continue;
+        }
+      }
       if (const auto known = file_->find(views[i].info.name)) {
         require_same_view(observations[i], views[i].signature, *known);
         ++counts_.known_before;
@@ -153,7 +183,8 @@ void Memoriser::require_same_view(const Observation& seen, const PackedSignature
                                   ViewId view) {
   const VisualMemory there = file_->load(std::array{view});
   const ReferenceInfo& info = there.info(view);
-  if (info.pose != seen.pose || info.stamp_s != seen.stamp_s) {
+  // A map may have given the view its pose.
+  if ((seen.pose && info.pose != seen.pose) || info.stamp_s != seen.stamp_s) {
     refuse_known_view(path_, seen.name, "a view with another pose or stamp under the name");
   }
   if (!is_same_picture(signature, there.packed(view))) {

@@ -2,10 +2,12 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "panonav/core/error.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/storage/memory_file.hpp"
@@ -18,6 +20,9 @@ struct MemoriserOptions {
   SignatureOptions signature;          ///< of a new file
   PreprocessingOptions preprocessing;  ///< of a new file
   bool thumbnails = true;              ///< keep small pictures of the views for people
+  /// Hears of an observation whose picture does not fit the others, such as one of another size,
+  /// which is then left out; empty: `add` throws.
+  std::function<void(const Observation&, const Error&)> left_out;
 };
 
 /// The header of a new memory: sizes from the first observation, the full scale from all of these.
@@ -71,6 +76,7 @@ class Memoriser {
 
  private:
   void make_file(Executor& executor);
+  [[nodiscard]] MemoryHeader header_of_waiting(Executor& executor) const;
   void store(std::span<const Observation> observations, Executor& executor);
   void require_same_view(const Observation& seen, const PackedSignature& signature, ViewId view);
 

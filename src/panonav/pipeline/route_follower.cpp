@@ -16,7 +16,8 @@ RouteFollower::RouteFollower(const MemoryFile& memory, const std::optional<Pictu
       name_(route_named(memory, options.name)),
       source_(route_source(memory, name_, memory.route(name_).value().columns())),
       encoder_(source.value_or(memory.header().source), source_),
-      tracker_(route_to_follow(memory, name_), options.tracker, options.fit) {}
+      tracker_(route_to_follow(memory, name_), options.tracker, options.fit),
+      changes_(tracker_.lines().poses()) {}
 
 RouteStep RouteFollower::step(std::vector<float> line, const std::optional<Pose2>& odometry) {
   RouteStep step{std::move(line), std::nullopt, {}};

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "panonav/geometry/angles.hpp"
 
@@ -15,6 +16,14 @@ constexpr int min_pictures = 5;
 constexpr double usual_deviations = 3.0;
 
 }  // namespace
+
+bool RouteChanges::counts(Point2 position) {
+  if (lines_.empty()) return true;
+  const auto off_m = [&](const Pose2& line) { return distance(line.position(), position); };
+  const auto nearest =
+      static_cast<std::size_t>(std::ranges::min_element(lines_, {}, off_m) - lines_.begin());
+  return std::exchange(line_, nearest) != nearest;
+}
 
 std::vector<AzimuthRange> RouteChanges::add(const RouteFix& fix) {
   const auto limit = static_cast<float>(usual_deviations * fix.noise);
@@ -33,11 +42,12 @@ std::vector<AzimuthRange> RouteChanges::add(const RouteFix& fix) {
   }
   // A thing beside the route goes from sector to sector as the robot passes it.
   const auto before = pictures_;
+  const int more = counts(fix.pose.position()) ? 1 : 0;
   for (std::size_t s = 0; s < sectors; ++s) {
     const bool high = all[s] > 0 && 2 * above[s] >= all[s];
-    pictures_[s] = high ? 1 + std::max({before[(s + sectors - 1) % sectors], before[s],
-                                        before[(s + 1) % sectors]})
-                        : 0;
+    const int so_far =
+        std::max({before[(s + sectors - 1) % sectors], before[s], before[(s + 1) % sectors]});
+    pictures_[s] = high ? std::max(1, so_far + more) : 0;
   }
   const auto changed = [&](std::size_t s) { return pictures_[s % sectors] >= min_pictures; };
   std::vector<AzimuthRange> ranges;

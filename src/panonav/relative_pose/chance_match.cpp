@@ -1,0 +1,142 @@
+#include "panonav/relative_pose/chance_match.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <cstddef>
+#include <cstdint>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "panonav/core/random.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr int max_bands = 16;
+constexpr int surrogates = 40;
+
+HomingView banded(const HomingView& view) {
+  const int bands = std::min(max_bands, view.rows());
+  std::vector<float> cosines;
+  std::vector<float> sines;
+  for (int k = 0; k < view.components(); ++k) {
+    for (int band = 0; band < bands; ++band) {
+      const int begin = band * view.rows() / bands;
+      const int end = (band + 1) * view.rows() / bands;
+      float a = 0.0F;
+      float b = 0.0F;
+      for (int y = begin; y < end; ++y) {
+        a += view.a(y, k);
+        b += view.b(y, k);
+      }
+      cosines.push_back(a / static_cast<float>(end - begin));
+      sines.push_back(b / static_cast<float>(end - begin));
+    }
+  }
+  return {bands, view.components(), std::move(cosines), std::move(sines), view.elevations()};
+}
+
+/// Noise with the spectrum of a view. A cosine transform over the rows splits each frequency into
+/// vertical patterns, which are turned each by itself.
+class NoiseOf {
+ public:
+  explicit NoiseOf(const HomingView& view)
+      : view_(view), rows_(static_cast<std::size_t>(view.rows())), energy_(rows_, 0.0F) {
+    const auto rows = static_cast<double>(rows_);
+    for (std::size_t m = 0; m < rows_; ++m) {
+      for (std::size_t y = 0; y < rows_; ++y) {
+        const double angle =
+            std::numbers::pi * (static_cast<double>(y) + 0.5) * static_cast<double>(m) / rows;
+        patterns_.push_back(
+            static_cast<float>(std::sqrt((m == 0 ? 1.0 : 2.0) / rows) * std::cos(angle)));
+      }
+    }
+    for (int k = 1; k < view.components(); ++k) {
+      const auto a = view.cosines(k);
+      const auto b = view.sines(k);
+      for (std::size_t y = 0; y < rows_; ++y) energy_[y] += a[y] * a[y] + b[y] * b[y];
+      for (std::size_t m = 0; m < rows_; ++m) {
+        std::complex<float> sum;
+        for (std::size_t y = 0; y < rows_; ++y) {
+          sum += patterns_[m * rows_ + y] * std::complex<float>(a[y], b[y]);
+        }
+        spectrum_.push_back(sum);
+      }
+    }
+  }
+
+  [[nodiscard]] HomingView draw(Random random) const {
+    const std::size_t size = rows_ * static_cast<std::size_t>(view_.components());
+    std::vector<float> cosines(size, 0.0F);
+    std::vector<float> sines(size, 0.0F);
+    std::vector<float> energy(rows_, 0.0F);
+    for (std::size_t i = 0; i < spectrum_.size(); ++i) {
+      const std::size_t first = rows_ + i / rows_ * rows_;  // frequency 0 counts for nothing
+      const std::size_t pattern = i % rows_ * rows_;
+      const double turn = random.uniform(0.0, 2.0 * std::numbers::pi);
+      const auto turned = spectrum_[i] * std::complex<float>(static_cast<float>(std::cos(turn)),
+                                                             static_cast<float>(std::sin(turn)));
+      for (std::size_t y = 0; y < rows_; ++y) {
+        cosines[first + y] += patterns_[pattern + y] * turned.real();
+        sines[first + y] += patterns_[pattern + y] * turned.imag();
+      }
+    }
+    for (std::size_t i = rows_; i < size; ++i) {
+      energy[i % rows_] += cosines[i] * cosines[i] + sines[i] * sines[i];
+    }
+    for (std::size_t i = rows_; i < size; ++i) {
+      const std::size_t y = i % rows_;
+      const float scale = energy[y] > 0.0F ? std::sqrt(energy_[y] / energy[y]) : 0.0F;
+      cosines[i] *= scale;
+      sines[i] *= scale;
+    }
+    return {view_.rows(), view_.components(), std::move(cosines), std::move(sines),
+            view_.elevations()};
+  }
+
+ private:
+  const HomingView& view_;
+  std::size_t rows_;
+  std::vector<float> patterns_;                // by pattern, then row
+  std::vector<std::complex<float>> spectrum_;  // by frequency from 1 on, then pattern
+  std::vector<float> energy_;                  // by row
+};
+
+double match_of(const HomingView& home, const HomingView& current,
+                const FourierHomingOptions& options) {
+  return home_vector(home, current, options).correlation +
+         home_vector(current, home, options).correlation;
+}
+
+}  // namespace
+
+bool ChanceMatch::beyond_chance() const noexcept {
+  // One draw more than the 40 of a normal distribution whose mean and deviation come from them:
+  // Student's t of 39 degrees of freedom at 0.99, times the root of 1 + 1 / 40.
+  constexpr double rare = 2.426 * 1.0124;
+  return deviation > 1e-6 && match - chance > rare * deviation;
+}
+
+ChanceMatch chance_match(const HomingView& home, const HomingView& current,
+                         const FourierHomingOptions& options) {
+  const HomingView goal = banded(home);
+  const HomingView here = banded(current);
+  ChanceMatch result;
+  result.match = match_of(goal, here, options);
+  const NoiseOf noise(here);
+  constexpr std::uint64_t seed = 1;
+  std::vector<double> matches;
+  for (std::uint64_t i = 0; i < surrogates; ++i) {
+    matches.push_back(match_of(goal, noise.draw(Random(seed, i)), options));
+    result.chance += matches.back() / surrogates;
+  }
+  double square = 0.0;
+  for (const double match : matches) square += (match - result.chance) * (match - result.chance);
+  result.deviation = std::sqrt(square / (surrogates - 1));
+  return result;
+}
+
+}  // namespace panonav

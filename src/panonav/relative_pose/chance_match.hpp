@@ -1,0 +1,30 @@
+#pragma once
+
+#include "panonav/relative_pose/fourier_homing.hpp"
+#include "panonav/relative_pose/homing_view.hpp"
+
+namespace panonav {
+
+/// How well two views match, beside how well one of them matches noise. Any two views correlate at
+/// the best of all turns and displacements, so a correlation alone tells nothing.
+struct ChanceMatch {
+  /// Sum of the correlations of the home vectors there and back, -2 .. 2.
+  double match = 0.0;
+  double chance = 0.0;  ///< mean of the same over views of noise with the spectrum of the current
+  double deviation = 0.0;  ///< standard deviation of that
+
+  /// Whether noise would match as well in less than 1 of 100 cases: the views have something in
+  /// common. False for views without structure, and where all noise matches alike, as with one
+  /// frequency.
+  [[nodiscard]] bool beyond_chance() const noexcept;
+};
+
+/// Matches `home` with `current` and with 40 views of noise made of it: each frequency of its
+/// vertical structure is turned by a random angle, which keeps the spectrum in both directions and
+/// the energy of each row. Rows are averaged to 16 bands first. Turning either robot on the spot
+/// changes nothing but rounding; no other randomness than fixed seeds. Throws as `home_vector`.
+/// Cost: that of 82 home vectors of 16 rows, some milliseconds.
+[[nodiscard]] ChanceMatch chance_match(const HomingView& home, const HomingView& current,
+                                       const FourierHomingOptions& options = {});
+
+}  // namespace panonav
