@@ -437,13 +437,6 @@ struct Unused {
   std::string instead;  ///< added to the line, the option counts
 };
 
-std::vector<std::string> words_of(const std::string& line) {
-  std::istringstream stream(line);
-  std::vector<std::string> words;
-  for (std::string word; stream >> word;) words.push_back(word);
-  return words;
-}
-
 // Files are not there: what is wrong with the options is said before they are looked for.
 TEST(Usage, AnOptionThatDoesNothingIsRefused) {
   const std::string on_navigate = "navigate m --goal 1 --scene office ";
