@@ -46,7 +46,7 @@ function(panonav_library name)
   panonav_precompile(panonav_${name})
 endfunction()
 
-# panonav_compile_quickly(TARGET): for tests, which take longer to compile than to run.
+# panonav_compile_quickly(TARGET): for what takes longer to compile than to run: the command and tests.
 function(panonav_compile_quickly target)
   if(CMAKE_CXX_COMPILER_ID MATCHES "GNU|Clang")
     target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
@@ -54,13 +54,23 @@ function(panonav_compile_quickly target)
 endfunction()
 
 # panonav_precompile(TARGET [HEADER ...]): the standard headers that most sources include, and these, are parsed once
-# for the whole target.
+# for all targets that name the same ones and are compiled with the same options: libraries, tests.
 function(panonav_precompile target)
-  if(PANONAV_PRECOMPILE)
-    target_precompile_headers(${target} PRIVATE
-      <algorithm> <array> <chrono> <cmath> <cstdint> <filesystem> <functional> <map> <memory> <numbers> <optional>
-      <random> <ranges> <span> <sstream> <string> <string_view> <unordered_map> <utility> <variant> <vector> ${ARGN})
+  if(NOT PANONAV_PRECOMPILE)
+    return()
   endif()
+  get_target_property(type ${target} TYPE)  # code for executables is not that of libraries
+  get_target_property(options ${target} COMPILE_OPTIONS)
+  string(MAKE_C_IDENTIFIER "PANONAV_PRECOMPILED_${type}_${options}_${ARGN}" key)
+  get_property(owner GLOBAL PROPERTY ${key})
+  if(owner)
+    target_precompile_headers(${target} REUSE_FROM ${owner})
+    return()
+  endif()
+  set_property(GLOBAL PROPERTY ${key} ${target})
+  target_precompile_headers(${target} PRIVATE
+    <algorithm> <array> <chrono> <cmath> <cstdint> <filesystem> <functional> <map> <memory> <numbers> <optional>
+    <random> <ranges> <span> <sstream> <string> <string_view> <unordered_map> <utility> <variant> <vector> ${ARGN})
 endfunction()
 
 function(panonav_warnings target)

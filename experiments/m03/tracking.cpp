@@ -11,9 +11,9 @@ namespace panonav {
 
 namespace {
 
-constexpr std::size_t images_before = 10;
+constexpr std::size_t images_before_blind = 10;
 constexpr std::size_t blind_steps = 8;  // of 0.25 m: 2 m
-constexpr std::size_t first_after = images_before + blind_steps;
+constexpr std::size_t first_after_blind = images_before_blind + blind_steps;
 constexpr std::uint64_t seed_of_tracking = 30'000;
 
 // "Large odometric errors": 20 % of the distance and 10 degrees a metre.
@@ -37,8 +37,8 @@ void reproduce_position_tracking(const TrackingReproductionOptions& options,
   for (const OfficeRuns& office : offices) {
     RunSet set{office.hard.place, {}, office.hard.single_images};
     for (const TrackingRun& run : office.hard.runs) {
-      if (run.steps.size() <= first_after + 2) continue;
-      set.runs.push_back(without_images(run, images_before, blind_steps));
+      if (run.steps.size() <= first_after_blind + 2) continue;
+      set.runs.push_back(without_images(run, images_before_blind, blind_steps));
     }
     sets.push_back(std::move(set));
   }
@@ -60,14 +60,15 @@ void reproduce_position_tracking(const TrackingReproductionOptions& options,
     // Only runs that knew the place before: others have nothing to keep.
     std::vector<TrackedRun> known;
     for (const TrackedRun& run : runs) {
-      if (run.at(images_before - 1).is_within(m03_spacing_m)) known.push_back(run);
+      if (run.at(images_before_blind - 1).is_within(m03_spacing_m)) known.push_back(run);
     }
     add_rate(result, row + ".known_before", what + ": runs with an error below 25 cm before",
              known.size(), runs.size());
     if (known.empty()) continue;
     std::size_t back = 0;
     for (const TrackedRun& run : known) {
-      back += images_until_first_right(run, m03_spacing_m, first_after).value_or(3) <= 2 ? 1 : 0;
+      back +=
+          images_until_first_right(run, m03_spacing_m, first_after_blind).value_or(3) <= 2 ? 1 : 0;
     }
     add_rate(result, row + ".back_2", what + ": error below 25 cm at the first or second image",
              back, known.size(),
@@ -75,11 +76,11 @@ void reproduce_position_tracking(const TrackingReproductionOptions& options,
     tell_single_images(result.rows.back(), sets);
     add_rate(result, row + ".back_2_for_good",
              what + ": error below 25 cm within 2 images and from then on",
-             localised_within(known, m03_spacing_m, 2, first_after), known.size());
+             localised_within(known, m03_spacing_m, 2, first_after_blind), known.size());
     add_median(result, row + ".error_1", what + ": error at the first image after", "m",
-               errors_after(known, 1, first_after));
+               errors_after(known, 1, first_after_blind));
     add_confidently_wrong(result, row + ".wrong", what, runs);
-    curves.series.push_back(error_over_images(name, known, 5, first_after));
+    curves.series.push_back(error_over_images(name, known, 5, first_after_blind));
     for (double& x : curves.series.back().x) {
       x += 0.05 * static_cast<double>(curves.series.size() - 1);
     }
@@ -87,7 +88,8 @@ void reproduce_position_tracking(const TrackingReproductionOptions& options,
   add_plot(result, options.out, "tracking_error.svg",
            "Error of the heaviest mode after 2 m of dead reckoning.", curves);
   if (sets.front().runs.empty()) return;
-  const std::array<std::size_t, 3> steps{images_before - 1, first_after - 1, first_after};
+  const std::array<std::size_t, 3> steps{images_before_blind - 1, first_after_blind - 1,
+                                         first_after_blind};
   add_plot(
       result, options.out, "fig07_position_tracking.svg",
       "Position tracking: before, at the end of, and one image after 2 m without images ([M03] "

@@ -23,7 +23,6 @@ namespace panonav {
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
 // Between robot and things where references are taken.
 constexpr double room_m = 0.2;
 // Between the lines of a route at most.
@@ -129,7 +128,7 @@ RememberedPlace remember_grid(const MissionPlace& place, double spacing_m, std::
   Random random(seed, 1);
   std::vector<Pose2> poses;
   for (const GridPosition& at : place.free_space->grid(spacing_m)) {
-    const double heading_rad = random.uniform(-pi, pi);
+    const double heading_rad = random.uniform(-std::numbers::pi, std::numbers::pi);
     if (place.free_space->clearance_m(at.position) < place.scene.robot_radius_m + room_m) continue;
     poses.push_back({at.position.x_m, at.position.y_m, heading_rad});
   }
@@ -256,7 +255,8 @@ namespace {
 bool drive(MissionRobot& robot, const BaseOptions& base, double direction_rad, double distance_m) {
   Point2 target{distance_m * std::cos(direction_rad), distance_m * std::sin(direction_rad)};
   constexpr double near_m = 0.003;
-  const double longest_s = 2.0 * (pi / base.turn_rad_s + distance_m / base.speed_m_s) + 1.0;
+  const double longest_s =
+      2.0 * (std::numbers::pi / base.turn_rad_s + distance_m / base.speed_m_s) + 1.0;
   for (double time_s = 0.0; time_s < longest_s; time_s += base.period_s) {
     const double left_m = std::hypot(target.x_m, target.y_m);
     if (left_m <= near_m) return false;
@@ -448,9 +448,10 @@ std::vector<Mission> random_missions(const MissionPlace& place, const Remembered
     for (;;) {
       const Pose2& reference = remembered.truth[random.index(remembered.truth.size())];
       const double off_m = options.beside_m * std::sqrt(random.uniform());
-      const double direction_rad = random.uniform(-pi, pi);
+      const double direction_rad = random.uniform(-std::numbers::pi, std::numbers::pi);
       const Pose2 there{reference.x_m + off_m * std::cos(direction_rad),
-                        reference.y_m + off_m * std::sin(direction_rad), random.uniform(-pi, pi)};
+                        reference.y_m + off_m * std::sin(direction_rad),
+                        random.uniform(-std::numbers::pi, std::numbers::pi)};
       if (space.is_free_between(reference.position(), there.position())) return there;
     }
   };

@@ -17,7 +17,6 @@ namespace panonav {
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
 constexpr int top = s06_components - 1;  // highest frequency of a view of 72 pixels
 
 TurnCorrelation correlation_of(const HomingView& home, const HomingView& current, int highest) {
@@ -51,7 +50,7 @@ void draw_correlation(const Arena& arena, const std::filesystem::path& folder,
   std::size_t shown = 0;
   double least = 10.0;
   for (std::size_t i = 0; i < arena.homes.views.size(); ++i) {
-    const double off = std::abs(std::abs(true_turn(arena, i, i)) - 2.0 * pi / 3.0);
+    const double off = std::abs(std::abs(true_turn(arena, i, i)) - 2.0 * std::numbers::pi / 3.0);
     if (off < least) {
       least = off;
       shown = i;
@@ -318,12 +317,13 @@ void draw_headings(const Arena& arena, const std::filesystem::path& folder, Exec
       }
     }
   });
-  const auto [whole, whole_pairs] = sum_pairs(
-      arena, 1, executor,
-      [&](std::size_t g, std::size_t p, std::vector<std::pair<double, double>>& values) {
-        const double error = -2.0 * pi * shifts[g][p] / s06_columns - true_turn(arena, g, p);
-        values[0] = {std::cos(error), std::sin(error)};
-      });
+  const auto [whole, whole_pairs] =
+      sum_pairs(arena, 1, executor,
+                [&](std::size_t g, std::size_t p, std::vector<std::pair<double, double>>& values) {
+                  const double error =
+                      -2.0 * std::numbers::pi * shifts[g][p] / s06_columns - true_turn(arena, g, p);
+                  values[0] = {std::cos(error), std::sin(error)};
+                });
 
   const auto deviation = [&counts = pairs](const Sums& of, std::size_t bin) {
     const double length = std::hypot(of.first[bin], of.second[bin]) / counts[bin];

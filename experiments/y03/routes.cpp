@@ -20,7 +20,6 @@ namespace panonav {
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
 constexpr double room_m = 0.1;
 
 // Where the robot has room; where the place has no such part, all that is free.
@@ -95,7 +94,9 @@ Pose2 start_beside(const RouteScene& place, std::span<const Point2> path, const 
                    double off_m, Random& random) {
   const std::size_t ahead = std::min<std::size_t>(3, path.size() - 1);
   const double side = random.uniform() < 0.5 ? 1.0 : -1.0;
-  for (const double angle : {0.5 * pi, -0.5 * pi, 0.75 * pi, -0.75 * pi, 0.25 * pi, -0.25 * pi}) {
+  for (const double angle :
+       {0.5 * std::numbers::pi, -0.5 * std::numbers::pi, 0.75 * std::numbers::pi,
+        -0.75 * std::numbers::pi, 0.25 * std::numbers::pi, -0.25 * std::numbers::pi}) {
     const Pose2 there =
         start * Pose2{off_m * std::cos(side * angle), off_m * std::sin(side * angle),
                       random.normal(0.0, radians(5.0))};
@@ -211,7 +212,7 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
   std::vector<Pose2> way(tracker.lines().poses().begin(), tracker.lines().poses().end());
   if (options.back) {
     std::ranges::reverse(way);
-    for (Pose2& pose : way) pose.heading_rad = wrap_angle(pose.heading_rad + pi);
+    for (Pose2& pose : way) pose.heading_rad = wrap_angle(pose.heading_rad + std::numbers::pi);
   }
   const std::vector<Point2> path = positions_of(way);
   const Pose2 start = way.front();

@@ -17,8 +17,6 @@
 namespace panonav::testing {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 Camera mirror_camera(CameraModel model, double inner_px, double rim_px) {
   Camera camera;
   camera.model = std::move(model);
@@ -69,7 +67,7 @@ std::vector<NamedCamera> all_cameras() {
       {"unified_pinhole", mirror_camera(UnifiedModel{0.0, 200, ViewAxis::up}, 0, 230)},
       {"equiangular", mirror_camera(EquiangularModel{-1.2, 0.4}, 35, 220)},
       {"equiangular_looking_up", mirror_camera(EquiangularModel{1.5, -0.2}, 5, 220)},
-      {"equirectangular", equirectangular_camera(-pi / 2, pi / 2)},
+      {"equirectangular", equirectangular_camera(-std::numbers::pi / 2, std::numbers::pi / 2)},
       {"panorama", equirectangular_camera(-0.5, 0.8)},
       {"panorama_counter_clockwise", counter_clockwise},
   };
@@ -122,7 +120,7 @@ TEST_P(EveryCamera, DirectionToPixelToDirection) {
   ASSERT_LT(band.bottom_rad, band.top_rad);
   double worst_rad = 0;
   for (int i = 0; i < 20000; ++i) {
-    const double azimuth_rad = random.uniform(-pi, pi);
+    const double azimuth_rad = random.uniform(-std::numbers::pi, std::numbers::pi);
     // The ends of the band themselves are visible, too.
     const double t = i % 10 == 0 ? 0 : i % 10 == 1 ? 1 : random.uniform();
     const double elevation_rad = band.bottom_rad * (1 - t) + band.top_rad * t;
@@ -145,24 +143,26 @@ TEST_P(EveryCamera, OutsideTheBandNothingIsSeen) {
   const ElevationBand band = visible_elevations(camera());
   if (GetParam().name == "hyperboloidal_cut_by_frame") {
     // The frame is nearest above the centre, at image angle pi/2; in its corners more is seen.
-    const double up_rad = camera().forward_angle_rad - pi / 2;
+    const double up_rad = camera().forward_angle_rad - std::numbers::pi / 2;
     const double beyond_rad = band.top_rad + 1e-3;
     EXPECT_FALSE(project(camera(), Direction3::from_angles(up_rad, beyond_rad)));
-    EXPECT_TRUE(project(camera(), Direction3::from_angles(up_rad + pi / 4, beyond_rad)));
+    EXPECT_TRUE(
+        project(camera(), Direction3::from_angles(up_rad + std::numbers::pi / 4, beyond_rad)));
     return;
   }
   int asked = 0;
   for (int i = 0; i < 360; ++i) {
-    const double azimuth_rad = i * pi / 180;
+    const double azimuth_rad = i * std::numbers::pi / 180;
     for (const double beyond_rad : {1e-4, 0.1, 0.5}) {
       for (const double elevation_rad : {band.bottom_rad - beyond_rad, band.top_rad + beyond_rad}) {
-        if (std::abs(elevation_rad) > pi / 2) continue;
+        if (std::abs(elevation_rad) > std::numbers::pi / 2) continue;
         ++asked;
         EXPECT_FALSE(project(camera(), Direction3::from_angles(azimuth_rad, elevation_rad)));
       }
     }
   }
-  EXPECT_TRUE(asked > 300 || band == (ElevationBand{-pi / 2, pi / 2})) << asked;
+  EXPECT_TRUE(asked > 300 || band == (ElevationBand{-std::numbers::pi / 2, std::numbers::pi / 2}))
+      << asked;
 }
 
 TEST_P(EveryCamera, NeverNotANumber) {

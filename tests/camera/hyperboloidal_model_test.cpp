@@ -11,8 +11,6 @@
 namespace panonav {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 struct Vector {
   double x = 0.0;  ///< away from the axis
   double z = 0.0;  ///< up
@@ -83,8 +81,8 @@ TEST(HyperboloidalModel, ReflectedRaysMeetInTheFocus) {
 
 TEST(HyperboloidalModel, LooksStraightDownInTheMiddleAndUpToTheAsymptote) {
   const HyperboloidalModel model{30, 40, 300};
-  EXPECT_NEAR(*elevation_at(model, 0), -pi / 2, 1e-12);
-  EXPECT_NEAR(*radius_at(model, -pi / 2), 0, 1e-9);
+  EXPECT_NEAR(*elevation_at(model, 0), -std::numbers::pi / 2, 1e-12);
+  EXPECT_NEAR(*radius_at(model, -std::numbers::pi / 2), 0, 1e-9);
   EXPECT_NEAR(*elevation_at(model, 225 * (1 - 1e-12)), std::atan2(40, 30), 1e-6);
   EXPECT_FALSE(elevation_at(model, 225));
   EXPECT_FALSE(elevation_at(model, -1));

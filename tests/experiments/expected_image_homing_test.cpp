@@ -15,15 +15,13 @@
 namespace panonav::testing {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 // What stands on a cylinder of radius 1 m around (0, 0).
 ToyWorld surroundings(std::uint64_t seed) {
   Random random(seed);
   std::vector<CylinderWave> waves;
   for (int k = 1; k <= 10; ++k) {
     const double amplitude = random.uniform(0.1, 0.3) / k;
-    waves.push_back({k, 0.0, amplitude, random.uniform(-pi, pi)});
+    waves.push_back({k, 0.0, amplitude, random.uniform(-std::numbers::pi, std::numbers::pi)});
   }
   return waved_cylinder(1.0, std::move(waves));
 }
@@ -52,8 +50,8 @@ Answer brute_force(const ExpectedImageHoming& homing, const std::vector<float>& 
     std::vector<double> expected;
     double mean = 0.0;
     for (int i = 0; i < n; ++i) {
-      const double phi = 2.0 * pi * i / n;
-      const double at = i + n / (2.0 * pi) *
+      const double phi = 2.0 * std::numbers::pi * i / n;
+      const double at = i + n / (2.0 * std::numbers::pi) *
                                 (-static_cast<double>(position.xi) * std::sin(phi) +
                                  static_cast<double>(position.eta) * std::cos(phi));
       const int pixel = (static_cast<int>(std::nearbyint(at)) % n + n) % n;
@@ -82,13 +80,14 @@ TEST(ExpectedImageHoming, FindsWhatTryingEveryPositionAndTurnFinds) {
       const ToyWorld around = surroundings(50 + trial);
       const auto home = seen_from(around, 0.0, 0.0, 0.4, columns);
       auto current = seen_from(around, random.uniform(-0.4, 0.4), random.uniform(-0.4, 0.4),
-                               random.uniform(-pi, pi), columns);
+                               random.uniform(-std::numbers::pi, std::numbers::pi), columns);
       for (float& v : current) v += static_cast<float>(random.normal(0.0, 0.02));
       const Answer truth = brute_force(homing, home, current);
       const HomeVector v = homing.home_vector(home, current);
       EXPECT_EQ(v.xi, truth.xi);
       EXPECT_EQ(v.eta, truth.eta);
-      EXPECT_NEAR(angle_difference(v.heading_rad, 2.0 * pi * truth.turn / columns), 0.0, 1e-9);
+      EXPECT_NEAR(angle_difference(v.heading_rad, 2.0 * std::numbers::pi * truth.turn / columns),
+                  0.0, 1e-9);
     }
   }
   EXPECT_EQ(trials, 18);
@@ -100,14 +99,15 @@ TEST(ExpectedImageHoming, PointsHomeAndTellsDistanceAndHeadingWhereAllThingsAreE
   const ExpectedImageHoming homing(columns, {.positions = 600});
   for (int trial = 0; trial < 12; ++trial) {
     const ToyWorld around = surroundings(trial);
-    const double angle = random.uniform(-pi, pi);
-    const double heading = random.uniform(-pi, pi);
+    const double angle = random.uniform(-std::numbers::pi, std::numbers::pi);
+    const double heading = random.uniform(-std::numbers::pi, std::numbers::pi);
     constexpr double d = 0.2;
     const auto home = seen_from(around, 0.0, 0.0, 0.0, columns);
     const auto current =
         seen_from(around, d * std::cos(angle), d * std::sin(angle), heading, columns);
     const HomeVector v = homing.home_vector(home, current);
-    EXPECT_LT(std::abs(angle_difference(v.direction_rad(), angle + pi - heading)), radians(20.0));
+    EXPECT_LT(std::abs(angle_difference(v.direction_rad(), angle + std::numbers::pi - heading)),
+              radians(20.0));
     EXPECT_NEAR(v.length(), d, 0.07);
     EXPECT_LT(std::abs(angle_difference(v.heading_rad, -heading)), radians(3.0));
   }
@@ -127,7 +127,7 @@ TEST(ExpectedImageHoming, ATurnByWholePixelsTurnsTheVectorAndNothingElse) {
   EXPECT_GT(a.length(), 0.1);
   EXPECT_NEAR(b.xi, a.eta, 1e-6);
   EXPECT_NEAR(b.eta, -a.xi, 1e-6);
-  EXPECT_NEAR(angle_difference(b.heading_rad, a.heading_rad - pi / 2.0), 0.0, 1e-9);
+  EXPECT_NEAR(angle_difference(b.heading_rad, a.heading_rad - std::numbers::pi / 2.0), 0.0, 1e-9);
 }
 
 TEST(ExpectedImageHoming, IdenticalViewsAreHomeAndFlatOnesTellNothing) {

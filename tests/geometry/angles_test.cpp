@@ -12,34 +12,32 @@
 namespace panonav {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 TEST(WrapAngle, StaysInsideTheHalfOpenInterval) {
   const std::vector<double> hard = {-1e-17,
                                     1e-17,
                                     0.0,
-                                    pi,
-                                    -pi,
-                                    3.0 * pi,
-                                    -3.0 * pi,
+                                    std::numbers::pi,
+                                    -std::numbers::pi,
+                                    3.0 * std::numbers::pi,
+                                    -3.0 * std::numbers::pi,
                                     1e9,
                                     -1e9,
                                     1e300,
                                     -1e300,
-                                    std::nextafter(pi, 0.0),
-                                    std::nextafter(pi, 4.0),
-                                    std::nextafter(-pi, 0.0),
-                                    std::nextafter(-pi, -4.0),
+                                    std::nextafter(std::numbers::pi, 0.0),
+                                    std::nextafter(std::numbers::pi, 4.0),
+                                    std::nextafter(-std::numbers::pi, 0.0),
+                                    std::nextafter(-std::numbers::pi, -4.0),
                                     std::numeric_limits<double>::max(),
                                     std::numeric_limits<double>::denorm_min()};
   for (const double angle : hard) {
     const double wrapped = wrap_angle(angle);
-    EXPECT_GE(wrapped, -pi) << angle;
-    EXPECT_LT(wrapped, pi) << angle;
+    EXPECT_GE(wrapped, -std::numbers::pi) << angle;
+    EXPECT_LT(wrapped, std::numbers::pi) << angle;
   }
   EXPECT_EQ(wrap_angle(-1e-17), -1e-17);
-  EXPECT_EQ(wrap_angle(pi), -pi);
-  EXPECT_EQ(wrap_angle(-pi), -pi);
+  EXPECT_EQ(wrap_angle(std::numbers::pi), -std::numbers::pi);
+  EXPECT_EQ(wrap_angle(-std::numbers::pi), -std::numbers::pi);
 }
 
 TEST(WrapAngle, IsTheSameAngleAndIdempotent) {
@@ -69,7 +67,7 @@ TEST(CircularMean, OfAnglesAcrossTheCutIsNotTheArithmeticMean) {
   const std::vector<double> angles = {radians(179), radians(-179), radians(178), radians(-178)};
   const auto mean = circular_mean(angles);
   ASSERT_TRUE(mean);
-  EXPECT_NEAR(std::abs(mean->direction_rad), pi, 1e-12);
+  EXPECT_NEAR(std::abs(mean->direction_rad), std::numbers::pi, 1e-12);
   EXPECT_GT(mean->resultant_length, 0.999);
 }
 
@@ -78,7 +76,7 @@ TEST(CircularMean, TurnsWithTheAngles) {
   for (int trial = 0; trial < 200; ++trial) {
     std::vector<double> angles;
     for (int i = 0; i < 20; ++i) angles.push_back(random.normal(0.3, 0.7));
-    const double turn = random.uniform(-pi, pi);
+    const double turn = random.uniform(-std::numbers::pi, std::numbers::pi);
     std::vector<double> turned = angles;
     for (double& a : turned) a += turn;
     const auto before = circular_mean(angles);
@@ -91,8 +89,9 @@ TEST(CircularMean, TurnsWithTheAngles) {
 
 TEST(CircularMean, IsEmptyWhereNoDirectionIsMeant) {
   EXPECT_FALSE(circular_mean({}));
-  EXPECT_FALSE(circular_mean(std::vector<double>{0.0, pi}));
-  EXPECT_FALSE(circular_mean(std::vector<double>{0.1, 0.1 + 2.0 * pi / 3.0, 0.1 - 2.0 * pi / 3.0}));
+  EXPECT_FALSE(circular_mean(std::vector<double>{0.0, std::numbers::pi}));
+  EXPECT_FALSE(circular_mean(std::vector<double>{0.1, 0.1 + 2.0 * std::numbers::pi / 3.0,
+                                                 0.1 - 2.0 * std::numbers::pi / 3.0}));
 }
 
 TEST(CircularStandardDeviation, IsThatOfANarrowNormalDistribution) {

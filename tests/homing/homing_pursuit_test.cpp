@@ -17,8 +17,6 @@ HomingView seen_from(const ToyWorld& world, const Pose2& pose, int components = 
   return homing_view(striped_signature(world, pose, components));
 }
 
-constexpr double pi = std::numbers::pi;
-
 struct Ended {
   PursuitState state = PursuitState::moving;
   Pose2 pose;
@@ -47,11 +45,12 @@ TEST(HomingPursuit, ReachesHomeFromAllAroundWhateverTheHeading) {
     for (int i = 0; i < starts; ++i) {
       const ToyWorld world = striped_round_room(3.0, 100 + static_cast<std::uint64_t>(i % 10));
       const Pose2 home{random.uniform(-0.8, 0.8), random.uniform(-0.8, 0.8),
-                       random.uniform(-pi, pi)};
-      const double direction = random.uniform(-pi, pi);
+                       random.uniform(-std::numbers::pi, std::numbers::pi)};
+      const double direction = random.uniform(-std::numbers::pi, std::numbers::pi);
       const double way_m = random.uniform(0.1, 1.0);
       const Pose2 start{home.x_m + way_m * std::cos(direction),
-                        home.y_m + way_m * std::sin(direction), random.uniform(-pi, pi)};
+                        home.y_m + way_m * std::sin(direction),
+                        random.uniform(-std::numbers::pi, std::numbers::pi)};
       const HomingPursuitOptions options{.strategy = strategy, .typical_distance_m = 3.0};
       const Ended end = run(world, HomingPursuit(seen_from(world, home), options), start);
       arrived += end.state == PursuitState::arrived &&

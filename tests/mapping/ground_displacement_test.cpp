@@ -19,7 +19,6 @@
 namespace panonav {
 namespace {
 
-constexpr double pi = std::numbers::pi;
 constexpr int rows = 80;
 constexpr int components = 20;
 constexpr double height_m = 0.6;
@@ -31,8 +30,8 @@ class Plain {
   explicit Plain(std::uint64_t seed, double contrast = 0.1) : contrast_(contrast) {
     Random random(seed, 0);
     for (int i = 0; i < 24; ++i) {
-      waves_.push_back(
-          {random.uniform(-1.2, 1.2), random.uniform(-1.2, 1.2), random.uniform(0.0, 2.0 * pi)});
+      waves_.push_back({random.uniform(-1.2, 1.2), random.uniform(-1.2, 1.2),
+                        random.uniform(0.0, 2.0 * std::numbers::pi)});
     }
   }
 
@@ -42,7 +41,7 @@ class Plain {
     for (int r = 0; r < rows; ++r) {
       const double elevation = band.top_rad - (band.top_rad - band.bottom_rad) * (r + 0.5) / rows;
       for (int c = 0; c < 256; ++c) {
-        const double azimuth = 2.0 * pi * c / 256 + pose.heading_rad;
+        const double azimuth = 2.0 * std::numbers::pi * c / 256 + pose.heading_rad;
         view.at(r, c) = static_cast<float>(0.5 + value(pose, elevation, azimuth));
       }
     }

@@ -14,12 +14,11 @@
 namespace panonav {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 TEST(Steering, ReachesGoalsFromAnywhere) {
   Random random(5);
   for (int trial = 0; trial < 50; ++trial) {
-    Pose2 robot{random.uniform(-2.0, 2.0), random.uniform(-2.0, 2.0), random.uniform(-pi, pi)};
+    Pose2 robot{random.uniform(-2.0, 2.0), random.uniform(-2.0, 2.0),
+                random.uniform(-std::numbers::pi, std::numbers::pi)};
     const Point2 goal{random.uniform(-2.0, 2.0), random.uniform(-2.0, 2.0)};
     for (int step = 0; step < 300; ++step) robot = robot * steer_to(robot, goal);
     EXPECT_LT(distance(robot.position(), goal), 1e-3) << trial;
@@ -42,7 +41,7 @@ TEST(Steering, ObeysItsLimits) {
 std::vector<Point2> eight() {
   std::vector<Point2> path;
   for (int i = 0; i <= 400; ++i) {
-    const double at = 2.0 * pi * i / 400.0;
+    const double at = 2.0 * std::numbers::pi * i / 400.0;
     path.push_back({2.0 * std::sin(at), 2.0 * std::sin(at) * std::cos(at)});
   }
   return path;

@@ -12,8 +12,6 @@
 namespace panonav {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 TEST(Velocity, ArcsComposeToTheWhole) {
   Random random(3);
   for (int i = 0; i < 200; ++i) {
@@ -22,7 +20,8 @@ TEST(Velocity, ArcsComposeToTheWhole) {
     const Pose2 whole = motion_after(v, 1.0);
     const Pose2 parts = motion_after(v, t) * motion_after(v, 1.0 - t);
     EXPECT_NEAR(distance(whole.position(), parts.position()), 0.0, 1e-12);
-    EXPECT_NEAR(std::remainder(whole.heading_rad - parts.heading_rad, 2.0 * pi), 0.0, 1e-12);
+    EXPECT_NEAR(std::remainder(whole.heading_rad - parts.heading_rad, 2.0 * std::numbers::pi), 0.0,
+                1e-12);
   }
 }
 
@@ -37,13 +36,14 @@ TEST(Velocity, SlowTurnsJoinStraightLines) {
 TEST(Velocity, AnyStepIsMadeByItsVelocity) {
   Random random(5);
   for (int i = 0; i < 200; ++i) {
-    const double turn = i % 10 == 0 ? random.uniform(-1e-7, 1e-7) : random.uniform(-pi, pi);
+    const double turn = i % 10 == 0 ? random.uniform(-1e-7, 1e-7)
+                                    : random.uniform(-std::numbers::pi, std::numbers::pi);
     const Pose2 step{random.uniform(-1, 1), random.uniform(-1, 1), turn};
     const double t = random.uniform(0.05, 2.0);
     const Velocity velocity = velocity_for(step, t);
     const Pose2 made = motion_after(velocity, t);
     EXPECT_NEAR(distance(made.position(), step.position()), 0.0, 1e-12);
-    EXPECT_NEAR(std::remainder(made.heading_rad - turn, 2.0 * pi), 0.0, 1e-12);
+    EXPECT_NEAR(std::remainder(made.heading_rad - turn, 2.0 * std::numbers::pi), 0.0, 1e-12);
   }
   // Wheels without slip: the chord has half the turn.
   const Velocity arc = velocity_for({std::cos(0.2), std::sin(0.2), 0.4}, 0.5);

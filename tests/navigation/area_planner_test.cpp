@@ -14,8 +14,6 @@
 namespace panonav::testing {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 bool is_connected(const NavigationGraph& graph, const SubAreas& areas, std::size_t area) {
   std::vector<std::size_t> open{areas.nodes[area].front()};
   std::vector<std::uint8_t> seen(graph.size(), 0);
@@ -60,7 +58,8 @@ NavigationGraph rooms_in_a_row(int rooms, int side, Random& random) {
   std::vector<Pose2> poses;
   for (int r = 0; r < rooms; ++r) {
     for (int i = 0; i < side * side; ++i) {
-      poses.push_back({r * side + i % side + 0.0, i / side + 0.0, random.uniform(-pi, pi)});
+      poses.push_back({r * side + i % side + 0.0, i / side + 0.0,
+                       random.uniform(-std::numbers::pi, std::numbers::pi)});
     }
   }
   const auto sees = [side](Point2 a, Point2 b) {
@@ -179,7 +178,8 @@ TEST(AreaPlanner, FewGatesReachTheGoalFromEverywhereByWaysHardlyLonger) {
   Random random(2);
   std::vector<Pose2> poses;
   for (int i = 0; i < 1600; ++i) {
-    poses.push_back({i % 40 + 0.0, i / 40 + 0.0, random.uniform(-pi, pi)});
+    poses.push_back(
+        {i % 40 + 0.0, i / 40 + 0.0, random.uniform(-std::numbers::pi, std::numbers::pi)});
   }
   const NavigationGraph graph = posed_graph(poses, 1.5, [](Point2, Point2) { return true; });
   AreaPlanner planner(graph, {.areas = {.views_per_area = 100}});

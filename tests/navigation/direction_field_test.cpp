@@ -13,8 +13,6 @@
 namespace panonav::testing {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 // The nodes from `start` to where the tree ends.
 std::vector<std::size_t> followed(const std::vector<Guide>& guides, std::size_t start) {
   std::vector<std::size_t> way{start};
@@ -66,7 +64,8 @@ TEST(DirectionField, DirectionsPointAlongTheWayInTheFrameOfEachView) {
   std::vector<Pose2> poses;
   for (int i = 0; i < 64; ++i) {
     poses.push_back({1.0 * (i % 8) + random.uniform(-0.2, 0.2),
-                     1.0 * (i / 8) + random.uniform(-0.2, 0.2), random.uniform(-pi, pi)});
+                     1.0 * (i / 8) + random.uniform(-0.2, 0.2),
+                     random.uniform(-std::numbers::pi, std::numbers::pi)});
   }
   const NavigationGraph graph = posed_graph(poses, 1.7, [](Point2, Point2) { return true; });
   const std::size_t goal = 27;

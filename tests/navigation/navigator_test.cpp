@@ -18,7 +18,6 @@
 namespace panonav::testing {
 namespace {
 
-constexpr double pi = std::numbers::pi;
 constexpr double spacing_m = 0.3;
 constexpr Point2 high{8.0, 4.0};
 
@@ -68,7 +67,7 @@ Drive drive(const ToyWorld& world, const RememberedWorld& remembered, Navigator&
 Pose2 free_pose(const ToyWorld& world, Random& random, double low_x = 0.0, double high_x = 8.0) {
   for (;;) {
     const Pose2 pose{random.uniform(low_x, high_x), random.uniform(0.0, high.y_m),
-                     random.uniform(-pi, pi)};
+                     random.uniform(-std::numbers::pi, std::numbers::pi)};
     if (world.clearance_m(pose.position()) > 0.25) return pose;
   }
 }
@@ -344,7 +343,8 @@ TEST(Navigator, ArrivesOverReferencesThatStandCloseTogether) {
     const ViewId goal = remembered.memory.views()[random.index(remembered.memory.size())];
     Pose2 start;
     do {
-      start = {random.uniform(0.3, 2.7), random.uniform(0.3, 1.7), random.uniform(-pi, pi)};
+      start = {random.uniform(0.3, 2.7), random.uniform(0.3, 1.7),
+               random.uniform(-std::numbers::pi, std::numbers::pi)};
     } while (world.clearance_m(start.position()) < 0.25);
     const Drive run =
         drive(world, remembered, navigator, goal, start, DriveKind::holonomic, random.next());

@@ -28,8 +28,6 @@ NavigationGraph graph_of_memory(const VisualMemory& memory, Executor& executor) 
   return graph_of_links(MemoryViewSource(memory), memory.links(), executor);
 }
 
-constexpr double pi = std::numbers::pi;
-
 // A grid in a round room of 3 m, 0.5 m apart, headings at random.
 struct Grid {
   ToyWorld room = round_room(3.0, 5);
@@ -43,7 +41,8 @@ struct Grid {
     Random random(8);
     std::vector<FourierSignature> signatures;
     for (int i = 0; i < 36; ++i) {
-      poses.push_back({-1.25 + 0.5 * (i % 6), -1.25 + 0.5 * (i / 6), random.uniform(-pi, pi)});
+      poses.push_back({-1.25 + 0.5 * (i % 6), -1.25 + 0.5 * (i / 6),
+                       random.uniform(-std::numbers::pi, std::numbers::pi)});
       signatures.push_back(round_room_signature(room, poses.back()));
     }
     VisualMemory made = make_memory(signatures);
@@ -176,7 +175,7 @@ void add_spring(Lattice& lattice, std::size_t a, std::size_t b, Point2 seen_b) {
        .b = b,
        .length = length,
        .phases = PhaseReading{.direction_a_rad = direction_rad,
-                              .direction_b_rad = wrap_angle(direction_rad + pi),
+                              .direction_b_rad = wrap_angle(direction_rad + std::numbers::pi),
                               .length = 0.2 * length,
                               .points = true}});
 }
@@ -275,11 +274,11 @@ TEST(PlaceScale, ArrivalMeansHalfTheSpacing) {
     int near_arrived = 0;
     int far_arrived = 0;
     for (int i = 0; i < 20; ++i) {
-      const double direction = random.uniform(-pi, pi);
+      const double direction = random.uniform(-std::numbers::pi, std::numbers::pi);
       const auto arrived_at = [&](double way_m) {
         const Pose2 pose{grid.poses[node].x_m + way_m * std::cos(direction),
                          grid.poses[node].y_m + way_m * std::sin(direction),
-                         random.uniform(-pi, pi)};
+                         random.uniform(-std::numbers::pi, std::numbers::pi)};
         const HomingView view = homing_view(round_room_signature(grid.room, pose));
         return image_difference(home, view) <= scale.difference &&
                home_vector(home, view).length() <= scale.length;
@@ -401,7 +400,9 @@ TEST(AreaViews, FewComponentsReadLess) {
 TEST(Obstacle, ClosesAllThatCrossesItAndNothingElse) {
   std::vector<Pose2> poses;
   Random random(3);
-  for (int i = 0; i < 25; ++i) poses.push_back({i % 5 + 0.0, i / 5 + 0.0, random.uniform(-pi, pi)});
+  for (int i = 0; i < 25; ++i)
+    poses.push_back(
+        {i % 5 + 0.0, i / 5 + 0.0, random.uniform(-std::numbers::pi, std::numbers::pi)});
   const NavigationGraph graph = posed_graph(poses, 1.5, [](Point2, Point2) { return true; });
   // From the middle, the way to the east is shut over one spacing either way.
   const std::size_t node = 12;

@@ -12,8 +12,6 @@
 namespace panonav {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 /// A smooth world, seen at (azimuth, elevation).
 double world(double azimuth, double elevation) {
   return 0.5 + 0.2 * std::cos(azimuth) + 0.1 * std::sin(3.0 * azimuth + 0.4) +
@@ -27,7 +25,7 @@ Image picture_of_world(int width, int height, ColumnDirection direction, double 
   const double sign = direction == ColumnDirection::clockwise ? -1.0 : 1.0;
   for (int v = 0; v < height; ++v) {
     for (int u = 0; u < width; ++u) {
-      const double azimuth = sign * ((u + 0.5) / width - forward) * 2.0 * pi;
+      const double azimuth = sign * ((u + 0.5) / width - forward) * 2.0 * std::numbers::pi;
       const double elevation = band.top_rad - (v + 0.5) / height * (band.top_rad - band.bottom_rad);
       picture.at(u, v) = static_cast<std::uint8_t>(std::lround(255.0 * world(azimuth, elevation)));
     }
@@ -36,7 +34,7 @@ Image picture_of_world(int width, int height, ColumnDirection direction, double 
 }
 
 TEST(PanoramaFromPicture, PutsEveryDirectionWhereItBelongs) {
-  const ElevationBand full{-pi / 2, pi / 2};
+  const ElevationBand full{-std::numbers::pi / 2, std::numbers::pi / 2};
   const ElevationBand kept{-0.5, 0.7};
   int checked = 0;
   for (const auto direction : {ColumnDirection::clockwise, ColumnDirection::counter_clockwise}) {

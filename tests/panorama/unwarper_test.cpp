@@ -16,8 +16,6 @@
 namespace panonav::testing {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 double smooth_world(double azimuth, double elevation) {
   return 0.5 + 0.2 * std::cos(azimuth - 0.3) + 0.1 * std::sin(5.0 * azimuth) +
          0.15 * std::sin(3.0 * elevation);
@@ -130,8 +128,8 @@ TEST(Unwarper, AzimuthsAreRightToAFractionOfAColumn) {
       mean += shift_rad / view.rows();
       EXPECT_GT(2.0 * std::abs(sum) / view.columns(), 0.37);  // and little is blurred away
     }
-    EXPECT_LT(worst / (2.0 * pi / 512), 0.1) << "columns, k = " << k;
-    EXPECT_LT(std::abs(mean) / (2.0 * pi / 512), 0.02) << "columns, k = " << k;
+    EXPECT_LT(worst / (2.0 * std::numbers::pi / 512), 0.1) << "columns, k = " << k;
+    EXPECT_LT(std::abs(mean) / (2.0 * std::numbers::pi / 512), 0.02) << "columns, k = " << k;
   }
 }
 
@@ -151,7 +149,7 @@ TEST(Unwarper, DoesNotAlias) {
 
 TEST(Unwarper, ATurnOfTheRobotTurnsTheColumns) {
   const Camera camera = mirror_camera();
-  const double turned_rad = 2.0 * pi * 100 / 512;
+  const double turned_rad = 2.0 * std::numbers::pi * 100 / 512;
   const Unwarper unwarper(camera);
   const Image image_here = render(camera, smooth_world);
   const Image image_there = render(camera, [&](double azimuth, double elevation) {

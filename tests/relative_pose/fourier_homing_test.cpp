@@ -18,7 +18,6 @@
 namespace panonav::testing {
 namespace {
 
-constexpr double pi = std::numbers::pi;
 constexpr ElevationBand band{-0.6, 0.6};
 
 // What stands on a cylinder of radius 1 m around the place of the home view.
@@ -28,7 +27,8 @@ ToyWorld random_surroundings(std::uint64_t seed, double height_rate = 0.0) {
   for (int k = 1; k <= 12; ++k) {
     for (int i = 0; i < 2; ++i) {
       waves.push_back({k, random.uniform(-height_rate, height_rate),
-                       0.3 / k * random.uniform(0.5, 1.0), random.uniform(-pi, pi)});
+                       0.3 / k * random.uniform(0.5, 1.0),
+                       random.uniform(-std::numbers::pi, std::numbers::pi)});
     }
   }
   return waved_cylinder(1.0, std::move(waves));
@@ -64,7 +64,7 @@ TEST(FourierHoming, SlopesOfThePublishedFormulasAreDerivativesOfTheExpectedImage
   const auto coefficient = [&](int k, bool sine, double xi, double eta) {
     double sum = 0.0;
     for (int c = 0; c < columns; ++c) {
-      const double phi = 2.0 * pi * c / columns;
+      const double phi = 2.0 * std::numbers::pi * c / columns;
       const double value = image(phi - xi * std::sin(phi) + eta * std::cos(phi));
       sum += value * (sine ? std::sin(k * phi) : std::cos(k * phi));
     }
@@ -94,8 +94,8 @@ TEST_P(EveryRule, PointsHomeAndTellsDistanceAndHeadingWhereAllThingsAreEquallyFa
   Random random(11);
   for (int trial = 0; trial < 40; ++trial) {
     const ToyWorld around = random_surroundings(100 + trial);
-    const double angle = random.uniform(-pi, pi);
-    const double heading = random.uniform(-pi, pi);
+    const double angle = random.uniform(-std::numbers::pi, std::numbers::pi);
+    const double heading = random.uniform(-std::numbers::pi, std::numbers::pi);
     constexpr double d = 0.02;
     const double x = d * std::cos(angle);
     const double y = d * std::sin(angle);
@@ -209,9 +209,9 @@ Panorama tilted_panorama(const Panorama& level, double tilt) {
       const double elevation = level.elevation_rad(r);
       const double from_row =
           std::clamp(r + tilt * std::cos(phi) / row_rad, 0.0, level.rows() - 1.001);
-      const double from_column =
-          (phi - tilt * std::tan(elevation) * std::sin(phi)) * level.columns() / (2.0 * pi) +
-          level.columns();
+      const double from_column = (phi - tilt * std::tan(elevation) * std::sin(phi)) *
+                                     level.columns() / (2.0 * std::numbers::pi) +
+                                 level.columns();
       const int r0 = static_cast<int>(from_row);
       const int c0 = static_cast<int>(std::floor(from_column));
       const auto fr = static_cast<float>(from_row - r0);
@@ -287,13 +287,13 @@ TEST(FourierHoming, SearchFindsTheWayFromFarAway) {
   Random random(77);
   for (int trial = 0; trial < 60; ++trial) {
     const ToyWorld around = random_surroundings(500 + trial);
-    const double angle = random.uniform(-pi, pi);
+    const double angle = random.uniform(-std::numbers::pi, std::numbers::pi);
     const HomingView home = view_of(seen_from(around, 0.0, 0.0, 0.0, 1), 20);
     const HomingView current =
         view_of(seen_from(around, 0.55 * std::cos(angle), 0.55 * std::sin(angle), 2.0, 1), 20);
     const auto component = [&](bool search) {
       const HomeVector v = home_vector(home, current, {.displacement_search = search});
-      return std::cos(v.direction_rad() - (angle + pi - 2.0));
+      return std::cos(v.direction_rad() - (angle + std::numbers::pi - 2.0));
     };
     with += component(true);
     without += component(false);
@@ -335,23 +335,23 @@ TEST(FourierHoming, ATurnKnownCoarselyTellsAlikeTurnsApart) {
     Random random(900 + trial);
     std::vector<CylinderWave> waves;
     for (int k = 1; k <= 12; ++k) {
-      waves.push_back(
-          {k, 0.0, k % 4 == 0 ? random.uniform(0.05, 0.1) : 0.004, random.uniform(-pi, pi)});
+      waves.push_back({k, 0.0, k % 4 == 0 ? random.uniform(0.05, 0.1) : 0.004,
+                       random.uniform(-std::numbers::pi, std::numbers::pi)});
     }
     const ToyWorld around = waved_cylinder(1.0, std::move(waves));
     const HomingView home = view_of(seen_from(around, 0.0, 0.0, 0.0, 1));
     const HomingView current = view_of(seen_from(around, 0.05, 0.02, 0.3, 1));
     for (int quarter = -1; quarter <= 2; ++quarter) {
-      const double middle = -0.3 + quarter * 0.5 * pi;
-      const HomeVector near = home_vector_near(home, current, middle, 0.25 * pi);
+      const double middle = -0.3 + quarter * 0.5 * std::numbers::pi;
+      const HomeVector near = home_vector_near(home, current, middle, 0.25 * std::numbers::pi);
       if (near.residual >= 1.0) continue;
-      EXPECT_NEAR(angle_difference(near.heading_rad, middle), 0.0, 0.25 * pi + 0.1);
+      EXPECT_NEAR(angle_difference(near.heading_rad, middle), 0.0, 0.25 * std::numbers::pi + 0.1);
       ++told_apart;
     }
-    const HomeVector right = home_vector_near(home, current, 0.0, 0.25 * pi);
+    const HomeVector right = home_vector_near(home, current, 0.0, 0.25 * std::numbers::pi);
     EXPECT_NEAR(right.heading_rad, -0.3, 0.1);
     // Without bounds it is what `home_vector` finds.
-    EXPECT_EQ(home_vector_near(home, current, 1.0, pi).heading_rad,
+    EXPECT_EQ(home_vector_near(home, current, 1.0, std::numbers::pi).heading_rad,
               home_vector(home, current).heading_rad);
   }
   EXPECT_GE(told_apart, 60);

@@ -11,15 +11,13 @@
 namespace panonav {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 // Value: elevation in rows from the top plus a wave around.
 Panorama wave(int rows, int columns, std::optional<ElevationBand> band) {
   Panorama panorama(rows, columns, band);
   for (int y = 0; y < rows; ++y) {
     for (int c = 0; c < columns; ++c) {
       panorama.at(y, c) =
-          static_cast<float>(0.01 * y + 0.2 * std::sin(2.0 * pi * 3.0 * c / columns));
+          static_cast<float>(0.01 * y + 0.2 * std::sin(2.0 * std::numbers::pi * 3.0 * c / columns));
     }
   }
   return panorama;
@@ -49,7 +47,8 @@ TEST(HorizonScanline, KeepsAzimuthsAtAnyNumberOfColumns) {
       const auto line = horizon_scanline(panorama, {.columns = wanted});
       ASSERT_EQ(line.size(), static_cast<std::size_t>(wanted));
       for (int c = 0; c < wanted; ++c) {
-        EXPECT_NEAR(line[c], 0.01 + 0.2 * std::sin(2.0 * pi * 3.0 * c / wanted), 0.012);
+        EXPECT_NEAR(line[c], 0.01 + 0.2 * std::sin(2.0 * std::numbers::pi * 3.0 * c / wanted),
+                    0.012);
       }
     }
   }

@@ -14,8 +14,6 @@
 namespace panonav::testing {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 RoutePanorama straight_route(const ToyWorld& room) {
   RoutePanorama route;
   for (int i = 0; i <= 150; ++i) {
@@ -41,7 +39,7 @@ TEST(RouteContours, ConvergeFromBothSidesOntoThePoseThatOdometryNearlyKnows) {
     const RouteContours& contours = routes[static_cast<std::size_t>(trial % 3)];
     Random random(100 + static_cast<std::uint64_t>(trial));
     const Pose2 truth{random.uniform(-0.7, 0.7), random.uniform(-0.4, 0.4),
-                      random.uniform(-pi, pi)};
+                      random.uniform(-std::numbers::pi, std::numbers::pi)};
     const Pose2 predicted{truth.x_m + 0.04, truth.y_m - 0.03, wrap_angle(truth.heading_rad + 0.01)};
     const auto fix = contours.fit(room.line(truth), predicted);
     ASSERT_TRUE(fix.has_value());

@@ -17,8 +17,6 @@
 namespace panonav::testing {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 std::vector<Pose2> straight_path(double length_m, double spacing_m) {
   std::vector<Pose2> path;
   const int steps = static_cast<int>(std::lround(length_m / spacing_m));
@@ -110,8 +108,8 @@ TEST(RouteFit, FindsPosesBesideAStraightPath) {
     constexpr int trials = 40;
     for (int trial = 0; trial < trials; ++trial) {
       const Pose2 truth{random.uniform(-2.0, 2.0), random.uniform(-0.6, 0.6),
-                        random.uniform(-pi, pi)};
-      const double off = random.uniform(-pi, pi);
+                        random.uniform(-std::numbers::pi, std::numbers::pi)};
+      const double off = random.uniform(-std::numbers::pi, std::numbers::pi);
       const Pose2 predicted{truth.x_m + 0.3 * std::cos(off), truth.y_m + 0.3 * std::sin(off),
                             wrap_angle(truth.heading_rad + random.uniform(-0.15, 0.15))};
       const auto fix = lines.fit(room.line(truth), predicted);
@@ -129,14 +127,14 @@ TEST(RouteFit, CurvedPathsAndHeadingsOfTheirOwn) {
   auto path =
       smooth_path(std::vector<Point2>{{-2.5, -0.8}, {-1, 0.3}, {0.5, -0.2}, {2.3, 0.9}}, 0.05);
   Random random(4);
-  for (Pose2& pose : path) pose.heading_rad = random.uniform(-pi, pi);
+  for (Pose2& pose : path) pose.heading_rad = random.uniform(-std::numbers::pi, std::numbers::pi);
   const RouteLines lines(record(room, path));
   double sum = 0.0;
   constexpr int trials = 30;
   for (int trial = 0; trial < trials; ++trial) {
     const Pose2 near = path[10 + random.index(path.size() - 20)];
     const Pose2 truth{near.x_m + random.uniform(-0.3, 0.3), near.y_m + random.uniform(-0.3, 0.3),
-                      random.uniform(-pi, pi)};
+                      random.uniform(-std::numbers::pi, std::numbers::pi)};
     const Pose2 predicted{truth.x_m + 0.1, truth.y_m - 0.1, wrap_angle(truth.heading_rad + 0.1)};
     const auto fix = lines.fit(room.line(truth), predicted);
     ASSERT_TRUE(fix.has_value());
@@ -190,7 +188,7 @@ TEST(RouteFit, ChangedPartsCountLessAndAreReported) {
   float changed = 0.0F;
   for (int trial = 0; trial < 20; ++trial) {
     const Pose2 truth{random.uniform(-1.5, 1.5), random.uniform(-0.3, 0.3),
-                      random.uniform(-pi, pi)};
+                      random.uniform(-std::numbers::pi, std::numbers::pi)};
     const auto line = room.line(truth);
     const auto a = lines.fit(line, truth);
     const auto b = trusting.fit(line, truth);
@@ -284,7 +282,7 @@ TEST(RouteFit, ExplainsAtLeastAsMuchAsWithoutSmoothing) {
     const RouteLines plain(route, {.levels = 1});
     for (int trial = 0; trial < 20; ++trial) {
       const Pose2 truth{random.uniform(-1.0, 1.0), random.uniform(-0.4, 0.4),
-                        random.uniform(-pi, pi)};
+                        random.uniform(-std::numbers::pi, std::numbers::pi)};
       const Pose2 predicted = truth * Pose2{0.3 * random.normal(), 0.3 * random.normal(), 0.1};
       const auto line = room.line(truth);
       const auto direct = plain.fit(line, predicted);

@@ -15,8 +15,6 @@
 namespace panonav::testing {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 class RouteTracking : public ::testing::Test {
  protected:
   RouteTracking() {
@@ -40,7 +38,7 @@ TEST_F(RouteTracking, FindsTheRobotWithoutAPrediction) {
   constexpr int trials = 30;
   for (int trial = 0; trial < trials; ++trial) {
     const Pose2 truth = beside(5 + random.index(path.size() - 10), random.uniform(-0.4, 0.4),
-                               random.uniform(-pi, pi));
+                               random.uniform(-std::numbers::pi, std::numbers::pi));
     const auto fix = tracker.search(room.line(truth));
     if (!fix) continue;
     EXPECT_EQ(fix->origin, RouteFixOrigin::search);
@@ -56,7 +54,7 @@ TEST_F(RouteTracking, SaysThatAnotherPlaceIsNotOnThisRoute) {
   for (int trial = 0; trial < 40; ++trial) {
     const ToyWorld other = pillared_room(500 + static_cast<std::uint64_t>(trial));
     const Pose2 there{random.uniform(-2.0, 2.0), random.uniform(-0.8, 0.8),
-                      random.uniform(-pi, pi)};
+                      random.uniform(-std::numbers::pi, std::numbers::pi)};
     refused += tracker.search(other.line(there)) ? 0 : 1;
   }
   EXPECT_GE(refused, 36);
@@ -91,8 +89,8 @@ TEST_F(RouteTracking, RecoversWhenThePredictionIsOff) {
   RouteTracker tracker(route);
   for (int trial = 0; trial < trials; ++trial) {
     const Pose2 truth = beside(8 + random.index(path.size() - 16), random.uniform(-0.2, 0.2),
-                               random.uniform(-pi, pi));
-    const double angle = random.uniform(-pi, pi);
+                               random.uniform(-std::numbers::pi, std::numbers::pi));
+    const double angle = random.uniform(-std::numbers::pi, std::numbers::pi);
     tracker.set_pose({truth.x_m + 0.5 * std::cos(angle), truth.y_m + 0.5 * std::sin(angle),
                       wrap_angle(truth.heading_rad + random.uniform(-0.3, 0.3))});
     const auto fix = tracker.track(room.line(truth), {});

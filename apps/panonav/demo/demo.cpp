@@ -430,7 +430,7 @@ ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
   return ExitCode::done;
 }
 
-Run declare(Arguments& arguments) {
+Run declare_demo(Arguments& arguments) {
   auto wanted = std::make_shared<DemoOptions>();
   auto out = std::make_shared<std::string>("demo");
   auto seed = std::make_shared<std::optional<std::uint64_t>>();
@@ -457,7 +457,7 @@ Verb demo_verb() {
           "written anew; a folder that holds "
           "anything\n"
           "else is refused.",
-          "  panonav demo\n  panonav demo --seed 5 -o other_office", declare};
+          "  panonav demo\n  panonav demo --seed 5 -o other_office", declare_demo};
 }
 
 }  // namespace panonav::command

@@ -13,7 +13,7 @@ namespace panonav::command {
 namespace {
 
 constexpr double right_closure_m = 1.0;
-constexpr std::size_t neighbours = 8;
+constexpr std::size_t compared_neighbours = 8;
 
 /// The nodes of the largest component beside what is known of them.
 struct Nodes {
@@ -58,8 +58,9 @@ std::optional<MapComparison> compare_with_ground_truth(const Dataset& recording,
   const Alignment alignment = align(nodes.map, nodes.truth, {.allow_scale = !run.wheels});
   comparison.rms_m = alignment.rms_m;
   comparison.scale = alignment.scale;
-  if (3 * neighbours + 1 < 2 * nodes.map.size()) {
-    const auto kept = neighbour_preservation(nodes.map, nodes.truth, static_cast<int>(neighbours));
+  if (3 * compared_neighbours + 1 < 2 * nodes.map.size()) {
+    const auto kept =
+        neighbour_preservation(nodes.map, nodes.truth, static_cast<int>(compared_neighbours));
     comparison.trustworthiness = kept.trustworthiness;
     comparison.continuity = kept.continuity;
   }

@@ -200,7 +200,7 @@ ExitCode arrange_views(const ArrangeArguments& wanted, Session& session) {
   return ExitCode::done;
 }
 
-Run declare(Arguments& arguments) {
+Run declare_arrange(Arguments& arguments) {
   auto wanted = std::make_shared<ArrangeArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file; its views may be in any order");
   arguments.option("--odometry DATASET", wanted->odometry,
@@ -234,7 +234,7 @@ Verb arrange_verb() {
       "lattice.",
       "  panonav arrange office.panonav --picture lattice.png\n"
       "  panonav arrange hall.panonav --odometry run --graphml hall.graphml --json",
-      declare};
+      declare_arrange};
 }
 
 }  // namespace panonav::command

@@ -170,7 +170,7 @@ ExitCode calibrate(const Arguments& arguments, const CalibrateArguments& wanted,
   return ExitCode::done;
 }
 
-Run declare(Arguments& arguments) {
+Run declare_calibrate(Arguments& arguments) {
   auto wanted = std::make_shared<CalibrateArguments>();
   arguments.positionals("IMAGE", wanted->images,
                         "Raw images of one mirror camera; more are better");
@@ -200,7 +200,8 @@ Verb calibrate_verb() {
       "calibrate", "Find centre, rim and inner radius of a mirror in raw images",
       "The exit code is 1 when no image shows a mirror's rim. Look at the overlay before you trust "
       "the file.",
-      "  panonav calibrate mirror1.jpg mirror2.jpg -o camera.toml --overlay overlay.png", declare};
+      "  panonav calibrate mirror1.jpg mirror2.jpg -o camera.toml --overlay overlay.png",
+      declare_calibrate};
 }
 
 }  // namespace panonav::command

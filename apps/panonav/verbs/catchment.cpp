@@ -256,7 +256,7 @@ ExitCode catchment(const Arguments& arguments, const CatchmentArguments& wanted,
   return std::isfinite(result.component) ? ExitCode::done : ExitCode::no_answer;
 }
 
-Run declare(Arguments& arguments) {
+Run declare_catchment(Arguments& arguments) {
   auto wanted = std::make_shared<CatchmentArguments>();
   arguments.positional("DATASET", wanted->dataset,
                        "Data set with positions and headings; each view is a home");
@@ -305,7 +305,7 @@ Verb catchment_verb() {
           "  panonav catchment monday_run --current tuesday_run --published 5 --json\n"
           "  panonav catchment grid_run --published 10 --stages 2,4,10\n"
           "  panonav catchment walk_run --ahead 20",
-          declare};
+          declare_catchment};
 }
 
 }  // namespace panonav::command

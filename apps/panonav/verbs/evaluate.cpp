@@ -214,7 +214,7 @@ ExitCode evaluate(const EvaluateArguments& wanted, Session& session) {
   return ExitCode::done;
 }
 
-Run declare(Arguments& arguments) {
+Run declare_evaluate(Arguments& arguments) {
   auto wanted = std::make_shared<EvaluateArguments>();
   arguments.positional("ESTIMATE", wanted->estimate,
                        "Trajectory as TUM text or CSV, or a memory file (NAME.panonav) with a map");
@@ -236,7 +236,7 @@ Verb evaluate_verb() {
           "  panonav evaluate estimate.tum truth.tum\n"
           "  panonav evaluate estimate.csv truth.csv --align-scale true --json\n"
           "  panonav evaluate office.panonav run/poses.csv",
-          declare};
+          declare_evaluate};
 }
 
 }  // namespace panonav::command

@@ -86,7 +86,7 @@ ExitCode export_all(const ExportArguments& wanted, Session& session) {
   return ExitCode::done;
 }
 
-Run declare(Arguments& arguments) {
+Run declare_export(Arguments& arguments) {
   auto wanted = std::make_shared<ExportArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file");
   arguments.required_option("-o,--out FOLDER", wanted->out,
@@ -104,7 +104,7 @@ Verb export_verb() {
       "they are. Links, maps and routes are not exported. The folder appears whole or not at all.",
       "  panonav export office.panonav -o office_views\n"
       "  panonav memorise office_views again.panonav --config office_views/memorise.toml",
-      declare};
+      declare_export};
 }
 
 }  // namespace panonav::command

@@ -71,7 +71,7 @@ ExitCode forget(const ForgetArguments& wanted, Session& session) {
   return ExitCode::done;
 }
 
-Run declare(Arguments& arguments) {
+Run declare_forget(Arguments& arguments) {
   auto wanted = std::make_shared<ForgetArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file");
   arguments.positionals("VIEW", wanted->views, "Names of views, as localise shows them");
@@ -88,7 +88,7 @@ Verb forget_verb() {
           "back.",
           "  panonav forget office.panonav view_0012.png view_0013.png\n"
           "  panonav forget office.panonav view_0012.png --dry-run",
-          declare};
+          declare_forget};
 }
 
 }  // namespace panonav::command

@@ -179,7 +179,7 @@ ExitCode gallery(const GalleryArguments& wanted, Session& session) {
   return ExitCode::done;
 }
 
-Run declare(Arguments& arguments) {
+Run declare_gallery(Arguments& arguments) {
   auto wanted = std::make_shared<GalleryArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file");
   arguments.required_option("-o,--out FOLDER", wanted->out,
@@ -198,7 +198,7 @@ Verb gallery_verb() {
       "holds 2000 views at most; --name and --near choose which.",
       "  panonav gallery office.panonav -o gallery\n"
       "  panonav gallery office.panonav -o corner --near 1,1,0.8",
-      declare};
+      declare_gallery};
 }
 
 }  // namespace panonav::command

@@ -159,7 +159,7 @@ ExitCode home(const Arguments& arguments, const HomeArguments& wanted, Session& 
   return answer_all(wanted, guide, goal, recording, session);
 }
 
-Run declare(Arguments& arguments) {
+Run declare_home(Arguments& arguments) {
   auto wanted = std::make_shared<HomeArguments>();
   arguments.positional("GOAL", wanted->goal,
                        "Picture of the place to return to; with --memory the name or id of a view");
@@ -187,7 +187,7 @@ Verb home_verb() {
           "  panonav home door.png now.png --kind panorama --elevation-deg -30 40\n"
           "  panonav home view_00012.png now.png --memory office.panonav --report way_home\n"
           "  panonav home office_run/view_00012.png office_run --json",
-          declare};
+          declare_home};
 }
 
 }  // namespace panonav::command

@@ -116,7 +116,7 @@ ExitCode show(const std::string& path, Session& session) {
   return ExitCode::done;
 }
 
-Run declare(Arguments& arguments) {
+Run declare_info(Arguments& arguments) {
   auto path = std::make_shared<std::string>();
   arguments.positional("MEMORY", *path, "Memory file");
   return [path](Session& session) { return show(*path, session); };
@@ -125,7 +125,7 @@ Run declare(Arguments& arguments) {
 }  // namespace
 
 Verb info_verb() {
-  return {"info", "Show what a memory holds", "", "  panonav info office.panonav", declare};
+  return {"info", "Show what a memory holds", "", "  panonav info office.panonav", declare_info};
 }
 
 }  // namespace panonav::command

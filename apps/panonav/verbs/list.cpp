@@ -122,7 +122,7 @@ ExitCode list(const ListArguments& wanted, Session& session) {
   return code;
 }
 
-Run declare(Arguments& arguments) {
+Run declare_list(Arguments& arguments) {
   auto wanted = std::make_shared<ListArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file");
   declare_selection(arguments, wanted->selection);
@@ -140,7 +140,7 @@ Verb list_verb() {
           "  panonav list office.panonav\n"
           "  panonav list office.panonav --near 1,1,0.5\n"
           "  panonav list office.panonav --name 'view_0001*' --csv",
-          declare};
+          declare_list};
 }
 
 }  // namespace panonav::command

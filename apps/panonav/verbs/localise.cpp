@@ -278,7 +278,7 @@ ExitCode localise(const Arguments& arguments, const LocaliseArguments& wanted, S
   return known > 0 ? ExitCode::done : ExitCode::no_answer;
 }
 
-Run declare(Arguments& arguments) {
+Run declare_localise(Arguments& arguments) {
   auto wanted = std::make_shared<LocaliseArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file");
   arguments.positionals("INPUT", wanted->inputs,
@@ -318,7 +318,7 @@ Verb localise_verb() {
       "  panonav localise office.panonav one.png two.png -o answers.csv\n"
       "  panonav localise office.panonav view.png --json\n"
       "  panonav localise office.panonav office_run --exclude-same-file --turn-randomly 7 --json",
-      declare,
+      declare_localise,
       "localize"};
 }
 

@@ -244,7 +244,7 @@ ExitCode map(const Arguments& arguments, const MapArguments& wanted, Session& se
   return ExitCode::done;
 }
 
-Run declare(Arguments& arguments) {
+Run declare_map(Arguments& arguments) {
   auto wanted = std::make_shared<MapArguments>();
   arguments.positional("DATASET", wanted->dataset,
                        "Data set or folder of pictures, in the order in which they were taken");
@@ -297,7 +297,7 @@ Verb map_verb() {
           "  panonav map office_run office.panonav --picture map.png --graphml map.graphml\n"
           "  panonav map walk walk.panonav --camera-height-m 0.6\n"
           "  panonav map walk walk.panonav --capture-difference 0.1 --json",
-          declare};
+          declare_map};
 }
 
 }  // namespace panonav::command

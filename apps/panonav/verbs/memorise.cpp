@@ -143,7 +143,7 @@ ExitCode memorise(const Arguments& arguments, const MemoriseArguments& wanted, S
   return ExitCode::done;
 }
 
-Run declare(Arguments& arguments) {
+Run declare_memorise(Arguments& arguments) {
   auto wanted = std::make_shared<MemoriseArguments>();
   arguments.positional("INPUT", wanted->input, "Data set, folder of pictures, or one picture");
   arguments.positional("MEMORY", wanted->memory,
@@ -177,7 +177,7 @@ Verb memorise_verb() {
       "name is refused.",
       "  panonav memorise office_run office.panonav\n"
       "  panonav memorise photos walk.panonav --kind equirectangular --elevation-deg -30 40",
-      declare,
+      declare_memorise,
       "memorize"};
 }
 

@@ -262,7 +262,7 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
   return run.end == NavigationState::arrived ? ExitCode::done : ExitCode::no_answer;
 }
 
-Run declare(Arguments& arguments) {
+Run declare_navigate(Arguments& arguments) {
   auto wanted = std::make_shared<NavigateArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file of a simulated data set");
   arguments.required_option("--goal VIEW", wanted->goal, "Name or id of the view to go to");
@@ -323,7 +323,7 @@ Verb navigate_verb() {
           "  panonav navigate office.panonav --goal 3 --scene office --light 0.7 --moved-objects "
           "0.1 --json\n"
           "  panonav navigate drive.panonav --goal 60 --scene loop --route route",
-          declare};
+          declare_navigate};
 }
 
 }  // namespace panonav::command

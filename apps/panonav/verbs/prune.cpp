@@ -122,7 +122,7 @@ ExitCode prune(const Arguments& arguments, const PruneArguments& wanted, Session
   return ExitCode::done;
 }
 
-Run declare(Arguments& arguments) {
+Run declare_prune(Arguments& arguments) {
   auto wanted = std::make_shared<PruneArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file");
   arguments.flag("--dry-run", wanted->dry_run, "Say what would be dropped, and drop nothing");
@@ -145,7 +145,7 @@ Verb prune_verb() {
           "  panonav prune office.panonav --dry-run\n"
           "  panonav prune office.panonav --max-difference 0.02\n"
           "  panonav prune office.panonav --outdated-within-m 0.3",
-          declare};
+          declare_prune};
 }
 
 }  // namespace panonav::command

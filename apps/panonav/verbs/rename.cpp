@@ -51,7 +51,7 @@ ExitCode rename(const RenameArguments& wanted, Session& session) {
   return ExitCode::done;
 }
 
-Run declare(Arguments& arguments) {
+Run declare_rename(Arguments& arguments) {
   auto wanted = std::make_shared<RenameArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file");
   arguments.positional("VIEW", wanted->name, "Name or id of a view; with --route that of a route");
@@ -68,7 +68,7 @@ Verb rename_verb() {
           "former name would be memorised as another view. panonav undo takes it back.",
           "  panonav rename office.panonav view_00012.png door\n"
           "  panonav rename office.panonav route to_the_lab --route",
-          declare};
+          declare_rename};
 }
 
 }  // namespace panonav::command

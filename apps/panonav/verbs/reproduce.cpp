@@ -53,7 +53,7 @@ ExitCode reproduce(const ReproduceArguments& wanted, Session& session) {
   return ExitCode::done;
 }
 
-Run declare(Arguments& arguments) {
+Run declare_reproduce(Arguments& arguments) {
   auto wanted = std::make_shared<ReproduceArguments>();
   std::vector<std::string> papers;
   std::string names;
@@ -127,7 +127,7 @@ Verb reproduce_verb() {
           "  panonav reproduce y03 -o routes --data DATA\n"
           "  panonav reproduce all -o results --data DATA\n"
           "  panonav reproduce all -o results --data DATA --continue",
-          declare};
+          declare_reproduce};
 }
 
 }  // namespace panonav::command

@@ -181,7 +181,7 @@ ExitCode follow_run(const Arguments& arguments, const FollowArguments& wanted, S
   return summary.on_route > 0 ? ExitCode::done : ExitCode::no_answer;
 }
 
-Run declare(Arguments& arguments) {
+Run declare_route_follow(Arguments& arguments) {
   auto wanted = std::make_shared<FollowArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file with a route");
   arguments.positional("DATASET", wanted->dataset,
@@ -225,7 +225,7 @@ Verb route_follow_verb() {
           "  panonav route follow office.panonav repeat_run\n"
           "  panonav route follow office.panonav repeat_run --report followed\n"
           "  panonav route follow office.panonav repeat_run --no-odometry --json",
-          declare};
+          declare_route_follow};
 }
 
 }  // namespace panonav::command

@@ -200,7 +200,7 @@ ExitCode record(const Arguments& arguments, const RecordArguments& wanted, Sessi
   return ExitCode::done;
 }
 
-Run declare(Arguments& arguments) {
+Run declare_route_record(Arguments& arguments) {
   auto wanted = std::make_shared<RecordArguments>();
   arguments.positional("DATASET", wanted->dataset,
                        "Data set with positions or odometry, in the order of the drive");
@@ -238,7 +238,7 @@ Verb route_record_verb() {
       "  panonav route record teach_run office.panonav\n"
       "  panonav route record teach_run office.panonav --name corridor --odometry --report "
       "corridor",
-      declare};
+      declare_route_record};
 }
 
 }  // namespace panonav::command

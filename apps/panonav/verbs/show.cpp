@@ -181,7 +181,7 @@ ExitCode show(const ShowArguments& wanted, Session& session) {
   return ExitCode::done;
 }
 
-Run declare(Arguments& arguments) {
+Run declare_show(Arguments& arguments) {
   auto wanted = std::make_shared<ShowArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file");
   arguments.positional("VIEW", wanted->view, "Name or id of a view");
@@ -198,7 +198,7 @@ Verb show_verb() {
           "that are most similar and nearest to it.",
           "  panonav show office.panonav view_00012.png\n"
           "  panonav show office.panonav 13 -o view_13.png",
-          declare};
+          declare_show};
 }
 
 }  // namespace panonav::command

@@ -120,7 +120,7 @@ ExitCode simulate(const Arguments& arguments, SimulateArguments wanted, Session&
   return ExitCode::done;
 }
 
-Run declare(Arguments& arguments) {
+Run declare_simulate_verb(Arguments& arguments) {
   auto wanted = std::make_shared<SimulateArguments>();
   const auto scenes = scene_names();
   std::string names;
@@ -176,7 +176,7 @@ Verb simulate_verb() {
           "  panonav simulate office memory_run --grid 0.25\n"
           "  panonav simulate office query_run --random 20 --seed 7\n"
           "  panonav simulate house.world house_run --grid 0.5 --kind panorama",
-          declare};
+          declare_simulate_verb};
 }
 
 }  // namespace panonav::command

@@ -273,7 +273,7 @@ ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Ses
   return summary.localised > 0 ? ExitCode::done : ExitCode::no_answer;
 }
 
-Run declare(Arguments& arguments) {
+Run declare_track(Arguments& arguments) {
   auto wanted = std::make_shared<TrackArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file");
   arguments.positional(
@@ -322,7 +322,7 @@ Verb track_verb() {
           "  panonav track office.panonav run --every 10 --report report\n"
           "  panonav track office.panonav run --tum estimate.tum --json\n"
           "  panonav evaluate estimate.tum run/poses.csv --align false",
-          declare};
+          declare_track};
 }
 
 }  // namespace panonav::command

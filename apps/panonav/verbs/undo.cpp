@@ -38,7 +38,7 @@ ExitCode undo(const UndoArguments& wanted, Session& session) {
   return ExitCode::done;
 }
 
-Run declare(Arguments& arguments) {
+Run declare_undo(Arguments& arguments) {
   auto wanted = std::make_shared<UndoArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file");
   arguments.flag("--dry-run", wanted->dry_run, "Say what would be undone, and change nothing");
@@ -54,7 +54,7 @@ Verb undo_verb() {
           "them has the name of a view that comes back, or when a map was made anew.",
           "  panonav undo office.panonav --dry-run\n"
           "  panonav undo office.panonav",
-          declare};
+          declare_undo};
 }
 
 }  // namespace panonav::command

@@ -53,7 +53,7 @@ ExitCode unwrap(const UnwrapArguments& wanted, Session& session) {
   return ExitCode::done;
 }
 
-Run declare(Arguments& arguments) {
+Run declare_unwrap(Arguments& arguments) {
   auto wanted = std::make_shared<UnwrapArguments>();
   arguments.positional("IMAGE", wanted->image, "Raw mirror image, 360 degree picture or panorama");
   arguments.required_option("-o,--out", wanted->out, "PNG picture to write");
@@ -71,7 +71,7 @@ Verb unwrap_verb() {
       "The picture written runs clockwise with forward in the middle, as a person would see it.",
       "  panonav unwrap mirror.jpg --camera camera.toml -o panorama.png\n"
       "  panonav unwrap photo360.jpg --kind equirectangular --elevation-deg -30 40 -o panorama.png",
-      declare};
+      declare_unwrap};
 }
 
 }  // namespace panonav::command

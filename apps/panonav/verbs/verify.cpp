@@ -37,7 +37,7 @@ ExitCode verify(const std::string& path, Session& session) {
                             " faults, first: " + faults.front().what);
 }
 
-Run declare(Arguments& arguments) {
+Run declare_verify(Arguments& arguments) {
   auto path = std::make_shared<std::string>();
   arguments.positional("MEMORY", *path, "Memory file");
   return [path](Session& session) { return verify(*path, session); };
@@ -48,7 +48,7 @@ Run declare(Arguments& arguments) {
 Verb verify_verb() {
   return {"verify", "Check every byte of a memory that can be checked",
           "The exit code is 0 when the file is intact, and 2 when it is not.",
-          "  panonav verify office.panonav", declare};
+          "  panonav verify office.panonav", declare_verify};
 }
 
 }  // namespace panonav::command

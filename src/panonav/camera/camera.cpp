@@ -10,8 +10,6 @@
 namespace panonav {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 template <class... Functions>
 struct Overloaded : Functions... {
   using Functions::operator()...;
@@ -105,9 +103,10 @@ void validate_mirror(const Camera& camera) {
 }
 
 void validate_equirectangular(const Camera& camera, const EquirectangularModel& model) {
-  require(std::abs(model.elevation_bottom_rad) <= pi / 2, "elevation_bottom_rad",
+  require(std::abs(model.elevation_bottom_rad) <= std::numbers::pi / 2, "elevation_bottom_rad",
           model.elevation_bottom_rad, "-pi/2 .. pi/2");
-  require(model.elevation_top_rad > model.elevation_bottom_rad && model.elevation_top_rad <= pi / 2,
+  require(model.elevation_top_rad > model.elevation_bottom_rad &&
+              model.elevation_top_rad <= std::numbers::pi / 2,
           "elevation_top_rad", model.elevation_top_rad, "above elevation_bottom_rad, at most pi/2");
   require(camera.forward_column >= 0 && camera.forward_column <= 1, "forward_column",
           camera.forward_column, "0 .. 1");
@@ -138,7 +137,7 @@ std::optional<PixelPoint> project(const Camera& camera, const Direction3& direct
                         (model->elevation_top_rad - model->elevation_bottom_rad) * height;
     const auto v = within(v_px, 0, height, tolerance_px(camera));
     if (!v) return std::nullopt;
-    double turns = camera.forward_column + turn_sign(camera) * azimuth_rad / (2 * pi);
+    double turns = camera.forward_column + turn_sign(camera) * azimuth_rad / (2 * std::numbers::pi);
     turns -= std::floor(turns);
     const double u_px = turns * width;
     return PixelPoint{u_px < width ? u_px : 0.0, *v};
@@ -158,7 +157,7 @@ std::optional<Direction3> unproject(const Camera& camera, PixelPoint pixel) {
     const double elevation_rad =
         model->elevation_top_rad * (1 - t) + model->elevation_bottom_rad * t;
     const double turns = inside->u_px / camera.image_size.width - camera.forward_column;
-    return Direction3::from_angles(turn_sign(camera) * turns * 2 * pi, elevation_rad);
+    return Direction3::from_angles(turn_sign(camera) * turns * 2 * std::numbers::pi, elevation_rad);
   }
   const double right_px = inside->u_px - camera.centre.u_px;
   const double up_px = camera.centre.v_px - inside->v_px;

@@ -12,8 +12,6 @@
 namespace panonav {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 /// The longest side of the fields on which circles are climbed, and on which all of them are tried.
 constexpr int middle_side_px = 400;
 constexpr int coarse_side_px = 200;
@@ -98,10 +96,10 @@ double structure(std::span<const SmoothPlanes> images, const PixelPoint& centre,
   std::size_t count = 0;
   for (const SmoothPlanes& image : images) {
     for (double r = from_px; r <= to_px; r += std::max(1.0, (to_px - from_px) / 16)) {
-      const int steps = std::max(48, static_cast<int>(2 * pi * r / 2));
+      const int steps = std::max(48, static_cast<int>(2 * std::numbers::pi * r / 2));
       std::vector<float> last;
       for (int i = 0; i <= steps; ++i) {
-        const double angle = 2 * pi * i / steps;
+        const double angle = 2 * std::numbers::pi * i / steps;
         const double u = centre.u_px + r * std::cos(angle);
         const double v = centre.v_px + r * std::sin(angle);
         if (u < 0 || v < 0 || u >= image.width || v >= image.height) {

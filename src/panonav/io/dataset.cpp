@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::array<std::string_view, 3> kind_names{"panorama", "equirectangular", "mirror"};
-constexpr std::array<std::string_view, 2> direction_names{"clockwise", "counter-clockwise"};
+constexpr std::array<std::string_view, 2> column_directions{"clockwise", "counter-clockwise"};
 constexpr std::array<std::string_view, 8> column_names{
     "file", "stamp_s", "x_m", "y_m", "heading_deg", "odom_x_m", "odom_y_m", "odom_heading_deg"};
 
@@ -52,7 +52,7 @@ PictureSource read_source(TomlFields& images, const fs::path& folder) {
     source.layout.kept_elevations = band;
     return source;
   }
-  if (const auto direction = images.choice("columns", direction_names)) {
+  if (const auto direction = images.choice("columns", column_directions)) {
     source.layout.direction =
         *direction == 0 ? ColumnDirection::clockwise : ColumnDirection::counter_clockwise;
   }
@@ -305,7 +305,7 @@ void write_dataset(const Dataset& dataset) {
   if (source.kind != PictureKind::mirror) {
     text += "columns = \"" +
             std::string(
-                direction_names[source.layout.direction == ColumnDirection::clockwise ? 0 : 1]) +
+                column_directions[source.layout.direction == ColumnDirection::clockwise ? 0 : 1]) +
             "\"\nforward_column = " + to_text(source.layout.forward_column) + "\n";
   }
   if (band) {

@@ -12,7 +12,7 @@ namespace panonav {
 
 namespace {
 
-constexpr std::size_t file_limit_bytes = std::size_t{1} << 30U;
+constexpr std::size_t image_limit_bytes = std::size_t{1} << 30U;
 
 using Bytes = std::span<const std::uint8_t>;
 
@@ -66,12 +66,12 @@ Image decode_image(Bytes bytes, std::string_view name, const ImageLimits& limits
 }
 
 Image read_image(const std::filesystem::path& path, const ImageLimits& limits) {
-  const auto bytes = read_file(path, file_limit_bytes);
+  const auto bytes = read_file(path, image_limit_bytes);
   return decode_image(bytes, path.string(), limits);
 }
 
 ImageSize read_image_size(const std::filesystem::path& path, const ImageLimits& limits) {
-  const auto bytes = read_file(path, file_limit_bytes);
+  const auto bytes = read_file(path, image_limit_bytes);
   const std::string name = path.string();
   return format_of(bytes, name) == Format::png ? detail::png_size(bytes, name, limits)
                                                : detail::jpeg_size(bytes, name, limits);

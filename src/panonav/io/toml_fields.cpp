@@ -19,7 +19,7 @@ namespace panonav {
 
 namespace {
 
-constexpr std::size_t file_limit_bytes = 1U << 20U;
+constexpr std::size_t document_limit_bytes = 1U << 20U;
 
 TomlTable copy_of(const toml::table& table);
 
@@ -112,7 +112,7 @@ std::optional<double> as_number(const TomlValue& value) {
 }  // namespace
 
 TomlTable read_toml(const std::filesystem::path& path) {
-  const auto bytes = read_file(path, file_limit_bytes);
+  const auto bytes = read_file(path, document_limit_bytes);
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   require_plain(text, path);
   try {

@@ -16,7 +16,7 @@ namespace panonav {
 
 namespace {
 
-constexpr std::size_t file_limit_bytes = 256U << 20U;
+constexpr std::size_t trajectory_limit_bytes = 256U << 20U;
 
 std::vector<StampedPose> read_csv(const std::filesystem::path& path) {
   const CsvTable table = CsvTable::read(path);
@@ -55,7 +55,7 @@ bool parse_line(std::string_view line, std::array<double, 8>& numbers) {
 
 std::vector<StampedPose> read_trajectory(const std::filesystem::path& path) {
   if (path.extension() == ".csv") return read_csv(path);
-  const auto bytes = read_file(path, file_limit_bytes);
+  const auto bytes = read_file(path, trajectory_limit_bytes);
   std::string_view rest(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   std::vector<StampedPose> trajectory;
   std::size_t number = 0;

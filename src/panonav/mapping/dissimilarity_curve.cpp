@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kShareOfLevel = 0.95;  // where the curve counts as level, as in [M04] figure 7
 
-struct Group {
+struct DistanceGroup {
   double dissimilarity = 0.0;
   double distance = 0.0;
   double square = 0.0;  // of what the distance misses
@@ -20,13 +20,13 @@ struct Group {
 
 /// Pool adjacent violators: the rising sequence that is nearest in weighted least squares.
 template <class Value>
-void make_rising(std::vector<Group>& groups, Value value) {
+void make_rising(std::vector<DistanceGroup>& groups, Value value) {
   struct Block {
     double sum, weight;
     std::size_t size;
   };
   std::vector<Block> blocks;
-  for (Group& group : groups) {
+  for (DistanceGroup& group : groups) {
     blocks.push_back({value(group) * group.weight, group.weight, 1});
     while (blocks.size() > 1) {
       const Block& last = blocks.back();
@@ -75,11 +75,11 @@ DissimilarityCurve::DissimilarityCurve(std::span<const DissimilarityAtDistance> 
   // shrink alike.
   const std::size_t count = std::clamp<std::size_t>(
       static_cast<std::size_t>(std::sqrt(static_cast<double>(sorted.size()))), 1, 40);
-  std::vector<Group> groups(count);
+  std::vector<DistanceGroup> groups(count);
   for (std::size_t g = 0; g < count; ++g) {
     const std::size_t begin = sorted.size() * g / count;
     const std::size_t end = sorted.size() * (g + 1) / count;
-    Group& group = groups[g];
+    DistanceGroup& group = groups[g];
     group.weight = static_cast<double>(end - begin);
     for (std::size_t i = begin; i < end; ++i) {
       group.dissimilarity += sorted[i].dissimilarity / group.weight;
@@ -95,7 +95,7 @@ DissimilarityCurve::DissimilarityCurve(std::span<const DissimilarityAtDistance> 
   make_rising(
       groups, [](auto& group) -> auto& { return group.square; });
   knots_.push_back({});
-  for (const Group& group : groups) {
+  for (const DistanceGroup& group : groups) {
     if (!(group.dissimilarity > knots_.back().dissimilarity)) {
       // Views that look exactly alike: the best guess is that they are at one place.
       continue;

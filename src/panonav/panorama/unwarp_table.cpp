@@ -15,8 +15,6 @@ namespace panonav {
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 /// The upper left one of four pixels of a halved image, and the weights of all four.
 struct Tap {
   int level = 0;
@@ -63,7 +61,7 @@ class RowSampler {
       : camera_(camera),
         columns_(columns),
         top_rad_(band.top_rad),
-        column_rad_(2.0 * pi / columns),
+        column_rad_(2.0 * std::numbers::pi / columns),
         row_rad_((band.top_rad - band.bottom_rad) / rows) {}
 
   [[nodiscard]] Taps sample(int row) const {
@@ -116,7 +114,7 @@ class RowSampler {
     int down_count = 0;
     constexpr int probes = 32;
     for (int probe = 0; probe < probes; ++probe) {
-      const double azimuth_rad = 2.0 * pi * probe / probes;
+      const double azimuth_rad = 2.0 * std::numbers::pi * probe / probes;
       const auto centre = look(azimuth_rad, elevation_rad);
       if (!centre) continue;
       if (const auto beside = look(azimuth_rad + column_rad_ / 2, elevation_rad)) {

@@ -11,7 +11,6 @@ namespace panonav {
 
 namespace {
 
-constexpr float pi = std::numbers::pi_v<float>;
 constexpr int max_points = 512;  // 8 for each of 62 frequencies, rounded up to a power of two
 
 CorrelationPoint<float> evaluate(const TurnCorrelation& correlation, float turn_rad) noexcept {
@@ -78,8 +77,9 @@ float sequential_turn(const TurnCorrelation& correlation) noexcept {
       const auto i = static_cast<std::size_t>(k);
       if (!(weights[i] > 0.0F)) continue;
       const auto frequency = static_cast<float>(k);
-      const float turns = std::nearbyint((frequency * turn - differences[i]) / (2.0F * pi));
-      const float told = (differences[i] + 2.0F * pi * turns) / frequency;
+      const float turns =
+          std::nearbyint((frequency * turn - differences[i]) / (2.0F * std::numbers::pi_v<float>));
+      const float told = (differences[i] + 2.0F * std::numbers::pi_v<float> * turns) / frequency;
       turn = (sum * turn + weights[i] * told) / (sum + weights[i]);
       sum += weights[i];
     }
@@ -87,7 +87,7 @@ float sequential_turn(const TurnCorrelation& correlation) noexcept {
   };
   const float first = refined_from(differences[1]);
   if (weights[1] >= 0.1F * all / static_cast<float>(correlation.highest)) return first;
-  const float opposite = refined_from(differences[1] + pi);
+  const float opposite = refined_from(differences[1] + std::numbers::pi_v<float>);
   return correlation.at(opposite) > correlation.at(first) ? opposite : first;
 }
 
@@ -125,15 +125,18 @@ int highest_turns(const TurnCorrelation& correlation, std::span<float> turns,
   for (std::size_t i = 0; i < count; ++i) {
     const float value = real[i];
     if (!(value > real[(i + count - 1) % count] && value >= real[(i + 1) % count])) continue;
-    if (!window.contains(2.0F * pi * static_cast<float>(i) / static_cast<float>(count))) continue;
+    if (!window.contains(2.0F * std::numbers::pi_v<float> * static_cast<float>(i) /
+                         static_cast<float>(count)))
+      continue;
     std::size_t at = std::min(found, wanted);
     while (at > 0 && peaks[at - 1].value < value) --at;
     if (at >= wanted) continue;
     found = std::min(found + 1, wanted);
     for (std::size_t j = found - 1; j > at; --j) peaks[j] = peaks[j - 1];
-    peaks[at] = {value, 2.0F * pi * static_cast<float>(i) / static_cast<float>(count)};
+    peaks[at] = {value, 2.0F * std::numbers::pi_v<float> * static_cast<float>(i) /
+                            static_cast<float>(count)};
   }
-  const float half_step_rad = pi / static_cast<float>(count);
+  const float half_step_rad = std::numbers::pi_v<float> / static_cast<float>(count);
   for (std::size_t i = 0; i < found; ++i) {
     peaks[i].turn_rad = refine(correlation, peaks[i].turn_rad, half_step_rad);
     peaks[i].value = correlation.at(peaks[i].turn_rad);

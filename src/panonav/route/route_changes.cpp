@@ -11,7 +11,6 @@ namespace panonav {
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
 constexpr int min_pictures = 5;
 constexpr double usual_deviations = 3.0;
 
@@ -33,9 +32,10 @@ std::vector<AzimuthRange> RouteChanges::add(const RouteFix& fix) {
   for (std::size_t c = 0; c < columns; ++c) {
     const float value = fix.unexplained[c];
     if (!std::isfinite(value)) continue;
-    const double azimuth =
-        fix.pose.heading_rad + 2.0 * pi * static_cast<double>(c) / static_cast<double>(columns);
-    const double share = azimuth / (2.0 * pi) - std::floor(azimuth / (2.0 * pi));
+    const double azimuth = fix.pose.heading_rad + 2.0 * std::numbers::pi * static_cast<double>(c) /
+                                                      static_cast<double>(columns);
+    const double share =
+        azimuth / (2.0 * std::numbers::pi) - std::floor(azimuth / (2.0 * std::numbers::pi));
     const auto sector = std::min(sectors - 1, static_cast<std::size_t>(share * sectors));
     ++all[sector];
     above[sector] += value > limit ? 1 : 0;
@@ -55,7 +55,7 @@ std::vector<AzimuthRange> RouteChanges::add(const RouteFix& fix) {
     if (!changed(s) || changed(s + sectors - 1)) continue;
     std::size_t end = s + 1;
     while (end < s + sectors && changed(end)) ++end;
-    const double width = 2.0 * pi / sectors;
+    const double width = 2.0 * std::numbers::pi / sectors;
     ranges.push_back({wrap_angle(static_cast<double>(s) * width - fix.pose.heading_rad),
                       wrap_angle(static_cast<double>(end) * width - fix.pose.heading_rad)});
   }

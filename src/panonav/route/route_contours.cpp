@@ -17,8 +17,6 @@ namespace panonav {
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 std::vector<float> slopes(std::span<const float> line) {
   std::vector<float> result(line.size());
   for (std::size_t c = 0; c < line.size(); ++c) {
@@ -180,7 +178,7 @@ void RouteContours::move(std::vector<ContourPoint>& contour, const std::vector<C
 bool RouteContours::fit_pose(RouteContourFix& fix) const {
   using Matrix = Eigen::Matrix3d;
   using Vector = Eigen::Vector3d;
-  const double columns_per_rad = columns_ / (2.0 * pi);
+  const double columns_per_rad = columns_ / (2.0 * std::numbers::pi);
   const auto size = static_cast<long long>(columns_);
   constexpr int steps = 20;
   std::vector<double> sizes;
@@ -270,7 +268,7 @@ std::optional<RouteContourFix> RouteContours::fit(std::span<const float> line,
   }
   const auto edges = slopes(smoothed_line(line, options_.smoothing_deg * columns_ / 360.0));
   const auto crossings = curve(predicted.position());
-  const double turn = predicted.heading_rad * columns_ / (2.0 * pi);
+  const double turn = predicted.heading_rad * columns_ / (2.0 * std::numbers::pi);
   const auto size = static_cast<long long>(columns_);
   RouteContourFix fix;
   fix.pose = predicted;

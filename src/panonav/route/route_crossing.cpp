@@ -9,16 +9,13 @@
 
 namespace panonav {
 
-namespace {
-
-constexpr double pi = std::numbers::pi;
-
-}  // namespace
+namespace {}  // namespace
 
 std::vector<Direction2> equal_directions(std::size_t count) {
   std::vector<Direction2> directions(count);
   for (std::size_t c = 0; c < count; ++c) {
-    const double angle = 2.0 * pi * static_cast<double>(c) / static_cast<double>(count);
+    const double angle =
+        2.0 * std::numbers::pi * static_cast<double>(c) / static_cast<double>(count);
     directions[c] = {std::cos(angle), std::sin(angle)};
   }
   return directions;
@@ -29,7 +26,7 @@ void cross_route(std::span<const Pose2> path, std::size_t first, Point2 viewpoin
   std::ranges::fill(crossings, RouteCrossing{});
   const std::size_t count = crossings.size();
   if (path.size() < 2 || count == 0) return;
-  const double columns_per_rad = static_cast<double>(count) / (2.0 * pi);
+  const double columns_per_rad = static_cast<double>(count) / (2.0 * std::numbers::pi);
   double from = std::atan2(path[0].y_m - viewpoint.y_m, path[0].x_m - viewpoint.x_m);
   for (std::size_t i = 0; i + 1 < path.size(); ++i) {
     const double ax = path[i].x_m - viewpoint.x_m;
@@ -42,7 +39,7 @@ void cross_route(std::span<const Pose2> path, std::size_t first, Point2 viewpoin
     const double width = std::abs(span);
     from = to;
     // The stretch as seen ahead, then as it lies behind the viewpoint.
-    for (const double turned : {0.0, pi}) {
+    for (const double turned : {0.0, std::numbers::pi}) {
       const auto begin = static_cast<long long>(std::ceil((low + turned) * columns_per_rad - 1e-9));
       const auto end =
           static_cast<long long>(std::floor((low + turned + width) * columns_per_rad + 1e-9));

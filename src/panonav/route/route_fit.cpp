@@ -19,8 +19,6 @@ namespace panonav {
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 // Unknowns: x, y, heading, gain, offset.
 using Matrix = Eigen::Matrix<double, 5, 5>;
 using Vector = Eigen::Matrix<double, 5, 1>;
@@ -90,7 +88,7 @@ RouteLines::RouteLines(const RoutePanorama& route, const RouteFitOptions& option
     if (i + 1 < options.levels) {
       level.sigma = options.coarse_deg * columns_ / 360.0 / std::pow(3.0, i);
     }
-    const double sigma_rad = level.sigma * 2.0 * pi / columns_;
+    const double sigma_rad = level.sigma * 2.0 * std::numbers::pi / columns_;
     level.half_slope =
         static_cast<std::size_t>(std::lround(usual_distance_m * sigma_rad / (2.0 * spacing_m)));
     // Two a standard deviation show all that is left of a line.
@@ -145,7 +143,7 @@ bool RouteLines::collect(const Level& level, std::span<const float> seen, const 
   crossings.resize(level.directions.size());
   cross_route(std::span(poses_).subspan(window.begin, window.end - window.begin), window.begin,
               pose.position(), level.directions, crossings);
-  const double columns_per_rad = columns_ / (2.0 * pi);
+  const double columns_per_rad = columns_ / (2.0 * std::numbers::pi);
   const double turn = pose.heading_rad * columns_per_rad;
   const auto row = [&](std::size_t line) {
     return level.values.data() + line * static_cast<std::size_t>(columns_);
@@ -292,7 +290,7 @@ bool RouteLines::descend(std::span<const Level> levels, std::span<const float> l
     work.seen = smoothed_line(line, level.sigma);
     const bool last = &level == &levels_.back();
     const double near_enough_m =
-        last ? 3e-4 : 0.05 * usual_distance_m * level.sigma * 2.0 * pi / columns_;
+        last ? 3e-4 : 0.05 * usual_distance_m * level.sigma * 2.0 * std::numbers::pi / columns_;
     for (int step = 0; step < options_.max_steps; ++step) {
       if (!collect(level, work.seen, pose, near, work.crossings, work.terms)) return false;
       const auto normal = linearise(work.terms, work.scratch);
@@ -367,7 +365,7 @@ std::optional<RouteFix> RouteLines::fit(std::span<const float> line, const Pose2
   }
   fix.noise = normal->noise;
   const int shift = std::max(1, columns_ / 360);
-  const double turn = fix.pose.heading_rad * columns_ / (2.0 * pi);
+  const double turn = fix.pose.heading_rad * columns_ / (2.0 * std::numbers::pi);
   const auto left =
       what_no_shift_explains(work.terms, line.size(), normal->gain, normal->offset, shift);
   fix.unexplained.resize(line.size());
@@ -391,7 +389,7 @@ std::vector<float> RouteLines::synthesise(const Pose2& pose) const {
   for (std::size_t c = 0; c < line.size(); ++c) {
     if (crossings[c].along >= 0.0F) world[c] = shown(levels_.back(), crossings[c].along, c);
   }
-  const double turn = pose.heading_rad * columns_ / (2.0 * pi);
+  const double turn = pose.heading_rad * columns_ / (2.0 * std::numbers::pi);
   for (std::size_t c = 0; c < line.size(); ++c) {
     line[c] = sample_line(world, static_cast<double>(c) + turn).value;
   }

@@ -15,8 +15,6 @@ namespace panonav {
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 // Smoothing by 8 degrees leaves nothing that 48 columns do not show.
 constexpr std::size_t coarse_columns = 48;
 
@@ -99,8 +97,9 @@ std::optional<RouteLines::Candidate> RouteLines::candidate(std::span<const float
   if (2 * count < coarse_columns) return std::nullopt;
   const Correlation best = best_turn(shown_there, coarse_line);
   if (!(best.value > -1.0)) return std::nullopt;
-  return Candidate{{position.x_m, position.y_m, wrap_angle(best.turn * 2.0 * pi / coarse_columns)},
-                   best.value};
+  return Candidate{
+      {position.x_m, position.y_m, wrap_angle(best.turn * 2.0 * std::numbers::pi / coarse_columns)},
+      best.value};
 }
 
 }  // namespace panonav

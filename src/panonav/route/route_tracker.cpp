@@ -13,11 +13,7 @@
 
 namespace panonav {
 
-namespace {
-
-constexpr double pi = std::numbers::pi;
-
-}  // namespace
+namespace {}  // namespace
 
 void visit_options(RouteTrackerOptions& options, OptionVisitor& visitor) {
   using T = RouteTrackerOptions;
@@ -88,7 +84,7 @@ std::optional<RouteFix> RouteTracker::recover(std::span<const float> line,
   for (int ring = 0; ring <= rings; ++ring) {
     for (int k = 0; k < (ring == 0 ? 1 : around); ++k) {
       const double off = options_.recovery_m * ring / rings;
-      const double angle = 2.0 * pi * k / around;
+      const double angle = 2.0 * std::numbers::pi * k / around;
       const auto found = lines_.candidate(
           coarse, {predicted.x_m + off * std::cos(angle), predicted.y_m + off * std::sin(angle)});
       if (found && (!start || found->correlation > start->correlation)) start = found;

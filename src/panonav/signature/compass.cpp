@@ -18,8 +18,6 @@ namespace panonav {
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 /// The terms of C(sigma) (`CorrelationPoint`); entry 0 is 0.
 struct CrossSpectrum {
   std::vector<double> real, imaginary;
@@ -47,9 +45,10 @@ struct SineCosine {
 /// |angle| <= 4 pi; absolute error below 1e-6. Branch-free, so that the compiler can do several at
 /// once.
 inline SineCosine sine_cosine(float angle_rad) {
-  const float quarters = angle_rad * static_cast<float>(2.0 / pi);
+  const float quarters = angle_rad * static_cast<float>(2.0 / std::numbers::pi);
   const int quadrant = static_cast<int>(quarters + 8.5F) - 8;
-  const float x = (quarters - static_cast<float>(quadrant)) * static_cast<float>(pi / 2.0);
+  const float x =
+      (quarters - static_cast<float>(quadrant)) * static_cast<float>(std::numbers::pi / 2.0);
   const float z = x * x;
   const float s = x * (1.0F + z * (-1.0F / 6 + z * (1.0F / 120 + z * (-1.0F / 5040))));
   const float c = 1.0F + z * (-0.5F + z * (1.0F / 24 + z * (-1.0F / 720 + z * (1.0F / 40320))));
@@ -116,8 +115,9 @@ std::optional<CrossSpectrum> cross_spectrum(const PackedSignature& query,
   static const auto turns = [] {
     std::array<Turn, 256> table{};
     for (int i = 0; i < 256; ++i) {
-      table[i] = {static_cast<std::int32_t>(std::lround(16384.0 * std::cos(pi * i / 128.0))),
-                  static_cast<std::int32_t>(std::lround(16384.0 * std::sin(pi * i / 128.0)))};
+      table[i] = {
+          static_cast<std::int32_t>(std::lround(16384.0 * std::cos(std::numbers::pi * i / 128.0))),
+          static_cast<std::int32_t>(std::lround(16384.0 * std::sin(std::numbers::pi * i / 128.0)))};
     }
     return table;
   }();
@@ -188,7 +188,7 @@ std::vector<Peak> highest_peaks(const CrossSpectrum& spectrum) {
   float* const sine = cosine + size;
   float* const real = sine + size;
   float* const imaginary = real + size;
-  const std::complex<double> step = std::polar(1.0, 2.0 * pi / count);
+  const std::complex<double> step = std::polar(1.0, 2.0 * std::numbers::pi / count);
   std::complex<double> turn = 1.0;
   for (std::size_t i = 0; i < size; ++i) {
     cosine[i] = static_cast<float>(turn.real());
@@ -225,7 +225,7 @@ std::vector<Peak> highest_peaks(const CrossSpectrum& spectrum) {
   // By Bernstein's inequality C rises by at most (highest * half a step)^2 / 2 <= 0.08 of its
   // maximum between a maximum and the nearest point of the grid.
   std::vector<Peak> peaks;
-  const double grid_step = 2.0 * pi / count;
+  const double grid_step = 2.0 * std::numbers::pi / count;
   const float margin = candidates.empty() ? 0.0F : 0.1F * candidates.front().value;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     if (i >= 2 && candidates[i].value + margin < candidates[1].value) break;
@@ -267,11 +267,13 @@ std::optional<CompassReading> compass(const PackedSignature& query,
 std::optional<CompassReading> compass_near(const PackedSignature& query,
                                            const PackedSignature& reference, double heading_rad,
                                            double within_rad, const CompassOptions& options) {
-  require(within_rad > 0.0 && within_rad <= pi, "within_rad", within_rad, "above 0 .. pi");
+  require(within_rad > 0.0 && within_rad <= std::numbers::pi, "within_rad", within_rad,
+          "above 0 .. pi");
   const auto spectrum = cross_spectrum(query, reference, options);
   if (!spectrum) return {};
   // As fine as `highest_peaks` looks.
-  const int steps = 1 + static_cast<int>(std::ceil(within_rad * 8.0 * spectrum->highest() / pi));
+  const int steps =
+      1 + static_cast<int>(std::ceil(within_rad * 8.0 * spectrum->highest() / std::numbers::pi));
   const double step = 2.0 * within_rad / steps;
   const double first = heading_rad - within_rad;
   std::vector<Point> points;

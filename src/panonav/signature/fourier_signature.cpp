@@ -14,13 +14,11 @@ namespace panonav {
 
 namespace {
 
-constexpr float pi = std::numbers::pi_v<float>;
-
 /// The invariant asks for phases below pi, but the float nearest to an angle just below pi is pi
 /// itself.
 float wrap_phase(double phase_rad) {
   const float phase = static_cast<float>(wrap_angle(phase_rad));
-  return phase >= pi ? -pi : phase;
+  return phase >= std::numbers::pi_v<float> ? -std::numbers::pi_v<float> : phase;
 }
 
 void check_full_scale(float full_scale) {
@@ -47,7 +45,8 @@ FourierSignature::FourierSignature(SignatureShape shape, std::vector<float> magn
     const float magnitude = magnitudes_[i];
     const float phase = phases_rad_[i];
     require(magnitude >= 0.0F && std::isfinite(magnitude), "magnitude", magnitude, "finite, >= 0");
-    require(phase >= -pi && phase < pi, "phase", phase, "[-pi, pi)");
+    require(phase >= -std::numbers::pi_v<float> && phase < std::numbers::pi_v<float>, "phase",
+            phase, "[-pi, pi)");
     require(magnitude != 0.0F || phase == 0.0F, "phase of magnitude 0", phase, "0");
   }
 }
@@ -91,7 +90,7 @@ PackedSignature pack(const FourierSignature& signature, float full_scale) {
   PackedSignature packed{signature.shape(), std::vector<std::uint8_t>(size),
                          std::vector<std::uint8_t>(size)};
   const float scale = 255.0F / full_scale;
-  constexpr float steps = 128.0F / pi;
+  constexpr float steps = 128.0F / std::numbers::pi_v<float>;
   for (std::size_t i = 0; i < size; ++i) {
     const float magnitude = std::min(signature.magnitudes()[i] * scale, 255.0F);
     packed.magnitudes[i] = static_cast<std::uint8_t>(magnitude + 0.5F);
@@ -115,10 +114,10 @@ FourierSignature unpack(const PackedSignature& packed, float full_scale,
   std::vector<float> phases(size);
   for (std::size_t i = 0; i < size; ++i) {
     magnitudes[i] = static_cast<float>(packed.magnitudes[i]) * (full_scale / 255.0F);
-    phases[i] =
-        packed.magnitudes[i] == 0
-            ? 0.0F
-            : static_cast<float>(static_cast<std::int8_t>(packed.phases[i])) * (pi / 128.0F);
+    phases[i] = packed.magnitudes[i] == 0
+                    ? 0.0F
+                    : static_cast<float>(static_cast<std::int8_t>(packed.phases[i])) *
+                          (std::numbers::pi_v<float> / 128.0F);
   }
   return {packed.shape, std::move(magnitudes), std::move(phases), elevations};
 }

@@ -14,12 +14,11 @@
 namespace panonav {
 namespace {
 
-constexpr double pi = std::numbers::pi;
 constexpr int coarse_directions = 96;
 
 /// One sample for each `spacing` of circumference, 48 to 720.
 int samples_on(double radius, double spacing) {
-  return std::clamp(static_cast<int>(2 * pi * radius / spacing), 48, 720);
+  return std::clamp(static_cast<int>(2 * std::numbers::pi * radius / spacing), 48, 720);
 }
 
 std::size_t index(int width, int u, int v) {
@@ -55,7 +54,7 @@ struct Direction {
 std::array<Direction, coarse_directions> directions() {
   std::array<Direction, coarse_directions> result{};
   for (int i = 0; i < coarse_directions; ++i) {
-    const double angle = 2 * pi * i / coarse_directions;
+    const double angle = 2 * std::numbers::pi * i / coarse_directions;
     result[static_cast<std::size_t>(i)] = {std::cos(angle), std::sin(angle),
                                            static_cast<float>(std::cos(2 * angle)),
                                            static_cast<float>(std::sin(2 * angle))};
@@ -296,8 +295,8 @@ CircleScore score(const EdgeField& field, const FieldCircle& circle, Evenness ev
   const int count = samples_on(circle.radius, 3.0);
   SectorScore total;
   // One turn in equal steps by rotating a unit vector; the rounding of 720 steps stays below 1e-12.
-  const double step_cosine = std::cos(2 * pi / count);
-  const double step_sine = std::sin(2 * pi / count);
+  const double step_cosine = std::cos(2 * std::numbers::pi / count);
+  const double step_sine = std::sin(2 * std::numbers::pi / count);
   double next_cosine = 1;
   double next_sine = 0;
   for (int i = 0; i < count; ++i) {
@@ -452,7 +451,7 @@ std::optional<CircleFit> fit_circle(std::span<const SmoothPlanes> images,
     std::vector<EdgePoint> points;
     int visible = 0;
     for (int i = 0; i < count; ++i) {
-      const double angle = 2 * pi * i / count;
+      const double angle = 2 * std::numbers::pi * i / count;
       const double u = circle.u + circle.radius * std::cos(angle);
       const double v = circle.v + circle.radius * std::sin(angle);
       if (u < 1 || v < 1 || u > images[0].width - 1 || v > images[0].height - 1) continue;

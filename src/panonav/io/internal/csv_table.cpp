@@ -11,7 +11,7 @@ namespace panonav {
 
 namespace {
 
-constexpr std::size_t file_limit_bytes = 64U << 20U;
+constexpr std::size_t table_limit_bytes = 64U << 20U;
 
 std::string_view trimmed(std::string_view text) {
   const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
@@ -54,7 +54,7 @@ std::optional<std::vector<std::string>> split(std::string_view line) {
 }  // namespace
 
 CsvTable CsvTable::read(const std::filesystem::path& path) {
-  const auto bytes = read_file(path, file_limit_bytes);
+  const auto bytes = read_file(path, table_limit_bytes);
   std::string_view rest(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   // A byte order mark is how some programs begin a table.
   if (rest.starts_with("\xEF\xBB\xBF")) rest.remove_prefix(3);

@@ -16,14 +16,13 @@ namespace {
 
 using Pixels = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-constexpr double pi = std::numbers::pi;
-constexpr int columns = 64;
-constexpr int fine_columns = 256;  // of the view that is looked up between columns
+constexpr int coarse_columns = 64;
+constexpr int fine_columns = 256;  // of the view that is looked up between coarse_columns
 constexpr int iterations = 4;
 constexpr int min_bands = 4;
 // Nearer to the horizon the ground is far and walls begin.
-constexpr double highest_elevation_rad = -10.0 * pi / 180.0;
-constexpr double band_height_rad = 1.75 * pi / 180.0;
+constexpr double highest_elevation_rad = -10.0 * std::numbers::pi / 180.0;
+constexpr double band_height_rad = 1.75 * std::numbers::pi / 180.0;
 
 // Rows below the horizon, averaged to bands.
 struct GroundBands {
@@ -49,9 +48,9 @@ std::optional<GroundBands> ground_bands(const HomingView& view) {
   return made;
 }
 
-// Bands x columns. The mean of a row belongs to it: the ground moves from row to row.
+// Bands x coarse_columns. The mean of a row belongs to it: the ground moves from row to row.
 Pixels sampled(const HomingView& view, const GroundBands& ground, int count) {
-  const int highest = std::min(view.components(), columns / 2) - 1;
+  const int highest = std::min(view.components(), coarse_columns / 2) - 1;
   Pixels cosines = Pixels::Zero(ground.bands, highest);
   Pixels sines = Pixels::Zero(ground.bands, highest);
   const float share = 1.0F / static_cast<float>(ground.rows_per_band);
@@ -64,7 +63,7 @@ Pixels sampled(const HomingView& view, const GroundBands& ground, int count) {
   std::vector<float> cosine(static_cast<std::size_t>(count));
   std::vector<float> sine(static_cast<std::size_t>(count));
   for (int c = 0; c < count; ++c) {
-    const double angle = 2.0 * pi * c / count;
+    const double angle = 2.0 * std::numbers::pi * c / count;
     cosine[static_cast<std::size_t>(c)] = static_cast<float>(std::cos(angle));
     sine[static_cast<std::size_t>(c)] = static_cast<float>(std::sin(angle));
   }
@@ -95,18 +94,18 @@ class Ground {
  public:
   Ground(const HomingView& before, const HomingView& after, const GroundBands& bands)
       : bands_(bands),
-        later_(sampled(after, bands, columns)),
+        later_(sampled(after, bands, coarse_columns)),
         earlier_(sampled(before, bands, fine_columns)) {}
 
   [[nodiscard]] std::size_t pixels() const {
-    return static_cast<std::size_t>(bands_.bands) * columns;
+    return static_cast<std::size_t>(bands_.bands) * coarse_columns;
   }
 
   // Equations of the pixels whose point both views show.
   void linearise(const Pose2& motion, std::vector<Equation>& equations) const {
     equations.clear();
-    for (int c = 0; c < columns; ++c) {
-      const double azimuth = 2.0 * pi * c / columns + motion.heading_rad;
+    for (int c = 0; c < coarse_columns; ++c) {
+      const double azimuth = 2.0 * std::numbers::pi * c / coarse_columns + motion.heading_rad;
       const Eigen::Vector2d direction(std::cos(azimuth), std::sin(azimuth));
       for (int band = 0; band < bands_.bands; ++band) {
         const double away = -1.0 / std::tan(bands_.first_rad - band * bands_.step_rad);
@@ -123,7 +122,7 @@ class Ground {
     if (!(distance > 1e-3)) return std::nullopt;
     const double row = (bands_.first_rad + std::atan(1.0 / distance)) / bands_.step_rad;
     if (!(row >= 0.0) || row > bands_.bands - 1) return std::nullopt;
-    double column = std::atan2(point.y(), point.x()) / (2.0 * pi) * fine_columns;
+    double column = std::atan2(point.y(), point.x()) / (2.0 * std::numbers::pi) * fine_columns;
     if (column < 0.0) column += fine_columns;
     // Between four pixels.
     const int r = std::min(static_cast<int>(row), bands_.bands - 2);
@@ -135,7 +134,7 @@ class Ground {
     const double lower = (1.0 - along) * earlier_(r + 1, left) + along * earlier_(r + 1, right);
     const double over_azimuth = ((1.0 - down) * (earlier_(r, right) - earlier_(r, left)) +
                                  down * (earlier_(r + 1, right) - earlier_(r + 1, left))) *
-                                (fine_columns / (2.0 * pi));
+                                (fine_columns / (2.0 * std::numbers::pi));
     const double over_elevation = (upper - lower) / bands_.step_rad;
     const double squared = distance * distance;
     return Equation{.difference = value - (1.0 - down) * upper - down * lower,
@@ -180,7 +179,7 @@ std::optional<GroundDisplacement> solve(const Ground& ground, const Pose2& start
       const Eigen::Vector2d along = length > 0.0
                                         ? Eigen::Vector2d(motion.x_m / length, motion.y_m / length)
                                         : Eigen::Vector2d(1.0, 0.0);
-      // The shortest wave of 15 components covers four columns, which say the same.
+      // The shortest wave of 15 components covers four coarse_columns, which say the same.
       const double variance = 4.0 * left / weights;
       return GroundDisplacement{motion.x_m, motion.y_m,
                                 std::sqrt(variance * along.dot(covariance * along)), middle};

@@ -16,7 +16,7 @@ namespace panonav {
 namespace {
 
 // A vector of less confidence is as likely as not but the error of reading it.
-constexpr double min_confidence = 0.5;
+constexpr double min_way_back_confidence = 0.5;
 // How a robot that is obstructed tries to get past: so many times before the way counts as blocked.
 constexpr std::array<double, 5> detours_rad{0.0, 0.7, -0.7, 1.3, -1.3};
 // Edges that cross a bar lie within so many of its place.
@@ -133,7 +133,7 @@ void Navigator::Core::notice_obstacles(Step& step) {
   if (last.direction_rad && last.view) {
     const HomeVector back = home_vector_unchecked(*last.view, step.view.view, short_way);
     // The robot stood. Along a route steps may be short, and lines tell the place.
-    obstruction.now |= !pilot.drives() && back.confidence < min_confidence &&
+    obstruction.now |= !pilot.drives() && back.confidence < min_way_back_confidence &&
                        image_difference(*last.view, step.view.view) <
                            0.5 * std::min(scales.place.neighbours, scales.coarse.neighbours);
     step.heading_for_rad = wrap_angle(*last.direction_rad + back.heading_rad);

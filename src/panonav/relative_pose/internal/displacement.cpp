@@ -13,7 +13,6 @@ namespace panonav {
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
 constexpr std::size_t size = max_displaced_frequencies + 1;
 
 // Displacements by n rings must leave n^2 % less than none.
@@ -44,7 +43,8 @@ void fill(Operator& filled, double rho) {
   std::vector<float> from_cosine(points * size), from_sine(points * size);
   std::vector<float> to_cosine(points * size), to_sine(points * size);
   for (std::size_t i = 0; i < points; ++i) {
-    const double phi = 2.0 * pi * static_cast<double>(i) / static_cast<double>(points);
+    const double phi =
+        2.0 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(points);
     const double seen = phi - std::asin(rho * std::sin(phi));
     for (std::size_t k = 0; k < size; ++k) {
       const auto frequency = static_cast<double>(k);
@@ -78,8 +78,8 @@ const Tables& tables() {
     }
     for (std::size_t d = 0; d < Displacement::directions; ++d) {
       for (std::size_t k = 0; k < size; ++k) {
-        const double angle =
-            2.0 * pi * static_cast<double>(d * k) / static_cast<double>(Displacement::directions);
+        const double angle = 2.0 * std::numbers::pi * static_cast<double>(d * k) /
+                             static_cast<double>(Displacement::directions);
         one[0].cosines[d][k] = static_cast<float>(std::cos(angle));
         one[0].sines[d][k] = static_cast<float>(std::sin(angle));
       }
@@ -96,7 +96,7 @@ double Displacement::length() const noexcept {
 }
 
 double Displacement::direction_rad() const noexcept {
-  return 2.0 * pi * direction / directions;
+  return 2.0 * std::numbers::pi * direction / directions;
 }
 
 void displace(Displacement displacement, std::span<const float> from_a,

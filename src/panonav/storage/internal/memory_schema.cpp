@@ -15,6 +15,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/storage/checksum.hpp"
+#include "panonav/storage/internal/write_ahead_log.hpp"
 
 namespace panonav {
 
@@ -85,11 +86,6 @@ constexpr std::string_view sequence = "CREATE TABLE sqlite_sequence(name,seq)";
 constexpr std::string_view names_index = "sqlite_autoindex_views_1";
 // The second end of a link, so that a view's links are found from either.
 constexpr const char* links_index = "CREATE INDEX links_b ON links(b)";
-
-std::uint32_t big_endian(const std::uint8_t* from) {
-  return (std::uint32_t{from[0]} << 24U) | (std::uint32_t{from[1]} << 16U) |
-         (std::uint32_t{from[2]} << 8U) | from[3];
-}
 
 std::string hexadecimal(std::uint32_t value) {
   constexpr char digits[] = "0123456789abcdef";

@@ -36,11 +36,6 @@ struct FileMark {
   Mark now{};
 };
 
-std::uint32_t big_endian(const std::uint8_t* from) {
-  return (std::uint32_t{from[0]} << 24U) | (std::uint32_t{from[1]} << 16U) |
-         (std::uint32_t{from[2]} << 8U) | from[3];
-}
-
 std::uint32_t little_endian(const std::uint8_t* from) {
   return (std::uint32_t{from[3]} << 24U) | (std::uint32_t{from[2]} << 16U) |
          (std::uint32_t{from[1]} << 8U) | from[0];

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 
 namespace panonav {
@@ -12,5 +13,11 @@ namespace panonav {
 /// is the file's own if and only if the file's mark is the one before the log's first change, or
 /// that of one of its changes: these are in the file already. Cost: one pass over the log.
 void require_own_log(const std::filesystem::path& file);
+
+/// Four bytes of a file of SQLite as a number: the most significant byte comes first.
+inline std::uint32_t big_endian(const std::uint8_t* from) {
+  return (std::uint32_t{from[0]} << 24U) | (std::uint32_t{from[1]} << 16U) |
+         (std::uint32_t{from[2]} << 8U) | from[3];
+}
 
 }  // namespace panonav
