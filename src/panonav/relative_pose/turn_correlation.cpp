@@ -14,9 +14,9 @@ namespace {
 constexpr int max_points = 512;  // 8 for each of 62 frequencies, rounded up to a power of two
 
 CorrelationPoint<float> evaluate(const TurnCorrelation& correlation, float turn_rad) noexcept {
-  const std::size_t size = static_cast<std::size_t>(correlation.highest) + 1;
-  return correlation_at<float>(std::span(correlation.real).first(size),
-                               std::span(correlation.imaginary).first(size), turn_rad);
+  const std::size_t count = static_cast<std::size_t>(correlation.highest) + 1;
+  return correlation_at<float>(std::span(correlation.real).first(count),
+                               std::span(correlation.imaginary).first(count), turn_rad);
 }
 
 // From a point of the grid to the maximum beside it.

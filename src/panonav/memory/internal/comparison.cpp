@@ -53,8 +53,8 @@ Comparison::Comparison(const SearchedViews& searched, const PackedSignature& que
     excluded_rows_.push_back(searched.rows[found - searched.views.begin()]);
   }
   std::ranges::sort(excluded_rows_);
-  const auto repeated = std::ranges::unique(excluded_rows_);
-  excluded_rows_.erase(repeated.begin(), repeated.end());
+  excluded_rows_.erase(std::unique(excluded_rows_.begin(), excluded_rows_.end()),
+                       excluded_rows_.end());
 }
 
 }  // namespace panonav
