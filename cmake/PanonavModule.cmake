@@ -80,11 +80,12 @@ function(panonav_warnings target)
                                            -Wno-missing-field-initializers)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
     # gcc 12 warns of overlaps in std::string operations where there are none (its bugs 105651 and 105329).
-    target_compile_options(${target} PRIVATE -Wno-restrict -Wno-stringop-overflow)
+    target_compile_options(${target} PRIVATE -Wno-restrict -Wno-stringop-overflow -Wno-array-bounds)
   endif()
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_UNITY_BUILD)
-    # A source that is compiled with others looks like a header, whose types must not use unnamed namespaces.
-    target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
+    # A source that is compiled with others looks like a header, whose types must not use unnamed namespaces, and what
+    # is global in one must not forbid local names in another.
+    target_compile_options(${target} PRIVATE -Wno-subobject-linkage -Wno-shadow -Wshadow=local)
   endif()
   if(PANONAV_WERROR)
     target_compile_options(${target} PRIVATE -Werror)

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* first_picture = "query_1.png";
+constexpr const char* first_page_picture = "query_1.png";
 constexpr std::size_t max_shown = 20;
 constexpr std::size_t max_rows = 500;
 constexpr std::size_t max_references = 5000;  // on a map
@@ -164,7 +164,7 @@ void add_table(ReportPage& page, const std::vector<LocalisedQuery>& queries) {
 }  // namespace
 
 void prepare_localise_report(const fs::path& folder) {
-  prepare_report_folder(folder, first_picture, "localise");
+  prepare_report_folder(folder, first_page_picture, "localise");
 }
 
 void write_localise_report(const fs::path& folder, const MemoryFile& file,
