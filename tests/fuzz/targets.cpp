@@ -135,7 +135,9 @@ std::vector<std::uint8_t> good_memory() {
     MemoryFile file = MemoryFile::create(path, header);
     std::vector<ViewId> views;
     for (const char* name : {"a", "b", "c"}) {
-      NewView view{{name, ReferencePose{1.0, 2.0, 0.5}, 3.0}, {}, {1, 2, 3}};
+      NewView view;
+      view.info = {name, ReferencePose{1.0, 2.0, 0.5}, 3.0};
+      view.thumbnail = {1, 2, 3};
       view.signature = pack(FourierSignature({2, 3}, {0.5F, 0.1F, 0.2F, 0.4F, 0.3F, 0.2F},
                                              std::vector<float>(6), std::nullopt),
                             1.0F);
