@@ -142,7 +142,9 @@ void add_table(ReportPage& page, const std::vector<LocalisedQuery>& queries) {
   std::vector<std::vector<std::string>> rows;
   for (std::size_t i = 0; i < std::min(max_rows, queries.size()); ++i) {
     const LocalisedQuery& query = queries[i];
-    const auto& [known, matches, position, heading, components, read, areas] = query.place;
+    const auto& matches = query.place.matches;
+    const auto& position = query.place.position;
+    const auto& heading = query.place.heading_rad;
     const auto difference = [&](std::size_t match) {
       return match < matches.size() ? fixed(matches[match].column_difference, 3) : "";
     };
