@@ -157,6 +157,14 @@ std::string zsh_values(const ArgumentInfo& argument) {
   return text;
 }
 
+/// Of the verb that a first word stands for.
+std::string summary_of(std::string_view word, std::span<const Description> verbs) {
+  const auto found = std::ranges::find_if(verbs, [word](const Description& description) {
+    return description.verb.name == word || description.verb.alias == word;
+  });
+  return std::string(found == verbs.end() ? "Verbs of two words" : found->verb.summary);
+}
+
 std::string zsh_script(std::span<const Description> verbs) {
   std::string script =
       "#compdef panonav\n"
@@ -166,11 +174,7 @@ std::string zsh_script(std::span<const Description> verbs) {
       "  local -a verbs\n"
       "  if (( CURRENT == 2 )); then\n    verbs=(\n";
   for (const auto& word : first_words(verbs)) {
-    const auto found = std::ranges::find_if(verbs, [&](const Description& description) {
-      return description.verb.name == word || description.verb.alias == word;
-    });
-    const std::string summary(found == verbs.end() ? "Verbs of two words" : found->verb.summary);
-    script += "      '" + word + ":" + quoted(summary, "") + "'\n";
+    script += "      '" + word + ":" + quoted(summary_of(word, verbs), "") + "'\n";
   }
   script += "    )\n    _describe verb verbs\n    return\n  fi\n";
   for (const auto& [first, seconds] : second_words(verbs)) {
@@ -227,11 +231,8 @@ std::string fish_script(std::span<const Description> verbs) {
       "end\n"
       "complete -c panonav -f\n";
   for (const auto& word : first_words(verbs)) {
-    const auto found = std::ranges::find_if(verbs, [&](const Description& description) {
-      return description.verb.name == word || description.verb.alias == word;
-    });
     script += "complete -c panonav -n __fish_use_subcommand -a " + word + " -d " +
-              fish_quoted(found == verbs.end() ? "Verbs of two words" : found->verb.summary) + "\n";
+              fish_quoted(summary_of(word, verbs)) + "\n";
   }
   for (const auto& [first, seconds] : second_words(verbs)) {
     script += "complete -c panonav -n '__panonav_verb " + first +
