@@ -56,6 +56,28 @@ TEST_F(Home, EveryPictureOfADataSetPointsThere) {
   EXPECT_GE(homeward / static_cast<double>(all.size()), 0.8);
 }
 
+TEST_F(Home, WhatNeedsElevationsIsRefusedWhereTheyAreUnknown) {
+  write_file(folder / "run/dataset.toml",
+             std::string_view("[images]\nkind = \"panorama\"\ncolumns = \"clockwise\"\n"
+                              "forward_column = 0.5\n[poses]\nfile = \"poses.csv\"\n"));
+  std::vector<std::vector<std::string>> verbs{{"home", folder / "run" / view_name(0)}};
+#ifdef PANONAV_COMMAND_SIMULATES
+  verbs.push_back({"catchment"});
+  verbs.push_back({"catchment", "--ahead", "1"});
+#endif
+  for (auto words : verbs) {
+    words.push_back(folder / "run");
+    EXPECT_NE(run_panonav(words).exit_code, 2) << words.front();
+    for (const std::string option : {"--tilt", "--vertical-motion"}) {
+      auto with_option = words;
+      with_option.insert(with_option.end(), {option, "false"});
+      const auto refused = run_panonav(with_option);
+      EXPECT_EQ(refused.exit_code, 2);
+      EXPECT_NE(refused.err.find(option + " has no effect"), std::string::npos) << refused.err;
+    }
+  }
+}
+
 TEST_F(Home, APictureOfADataSetLiesAsItSays) {
   const auto both =
       answer_of({"home", folder / "home.png", folder / ("run/" + view_name(0)), "--json"});

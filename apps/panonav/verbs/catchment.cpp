@@ -229,10 +229,12 @@ ExitCode catchment(const Arguments& arguments, const CatchmentArguments& wanted,
 
   if (wanted.ahead) {
     const auto views = read_views(recording, wanted.homing, wanted.turn_seed, session);
+    refuse_unused_rise(arguments, views.views.front(), wanted.dataset);
     return look_ahead(wanted, views, settings.homing, session);
   }
   const auto goals = read_views(recording, wanted.homing, std::nullopt, session);
   check_posed(goals, wanted.dataset);
+  refuse_unused_rise(arguments, goals.views.front(), wanted.dataset);
   const std::size_t goal = shown_goal(wanted, goals);
   const auto places =
       read_views(second ? *second : recording, wanted.homing, wanted.turn_seed, session);

@@ -129,6 +129,7 @@ ExitCode home_from_memory(const Arguments& arguments, const HomeArguments& wante
   const HomingGuide guide(file, wanted.goal, recording.source,
                           homing_options(arguments, wanted.homing, components), components,
                           wanted.homing.views.horizon);
+  refuse_unused_rise(arguments, guide.goal(), *wanted.memory);
   const Goal goal{guide.goal_name(), file.load({&view, 1}).info(view).pose, guide.goal(),
                   wanted.report ? thumbnail_panorama(file, view) : std::nullopt};
   return answer_all(wanted, guide, goal, recording, session);
@@ -155,6 +156,7 @@ ExitCode home(const Arguments& arguments, const HomeArguments& wanted, Session& 
   const HomingEncoder encoder(goals.source, views);
   const Panorama picture = encoder.panorama(read_observation(goals.entries.front()));
   const Goal goal{wanted.goal, std::nullopt, encoder.view(picture), picture};
+  refuse_unused_rise(arguments, goal.view, goal.name);
   const HomingGuide guide(HomingEncoder(recording.source, views), goal.name, goal.view, options);
   return answer_all(wanted, guide, goal, recording, session);
 }

@@ -6,6 +6,12 @@
 
 namespace panonav::command {
 
+namespace {
+
+const std::vector<std::string> rise{"--vertical-motion", "--tilt"};
+
+}  // namespace
+
 void declare_homing(Arguments& arguments, HomingArguments& wanted) {
   arguments.flag("--horizon", wanted.views.horizon,
                  "Compare one row only, the mean of the rows within 5 degrees of the horizon (all "
@@ -21,7 +27,6 @@ void declare_homing(Arguments& arguments, HomingArguments& wanted) {
   arguments.used_only(
       {"--starting-estimates"}, [&wanted] { return wanted.homing.turn == TurnEstimate::global; },
       "with --turn sequential");
-  const std::vector<std::string> rise{"--vertical-motion", "--tilt"};
   arguments.used_only(
       rise, [&wanted] { return !wanted.views.horizon; }, "with --horizon");
 }
@@ -46,6 +51,15 @@ FourierHomingOptions homing_options(const Arguments& arguments, const HomingArgu
                         "1 to " + std::to_string(most) + ", components less two");
   }
   return options;
+}
+
+void refuse_unused_rise(const Arguments& arguments, const HomingView& view,
+                        const std::string& name) {
+  if (view.elevations() && view.rows() >= 3) return;
+  const std::string why = view.elevations()
+                              ? " has fewer than three rows"
+                              : " does not tell the elevations of its rows (elevation_deg)";
+  arguments.refuse_unused(rise, "where " + name + why);
 }
 
 }  // namespace panonav::command
