@@ -110,6 +110,61 @@ TEST_F(MeshFile, ObjAndStlAreZUpUnlessSaidOtherwise) {
   EXPECT_THROW((void)load_mesh(obj, {.scale = 0.0}), ContractError);
 }
 
+// A square of 4 m with what `body` says of it; vertices 4 to 7 are a square of 2 m in its middle, 8
+// to 10 a triangle of 0.3 square metres beside that.
+std::string collada(const std::string& body, const std::string& colour = "1 0 0 1") {
+  return R"(<?xml version="1.0"?><COLLADA version="1.4.1"><asset><unit meter="1"/><up_axis>Z_UP</up_axis></asset>
+    <library_effects><effect id="e"><profile_COMMON><technique sid="c"><lambert><diffuse><color>)" +
+         colour +
+         R"(</color></diffuse></lambert></technique></profile_COMMON></effect></library_effects>
+    <library_geometries><geometry id="g"><mesh><source id="p"><float_array id="a" count="33">
+      0 0 0 4 0 0 4 4 0 0 4 0 1 1 0 3 1 0 3 3 0 1 3 0 1 3.2 0 1.5 3.8 0 0.5 3.8 0</float_array><technique_common>
+      <accessor source="#a" count="11" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
+      <param name="Z" type="float"/></accessor></technique_common></source>
+    <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>)" +
+         body +
+         R"(</mesh></geometry></library_geometries><library_visual_scenes><visual_scene id="s">
+    <node id="n"><instance_geometry url="#g"/></node></visual_scene></library_visual_scenes>
+    <scene><instance_visual_scene url="#s"/></scene></COLLADA>)";
+}
+
+double area(const Scene& scene) {
+  double sum = 0.0;
+  for (const Mesh& mesh : scene.meshes) {
+    for (const auto& t : mesh.triangles) {
+      const Vector3& a = mesh.vertices[t[0]];
+      const Vector3& b = mesh.vertices[t[1]];
+      const Vector3& c = mesh.vertices[t[2]];
+      sum += 0.5 * std::abs((b.x_m - a.x_m) * (c.y_m - a.y_m) - (c.x_m - a.x_m) * (b.y_m - a.y_m));
+    }
+  }
+  return sum;
+}
+
+TEST_F(MeshFile, ColladaPolygonsMayHaveHoles) {
+  const auto area_of = [&](const std::string& polygons) {
+    return area(load_mesh(folder_.write(
+        "holes.dae",
+        collada("<polygons count='1'><input semantic='VERTEX' source='#v' offset='0'/>" + polygons +
+                "</polygons>"))));
+  };
+  EXPECT_NEAR(area_of("<p>0 1 2 3</p>"), 16.0, 1e-5);
+  EXPECT_NEAR(area_of("<ph><p>0 1 2 3</p><h>4 7 6 5</h></ph>"), 12.0, 1e-5);
+  // Turned the same way as the outline, which exporters do as well.
+  EXPECT_NEAR(area_of("<ph><p>0 1 2 3</p><h>4 5 6 7</h></ph>"), 12.0, 1e-5);
+  EXPECT_NEAR(area_of("<ph><p>0 1 2 3</p><h>4 7 6 5</h><h>8 9 10</h></ph>"), 11.7, 1e-5);
+  EXPECT_THROW((void)area_of("<ph><p>0 1 2 3</p><h>4 5 99</h></ph>"), FileError);
+}
+
+TEST_F(MeshFile, ColladaNumbersMayHaveBlanksBeforeThem) {
+  const std::string triangles =
+      "<triangles count='1'><input semantic='VERTEX' source='#v' offset='0'/><p> 0 1 2 "
+      "</p></triangles>";
+  const Scene scene =
+      load_mesh(folder_.write("blanks.dae", collada(triangles, "\n   0.5 0.5 0.5 1 ")));
+  EXPECT_NEAR(area(scene), 8.0, 1e-5);
+}
+
 TEST_F(MeshFile, BrokenFilesGiveOneClearLine) {
   const std::string good = [] {
     std::ifstream stream(meshes / "crate_z_up_cm.dae");

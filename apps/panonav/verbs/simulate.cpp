@@ -111,7 +111,8 @@ ExitCode simulate(const Arguments& arguments, SimulateArguments wanted, Session&
     session.print(json_line(ordered_json{{"dataset", wanted.out},
                                          {"scene", world.scene().name},
                                          {"views", dataset.entries.size()},
-                                         {"free_area_m2", world.free_space().area_m2()}}));
+                                         {"free_area_m2", world.free_space().area_m2()},
+                                         {"warnings", world.scene().warnings}}));
   } else {
     session.print(session.strong(std::to_string(dataset.entries.size())) + " views of " +
                   world.scene().name + " in " + wanted.out);

@@ -9,11 +9,15 @@
 #include <assimp/Importer.hpp>
 #include <cctype>
 #include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/simulation/internal/gazebo_files.hpp"
 #include "panonav/simulation/internal/mesh_library.hpp"
+#include "panonav/simulation/internal/xml.hpp"
 
 namespace panonav {
 
@@ -25,10 +29,15 @@ Affine3 affine(const aiMatrix4x4& m) {
   return {{m.a1, m.a2, m.a3, m.b1, m.b2, m.b3, m.c1, m.c2, m.c3}, {m.a4, m.b4, m.c4}};
 }
 
-// What turns the importer's axes into z up. It has turned COLLADA files to y up already.
-Affine3 upright(UpAxis up, const fs::path& path) {
+std::string lower_ending(const fs::path& path) {
   std::string ending = path.extension().string();
   for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return ending;
+}
+
+// What turns the importer's axes into z up. It has turned COLLADA files to y up already.
+Affine3 upright(UpAxis up, const fs::path& path) {
+  const std::string ending = lower_ending(path);
   const bool y_up_format = ending == ".dae" || ending == ".gltf" || ending == ".glb";
   const bool y_up = up == UpAxis::y || (up == UpAxis::of_format && y_up_format);
   if (!y_up) return {};
@@ -135,11 +144,157 @@ class RegularFiles final : public Assimp::DefaultIOSystem {
   }
 };
 
+// Collada as the importer refuses it: polygons with holes, blanks before the numbers of a colour.
+// The holes become part of the outline, each joined to it by a cut between the vertices that are
+// nearest to each other.
+class ColladaHoles {
+ public:
+  explicit ColladaHoles(XmlElement& root) {
+    collect(root);
+    for (XmlElement* polygons : polygons_) join_holes(*polygons);
+  }
+
+ private:
+  using Corner = std::vector<double>;  // the indices of one vertex, one for each input
+  using Outline = std::vector<Corner>;
+
+  void collect(XmlElement& element) {
+    if (!element.attribute("id").empty())
+      by_id_.emplace("#" + std::string(element.attribute("id")), &element);
+    if (element.name == "polygons") polygons_.push_back(&element);
+    for (XmlElement& child : element.children) collect(child);
+  }
+
+  [[nodiscard]] const XmlElement* source_of(const XmlElement& element,
+                                            std::string_view semantic) const {
+    for (const XmlElement& input : element.children) {
+      if (input.name != "input" || input.attribute("semantic") != semantic) continue;
+      const auto found = by_id_.find(std::string(input.attribute("source")));
+      return found == by_id_.end() ? nullptr : found->second;
+    }
+    return nullptr;
+  }
+
+  void join_holes(XmlElement& polygons) {
+    const XmlElement* vertices = source_of(polygons, "VERTEX");
+    const XmlElement* source = vertices == nullptr ? nullptr : source_of(*vertices, "POSITION");
+    const XmlElement* array = source == nullptr ? nullptr : source->child("float_array");
+    positions_ = array == nullptr ? std::nullopt : numbers_of(array->text);
+    inputs_ = 1;
+    vertex_input_ = 0;
+    for (const XmlElement& input : polygons.children) {
+      const auto offset = numbers_of(input.attribute("offset"));
+      if (input.name != "input" || !offset || offset->size() != 1) continue;
+      if (!(offset->front() >= 0.0 && offset->front() < 32.0)) return;
+      const auto number = static_cast<std::size_t>(offset->front());
+      inputs_ = std::max(inputs_, number + 1);
+      if (input.attribute("semantic") == "VERTEX") vertex_input_ = number;
+    }
+    for (XmlElement& polygon : polygons.children) {
+      if (polygon.name != "ph") continue;
+      Outline outline;
+      for (const XmlElement& ring : polygon.children) {
+        if (ring.name == "p") outline = corners(ring);
+      }
+      for (const XmlElement& ring : polygon.children) {
+        if (ring.name == "h") join(outline, corners(ring));
+      }
+      polygon = {"p", {}, {}, {}};
+      for (const Corner& corner : outline) {
+        for (const double index : corner) polygon.text += std::to_string(std::lround(index)) + " ";
+      }
+    }
+  }
+
+  [[nodiscard]] Outline corners(const XmlElement& ring) const {
+    const auto indices = numbers_of(ring.text).value_or(std::vector<double>{});
+    Outline outline;
+    for (std::size_t i = 0; i + inputs_ <= indices.size(); i += inputs_)
+      outline.emplace_back(&indices[i], &indices[i] + inputs_);
+    return outline;
+  }
+
+  [[nodiscard]] Vector3 position(const Corner& corner) const {
+    const double index = corner[vertex_input_];
+    if (!positions_ || !(index >= 0.0 && index < static_cast<double>(positions_->size() / 3)))
+      throw Error("a vertex that is not there");
+    const double* p = &(*positions_)[3 * static_cast<std::size_t>(index)];
+    return {p[0], p[1], p[2]};
+  }
+
+  // Twice the area times the normal.
+  [[nodiscard]] Vector3 turn(const Outline& outline) const {
+    Vector3 sum{};
+    for (std::size_t i = 0; i < outline.size(); ++i) {
+      const Vector3 a = position(outline[i]);
+      const Vector3 b = position(outline[(i + 1) % outline.size()]);
+      sum.x_m += a.y_m * b.z_m - a.z_m * b.y_m;
+      sum.y_m += a.z_m * b.x_m - a.x_m * b.z_m;
+      sum.z_m += a.x_m * b.y_m - a.y_m * b.x_m;
+    }
+    return sum;
+  }
+
+  void join(Outline& outline, Outline hole) const {
+    if (outline.empty() || hole.empty()) return;
+    const Vector3 a = turn(outline);
+    const Vector3 b = turn(hole);
+    if (a.x_m * b.x_m + a.y_m * b.y_m + a.z_m * b.z_m > 0.0) std::reverse(hole.begin(), hole.end());
+    constexpr std::size_t max_pairs = 10000000;
+    if (outline.size() > max_pairs / hole.size()) throw Error("too many vertices around a hole");
+    double nearest = std::numeric_limits<double>::infinity();
+    std::size_t at_outline = 0;
+    std::size_t at_hole = 0;
+    for (std::size_t h = 0; h < hole.size(); ++h) {
+      const Vector3 q = position(hole[h]);
+      for (std::size_t o = 0; o < outline.size(); ++o) {
+        const Vector3 p = position(outline[o]);
+        const double distance = std::hypot(p.x_m - q.x_m, p.y_m - q.y_m, p.z_m - q.z_m);
+        if (!(distance < nearest)) continue;
+        nearest = distance;
+        at_outline = o;
+        at_hole = h;
+      }
+    }
+    std::rotate(hole.begin(), hole.begin() + static_cast<std::ptrdiff_t>(at_hole), hole.end());
+    hole.push_back(hole.front());
+    hole.push_back(outline[at_outline]);
+    outline.insert(outline.begin() + static_cast<std::ptrdiff_t>(at_outline) + 1, hole.begin(),
+                   hole.end());
+  }
+
+  std::map<std::string, const XmlElement*> by_id_;
+  std::vector<XmlElement*> polygons_;
+  std::optional<std::vector<double>> positions_;
+  std::size_t inputs_ = 1;
+  std::size_t vertex_input_ = 0;
+};
+
+std::optional<std::string> readable_collada(const fs::path& path) {
+  try {
+    XmlElement root = parse_xml(text_of_scene_file(path));
+    const ColladaHoles joined(root);
+    return to_xml(root);
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
 }  // namespace
 
 const std::vector<FileMesh>& MeshLibrary::read(const fs::path& path, UpAxis up) {
-  const auto key = std::make_pair(path.lexically_normal().string(), up);
+  const Key key{path.lexically_normal().string(), up};
   if (const auto known = files_.find(key); known != files_.end()) return known->second;
+  if (const auto known = faults_.find(key); known != faults_.end()) throw known->second;
+  try {
+    return files_.emplace(key, read_new(path, up)).first->second;
+  } catch (const FileError& error) {
+    faults_.emplace(key, error);
+    throw;
+  }
+}
+
+std::vector<FileMesh> MeshLibrary::read_new(const fs::path& path, UpAxis up) {
   require_scene_file(path);
   Assimp::Importer importer;
   importer.SetIOHandler(new RegularFiles);  // the importer owns it
@@ -150,20 +305,24 @@ const std::vector<FileMesh>& MeshLibrary::read(const fs::path& path, UpAxis up) 
                                   aiComponent_COLORS | aiComponent_BONEWEIGHTS |
                                   aiComponent_ANIMATIONS | aiComponent_LIGHTS |
                                   aiComponent_CAMERAS);
-  const aiScene* source = importer.ReadFile(
-      path.string(), aiProcess_RemoveComponent | aiProcess_Triangulate | aiProcess_SortByPType |
-                         aiProcess_JoinIdenticalVertices | aiProcess_ValidateDataStructure);
-  if (source == nullptr || source->mRootNode == nullptr) {
-    throw FileError(path.string(),
-                    "not a readable mesh file: " + readable_line(importer.GetErrorString()));
+  constexpr unsigned steps = aiProcess_RemoveComponent | aiProcess_Triangulate |
+                             aiProcess_SortByPType | aiProcess_JoinIdenticalVertices |
+                             aiProcess_ValidateDataStructure;
+  const aiScene* source = importer.ReadFile(path.string(), steps);
+  const std::string fault = importer.GetErrorString();
+  if (source == nullptr && lower_ending(path) == ".dae") {
+    if (const auto text = readable_collada(path))
+      source = importer.ReadFileFromMemory(text->data(), text->size(), steps, "dae");
   }
+  if (source == nullptr || source->mRootNode == nullptr)
+    throw FileError(path.string(), "not a readable mesh file: " + readable_line(fault));
   Collector collector{*source, path, {}, {}};
   for (unsigned i = 0; i < source->mNumMaterials; ++i) {
     collector.materials.push_back(material_of(*source->mMaterials[i], path, textures_));
   }
   collector.visit(*source->mRootNode, upright(up, path));
   if (collector.meshes.empty()) throw FileError(path.string(), "holds no triangles");
-  return files_.emplace(key, std::move(collector.meshes)).first->second;
+  return std::move(collector.meshes);
 }
 
 Scene load_mesh(const fs::path& path, const MeshOptions& options) {

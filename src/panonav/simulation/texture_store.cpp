@@ -108,6 +108,14 @@ std::shared_ptr<const Image> TextureStore::find(std::string_view written,
     }
     return nullptr;
   }
+  const std::string taken = found->filename().string();
+  const std::string name = fs::path(path).filename().string();
+  if (taken != name && lower_case(taken) == lower_case(name) &&
+      reported_missing_.emplace(path, true).second) {
+    warnings_.push_back(directory.string() + ": texture \"" + path +
+                        "\" was not found; taken instead, with letters of other case: " +
+                        found->lexically_normal().string());
+  }
   const auto [entry, is_new] = images_.try_emplace(found->lexically_normal().string());
   if (is_new) {
     try {

@@ -32,11 +32,13 @@ class TextureStore {
   /// The picture that a mesh or material file calls `written` (any slashes, absolute paths of
   /// foreign machines, `file://`). Looked for as written beside `directory`, then by its base name
   /// in the usual texture folders around `directory`, then with another ending (.png, .jpg, .jpeg)
-  /// for the same base name; upper and lower case alike. Null when there is none.
+  /// for the same base name; upper and lower case alike. A name that is not as written is a
+  /// warning. Null when there is none.
   [[nodiscard]] std::shared_ptr<const Image> find(std::string_view written,
                                                   const std::filesystem::path& directory);
 
-  /// One line for every picture that was missing or could not be read, in order of first use.
+  /// One line for every picture that was missing, found in another case or could not be read,
+  /// in order of first use.
   [[nodiscard]] const std::vector<std::string>& warnings() const& noexcept { return warnings_; }
 
  private:

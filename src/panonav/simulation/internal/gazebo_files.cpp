@@ -4,9 +4,9 @@
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
-#include <map>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/simulation/load_gazebo.hpp"
 
 namespace panonav {
@@ -20,95 +20,39 @@ bool is_there(const fs::path& path) {
   return fs::exists(path, code);
 }
 
-std::string text_without_comments(const fs::path& file) {
-  require_scene_file(file);
-  std::ifstream stream(file, std::ios::binary);
-  const std::string text((std::istreambuf_iterator<char>(stream)),
-                         std::istreambuf_iterator<char>());
-  std::string result;
-  std::size_t at = 0;
-  while (at != std::string::npos) {
-    const auto begin = text.find("<!--", at);
-    result.append(text, at, begin == std::string::npos ? begin : begin - at);
-    const auto end = begin == std::string::npos ? begin : text.find("-->", begin);
-    at = end == std::string::npos ? end : end + 3;
-  }
-  return result;
-}
-
-// The parser hands files with another root element to another parser, which prints.
-bool is_sdf(const std::string& text) {
-  for (auto at = text.find('<'); at != std::string::npos; at = text.find('<', at + 1)) {
-    if (text.compare(at, 2, "<?") == 0 || text.compare(at, 2, "<!") == 0) continue;
-    return text.compare(at, 4, "<sdf") == 0;
-  }
-  return false;
-}
-
-// What the <uri> of every <include> says.
-std::vector<std::string> included_uris(const std::string& text) {
-  std::vector<std::string> uris;
-  for (auto at = text.find("<include"); at != std::string::npos; at = text.find("<include", at)) {
-    const auto close = std::min(text.find("</include>", at), text.size());
-    const std::string_view include(text.data() + at, close - at);
-    at = close;
-    const auto begin = include.find("<uri>");
-    const auto end = include.find("</uri>");
-    if (begin == std::string_view::npos || end == std::string_view::npos || begin > end) continue;
-    const std::string_view uri = include.substr(begin + 5, end - begin - 5);
-    const auto first = uri.find_first_not_of(" \t\r\n");
-    if (first == std::string_view::npos) continue;
-    uris.emplace_back(uri.substr(first, uri.find_last_not_of(" \t\r\n") + 1 - first));
-  }
-  return uris;
-}
-
-// What a file includes, itself counted: how deep, and how many in all.
-struct Included {
-  int depth = 0;  // 0: not known yet
-  double files = 0.0;
-};
-
-Included follow_includes(const fs::path& file, const GazeboFiles& files, int depth,
-                         std::map<std::string, Included>& visits) {
-  constexpr int max_depth = 32;
-  constexpr double max_files = 100000.0;
-  const std::string key = file.lexically_normal().string();
-  const auto [visit, is_new] = visits.try_emplace(key);
-  if (!is_new) {
-    if (visit->second.depth == 0)
-      throw FileError(key, "includes itself, directly or through other models");
-    return visit->second;
-  }
-  if (depth > max_depth) throw FileError(key, "is included more than 32 models deep");
-  const std::string text = text_without_comments(file);
-  if (!is_sdf(text))
-    throw FileError(file.string(), "not an SDF file: its first element is not <sdf>");
-  Included all{1, 1.0};
-  const auto follow = [&](const fs::path& included) {
-    const Included below = follow_includes(included, files, depth + 1, visits);
-    all = {std::max(all.depth, below.depth + 1), all.files + below.files};
-    if (all.depth > max_depth) throw FileError(key, "includes models more than 32 deep");
-    if (all.files > max_files) throw FileError(key, "includes more than 100000 models in all");
-  };
-  for (const std::string& uri : included_uris(text)) {
-    const auto place = files.resolve(uri, file.parent_path());
-    if (!place) continue;  // the parser says what is missing
-    std::error_code code;
-    if (!fs::is_directory(*place, code)) {
-      follow(*place);
+// The path below `base`, with the case of letters that the folders have; the first in the order of
+// names where several fit.
+std::optional<fs::path> path_in_any_case(const fs::path& base, const fs::path& path) {
+  fs::path found = base;
+  for (const fs::path& part : path) {
+    if (part == "/" || part.empty() || is_there(found / part)) {
+      found /= part;
       continue;
     }
-    std::vector<fs::path> descriptions;
-    for (fs::directory_iterator it(*place, code), end; !code && it != end; it.increment(code)) {
-      const std::string ending = it->path().extension().string();
-      if (ending == ".sdf") descriptions.push_back(it->path());
-      if (ending == ".config" || ending == ".xml") require_scene_file(it->path());
+    std::vector<fs::path> names;
+    std::error_code code;
+    for (fs::directory_iterator it(found, code), end; !code && it != end; it.increment(code)) {
+      if (same_but_for_case(it->path().filename().string(), part.string()))
+        names.push_back(it->path().filename());
     }
-    std::sort(descriptions.begin(), descriptions.end());
-    for (const fs::path& description : descriptions) follow(description);
+    if (names.empty()) return std::nullopt;
+    found /= *std::min_element(names.begin(), names.end());
   }
-  return visits[key] = all;
+  return is_there(found) ? std::optional(found) : std::nullopt;
+}
+
+// NAME/FILE of https://SERVER/1.0/OWNER/models/NAME[/VERSION/files/FILE]; empty for other
+// addresses.
+std::string path_of_fuel_model(std::string_view uri) {
+  constexpr std::string_view folder = "/models/";
+  const auto at = uri.find(folder);
+  if (at == std::string_view::npos) return {};
+  const std::string_view path = uri.substr(at + folder.size());
+  const std::string_view name = path.substr(0, path.find('/'));
+  const auto files = path.find("/files/");
+  return std::string(name) + (files == std::string_view::npos
+                                  ? std::string()
+                                  : "/" + std::string(path.substr(files + 7)));
 }
 
 }  // namespace
@@ -124,6 +68,18 @@ void require_scene_file(const fs::path& file) {
     throw FileError(file.string(), "is " + std::to_string(bytes) + " bytes; allowed: up to " +
                                        std::to_string(max_bytes));
   }
+}
+
+std::string text_of_scene_file(const fs::path& file) {
+  require_scene_file(file);
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+}
+
+bool same_but_for_case(std::string_view a, std::string_view b) {
+  const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; };
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [&](char x, char y) { return lower(x) == lower(y); });
 }
 
 std::vector<fs::path> gazebo_model_folders_of_environment() {
@@ -150,23 +106,29 @@ GazeboFiles::GazeboFiles(fs::path world, std::vector<fs::path> model_folders)
   }
 }
 
-std::optional<fs::path> GazeboFiles::resolve(std::string_view uri,
-                                             const fs::path& directory) const {
-  if (uri.empty()) return std::nullopt;
+std::optional<FoundFile> GazeboFiles::resolve(std::string_view uri,
+                                              const fs::path& directory) const {
+  if (uri.empty() || uri.find('\0') != std::string_view::npos) return std::nullopt;
   const auto scheme_end = uri.find("://");
   const std::string_view scheme =
       scheme_end == std::string_view::npos ? "" : uri.substr(0, scheme_end);
-  const fs::path path(scheme_end == std::string_view::npos ? uri : uri.substr(scheme_end + 3));
+  const bool on_server = scheme == "http" || scheme == "https";
+  const fs::path path = on_server ? fs::path(path_of_fuel_model(uri))
+                                  : fs::path(scheme.empty() ? uri : uri.substr(scheme_end + 3));
   if (path.empty()) return std::nullopt;
+  std::vector<fs::path> bases;
   if (scheme.empty() || scheme == "file") {
-    if (path.is_absolute()) return is_there(path) ? std::optional(path) : std::nullopt;
-    if (is_there(directory / path)) return directory / path;
-    if (is_there(world_.parent_path() / path)) return world_.parent_path() / path;
-  } else if (scheme != "model" && scheme != "package") {
+    bases = {directory, world_.parent_path()};
+    if (path.is_absolute()) bases = {"/"};
+  } else if (!on_server && scheme != "model" && scheme != "package") {
     return std::nullopt;
   }
-  for (const fs::path& folder : folders_) {
-    if (is_there(folder / path)) return folder / path;
+  if (!path.is_absolute()) bases.insert(bases.end(), folders_.begin(), folders_.end());
+  for (const fs::path& base : bases) {
+    if (is_there(base / path)) return FoundFile{base / path};
+  }
+  for (const fs::path& base : bases) {
+    if (auto found = path_in_any_case(base, path)) return FoundFile{std::move(*found), false};
   }
   return std::nullopt;
 }
@@ -177,9 +139,53 @@ std::string GazeboFiles::places() const {
   return text;
 }
 
-void GazeboFiles::check_includes() const {
-  std::map<std::string, Included> visits;
-  follow_includes(world_, *this, 1, visits);
+const XmlElement& GazeboFiles::sdf(const fs::path& file) {
+  const std::string key = file.lexically_normal().string();
+  if (const auto known = files_.find(key); known != files_.end()) return known->second;
+  XmlElement root;
+  try {
+    root = parse_xml(text_of_scene_file(file));
+  } catch (const FileError&) {
+    throw;
+  } catch (const Error& error) {
+    throw FileError(file.string(), "not an SDF file: " + readable_line(error.what()));
+  }
+  if (root.name != "sdf" && root.name != "gazebo") {
+    throw FileError(file.string(), "not an SDF file: its first element is <" +
+                                       readable_line(root.name) + ">, not <sdf>");
+  }
+  return files_.emplace(key, std::move(root)).first->second;
+}
+
+fs::path GazeboFiles::description_in(const fs::path& folder) {
+  std::error_code code;
+  for (const char* list : {"model.config", "manifest.xml"}) {
+    if (!fs::is_regular_file(folder / list, code)) continue;
+    const XmlElement* best = nullptr;
+    double best_version = -1.0;
+    XmlElement config;
+    try {
+      config = parse_xml(text_of_scene_file(folder / list));
+    } catch (const Error&) {
+      break;  // the usual names may do
+    }
+    for (const XmlElement& entry : config.children) {
+      const auto version = numbers_of(entry.attribute("version"));
+      const double number = version && version->size() == 1 ? version->front() : 0.0;
+      if (entry.name != "sdf" || entry.text.empty() || number <= best_version) continue;
+      if (!path_in_any_case(folder, entry.text)) continue;
+      best = &entry;
+      best_version = number;
+    }
+    if (best != nullptr) return *path_in_any_case(folder, best->text);
+  }
+  if (const auto usual = path_in_any_case(folder, "model.sdf")) return *usual;
+  std::vector<fs::path> others;
+  for (fs::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
+    if (it->path().extension() == ".sdf") others.push_back(it->path());
+  }
+  if (others.empty()) throw FileError(folder.string(), "holds no model description (model.sdf)");
+  return *std::min_element(others.begin(), others.end());
 }
 
 }  // namespace panonav

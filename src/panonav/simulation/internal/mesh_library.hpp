@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "panonav/core/error.hpp"
 #include "panonav/simulation/internal/affine3.hpp"
 #include "panonav/simulation/load_mesh.hpp"
 #include "panonav/simulation/texture_store.hpp"
@@ -27,13 +28,17 @@ class MeshLibrary {
   /// `textures` outlives *this.
   explicit MeshLibrary(TextureStore& textures) : textures_(textures) {}
 
-  /// Throws FileError. The reference stays valid.
+  /// Throws FileError, each time the same. The reference stays valid.
   const std::vector<FileMesh>& read(const std::filesystem::path& path,
                                     UpAxis up = UpAxis::of_format);
 
  private:
+  using Key = std::pair<std::string, UpAxis>;
+  std::vector<FileMesh> read_new(const std::filesystem::path& path, UpAxis up);
+
   TextureStore& textures_;
-  std::map<std::pair<std::string, UpAxis>, std::vector<FileMesh>> files_;
+  std::map<Key, std::vector<FileMesh>> files_;
+  std::map<Key, FileError> faults_;
 };
 
 /// Adds `mesh` to the scene at a place. A map that mirrors keeps the mesh's shape; surfaces are

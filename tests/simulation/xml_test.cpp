@@ -1,0 +1,62 @@
+#include "panonav/simulation/internal/xml.hpp"
+
+#include <gtest/gtest.h>
+
+#include "panonav/core/error.hpp"
+#include "support/text.hpp"
+
+namespace panonav::testing {
+namespace {
+
+TEST(Xml, ReadsElementsAttributesAndText) {
+  const XmlElement root = parse_xml(
+      "\xEF\xBB\xBF\n<?xml version='1.0'?><!DOCTYPE a [<!ENTITY x 'y'>]><!-- a -- b --->"
+      "<a one='1' two=\"&lt;&#65;&#x20AC;&amp; &no; &\"> x <b/><![CDATA[<y>]]><b n='2'>z</b> </a> "
+      "rest <");
+  EXPECT_EQ(root.name, "a");
+  EXPECT_EQ(root.attribute("two"), "<A\xE2\x82\xAC& &no; &");
+  EXPECT_EQ(root.attribute("three"), "");
+  EXPECT_EQ(root.text, "x <y>");
+  ASSERT_EQ(root.children.size(), 2U);
+  EXPECT_EQ(root.child("b"), &root.children[0]);
+  EXPECT_EQ(root.children[1].text, "z");
+  EXPECT_EQ(root.children[1].value("n"), "2");
+  EXPECT_EQ(to_xml(parse_xml(to_xml(root))), to_xml(root));
+  EXPECT_EQ(parse_xml(to_xml(root)).attribute("two"), root.attribute("two"));
+}
+
+TEST(Xml, WhatIsNoXmlIsRefusedWithItsLine) {
+  std::string deep;
+  for (int i = 0; i < 201; ++i) deep += "<a>";
+  std::string many = "<a>";
+  for (int i = 0; i < 1000000; ++i) many += "<b/>";
+  for (const auto& [text, message] :
+       {std::pair<std::string, const char*>{"", "line 1: has no element"},
+        {"words", "has no element"},
+        {"\n\n<a>", "line 3: <a> is not closed"},
+        {"<a></b>", "</b> closes nothing"},
+        {"</a>", "</a> closes nothing"},
+        {"<a b></a>", "has no value"},
+        {"<a b=1></a>", "not in quotation marks"},
+        {"<a b='1></a>", "\"'\" is missing"},
+        {"<a <b></b></a>", "a name is missing"},
+        {"<a><!-- </a>", "\"-->\" is missing"},
+        {"<>", "a name is missing"},
+        {"<", "a name is missing"},
+        {deep, "more than 200 deep"},
+        {many, "more than 1000000 elements"}}) {
+    EXPECT_TRUE(
+        contains(message_of<Error>([&, &words = text] { (void)parse_xml(words); }), message))
+        << text.substr(0, 40);
+  }
+}
+
+TEST(Xml, NumbersAreFiniteAndAlone) {
+  EXPECT_EQ(numbers_of(" 1\t-2.5\n+3e1 "), (std::vector{1.0, -2.5, 30.0}));
+  EXPECT_EQ(numbers_of(""), std::vector<double>{});
+  for (const char* text : {"nan", "1 inf", "1,2", "1 x", "+", "1e999", "0x10"})
+    EXPECT_EQ(numbers_of(text), std::nullopt) << text;
+}
+
+}  // namespace
+}  // namespace panonav::testing
