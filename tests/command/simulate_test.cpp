@@ -29,7 +29,8 @@ using Simulate = InTemporaryFolder;
 TEST_F(Simulate, WritesADataSetThatSaysWhereEachViewWasTaken) {
   const std::string out = folder / "run";
   const auto said = answer_of(with_small({"simulate", "office", out, "--grid", "1", "--json"}));
-  EXPECT_EQ(keys_of(said), (std::set<std::string>{"dataset", "scene", "views", "free_area_m2"}));
+  EXPECT_EQ(keys_of(said), (std::set<std::string>{"dataset", "scene", "views", "free_area_m2",
+                                                   "warnings"}));
   EXPECT_EQ(said["scene"], "office");
   const Dataset dataset = read_dataset(out);
   ASSERT_GE(dataset.entries.size(), 8U);
