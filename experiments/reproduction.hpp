@@ -161,6 +161,31 @@ struct RouteReproductionOptions {
                                          Executor& executor,
                                          const ReproductionProgress& progress = {});
 
+struct ElsewhereReproductionOptions {
+  std::filesystem::path out;  ///< folder for pictures; made when it is not there
+  /// Built-in scenes that take part; Gazebo worlds and recordings are those that are there.
+  std::vector<std::string> built_in{"office", "hall", "lab", "loop", "corridor", "garden"};
+  int scenes = 3;             ///< variants of each, >= 1
+  int queries = 60;           ///< in each variant, and pairs of views in each range, >= 4
+  int runs = 40;              ///< homing runs and missions in each place, >= 2
+  int rows = 80;              ///< of the views
+  bool floors = true;         ///< whole floors of the worlds are arranged
+  std::uint64_t seed = 5001;  ///< of the first variant; the others follow it
+  /// Folder of the recordings and Gazebo worlds (docs/formats.md); empty: these are left out.
+  std::filesystem::path data;
+};
+
+/// The same as a smoke run: one variant of two scenes, few queries and runs, no arranged floors.
+[[nodiscard]] ElsewhereReproductionOptions quick_run(ElsewhereReproductionOptions options);
+
+/// How all of it does on ground where it was not made, beside rivals: places known and unknown,
+/// stated radii, home vectors between views of one place and of two, robots that tilt, whole floors
+/// arranged by similarity, sparse real recordings. Same options: same rows, but for times (unit
+/// ms), and same pictures on any number of threads. Throws ContractError, FileError.
+[[nodiscard]] Reproduction reproduce_elsewhere(const ElsewhereReproductionOptions& options,
+                                               Executor& executor,
+                                               const ReproductionProgress& progress = {});
+
 struct NavigationReproductionOptions {
   std::filesystem::path out;  ///< folder for pictures; made when it is not there
   int scenes = 4;             ///< variants of each scene and drives through each world, >= 2

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <limits>
 #include <numbers>
 
 #include "panonav/core/error.hpp"
@@ -24,20 +25,22 @@ void require_references(const std::vector<RivalView>& references) {
   }
 }
 
-// Index of the smallest value of `distance(i)`, the first of equals.
+// Index of the smallest value of `distance(i)`, the first of equals; `left_out` is not asked.
 template <class Distance>
-std::size_t argmin(std::size_t count, const Distance& distance) {
-  require(count >= 1, "number of reference views", static_cast<double>(count), ">= 1");
-  std::size_t best = 0;
-  auto smallest = distance(std::size_t{0});
-  for (std::size_t i = 1; i < count; ++i) {
-    const auto value = distance(i);
-    if (value < smallest) {
-      smallest = value;
-      best = i;
-    }
+std::size_t argmin(std::size_t count, std::optional<std::size_t> left_out,
+                   const Distance& distance) {
+  require(count >= (left_out ? 2U : 1U), "number of reference views", static_cast<double>(count),
+          ">= 1 beside the one left out");
+  std::optional<std::size_t> best;
+  double smallest = 0.0;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i == left_out) continue;
+    const double value = distance(i);
+    if (best && !(value < smallest)) continue;
+    smallest = value;
+    best = i;
   }
-  return best;
+  return *best;
 }
 
 double l1(const std::vector<float>& a, const std::vector<float>& b) {
@@ -46,7 +49,7 @@ double l1(const std::vector<float>& a, const std::vector<float>& b) {
   return sum;
 }
 
-class FourierSignatureRecogniser final : public PlaceRecogniser {
+class FourierSignatureRecogniser final : public RivalRecogniser {
  public:
   explicit FourierSignatureRecogniser(int components) : components_(components) {}
   [[nodiscard]] std::string name() const override { return "Fourier signature"; }
@@ -57,9 +60,10 @@ class FourierSignatureRecogniser final : public PlaceRecogniser {
       signatures_.push_back(compute_signature(view.panorama, components_));
     }
   }
-  [[nodiscard]] std::size_t nearest(const RivalView& query) const override {
+  [[nodiscard]] std::size_t nearest(const RivalView& query,
+                                    std::optional<std::size_t> left_out) const override {
     const auto signature = compute_signature(query.panorama, components_);
-    return argmin(signatures_.size(),
+    return argmin(signatures_.size(), left_out,
                   [&](std::size_t i) { return dissimilarity_l1(signature, signatures_[i]); });
   }
   [[nodiscard]] double bytes_per_view() const override {
@@ -72,7 +76,7 @@ class FourierSignatureRecogniser final : public PlaceRecogniser {
 };
 
 // One histogram over the whole view: what Ulrich and Nourbakhsh use, in grey.
-class GreyHistogramRecogniser final : public PlaceRecogniser {
+class GreyHistogramRecogniser final : public RivalRecogniser {
  public:
   explicit GreyHistogramRecogniser(int bins) : bins_(bins) {
     require(bins >= 2 && bins <= 256, "histogram bins", bins, "2 .. 256");
@@ -83,9 +87,11 @@ class GreyHistogramRecogniser final : public PlaceRecogniser {
     histograms_.clear();
     for (const auto& view : references) histograms_.push_back(histogram(view.panorama));
   }
-  [[nodiscard]] std::size_t nearest(const RivalView& query) const override {
+  [[nodiscard]] std::size_t nearest(const RivalView& query,
+                                    std::optional<std::size_t> left_out) const override {
     const auto wanted = histogram(query.panorama);
-    return argmin(histograms_.size(), [&](std::size_t i) { return l1(wanted, histograms_[i]); });
+    return argmin(histograms_.size(), left_out,
+                  [&](std::size_t i) { return l1(wanted, histograms_[i]); });
   }
   [[nodiscard]] double bytes_per_view() const override { return 2.0 * bins_; }
 
@@ -105,7 +111,7 @@ class GreyHistogramRecogniser final : public PlaceRecogniser {
 
 // One histogram of colours over the whole view. Colour needs no phases and no unwarping, and does
 // not change when the robot turns.
-class ColourHistogramRecogniser final : public PlaceRecogniser {
+class ColourHistogramRecogniser final : public RivalRecogniser {
  public:
   explicit ColourHistogramRecogniser(int bins_per_channel) : bins_(bins_per_channel) {
     require(bins_per_channel >= 2 && bins_per_channel <= 32, "histogram bins per channel",
@@ -117,9 +123,11 @@ class ColourHistogramRecogniser final : public PlaceRecogniser {
     histograms_.clear();
     for (const auto& view : references) histograms_.push_back(histogram(view.colour));
   }
-  [[nodiscard]] std::size_t nearest(const RivalView& query) const override {
+  [[nodiscard]] std::size_t nearest(const RivalView& query,
+                                    std::optional<std::size_t> left_out) const override {
     const auto wanted = histogram(query.colour);
-    return argmin(histograms_.size(), [&](std::size_t i) { return l1(wanted, histograms_[i]); });
+    return argmin(histograms_.size(), left_out,
+                  [&](std::size_t i) { return l1(wanted, histograms_[i]); });
   }
   [[nodiscard]] double bytes_per_view() const override { return 2.0 * bins_ * bins_ * bins_; }
 
@@ -153,7 +161,7 @@ Panorama turned_to_zero_phase(const Panorama& view) {
   return turn_columns(view, static_cast<int>(std::lround(-std::arg(first) * columns_per_radian)));
 }
 
-class ZeroPhaseRecogniser final : public PlaceRecogniser {
+class ZeroPhaseRecogniser final : public RivalRecogniser {
  public:
   [[nodiscard]] std::string name() const override { return "zero-phase representation"; }
   void memorise(const std::vector<RivalView>& references) override {
@@ -164,10 +172,11 @@ class ZeroPhaseRecogniser final : public PlaceRecogniser {
       views_.emplace_back(turned.values().begin(), turned.values().end());
     }
   }
-  [[nodiscard]] std::size_t nearest(const RivalView& query) const override {
+  [[nodiscard]] std::size_t nearest(const RivalView& query,
+                                    std::optional<std::size_t> left_out) const override {
     const Panorama turned = turned_to_zero_phase(query.panorama);
     const std::vector<float> wanted(turned.values().begin(), turned.values().end());
-    return argmin(views_.size(), [&](std::size_t i) { return l1(wanted, views_[i]); });
+    return argmin(views_.size(), left_out, [&](std::size_t i) { return l1(wanted, views_[i]); });
   }
   [[nodiscard]] double bytes_per_view() const override {
     return views_.empty() ? 0.0 : static_cast<double>(views_[0].size());
@@ -179,7 +188,7 @@ class ZeroPhaseRecogniser final : public PlaceRecogniser {
 
 // Principal components of views turned to zero phase: eigenimages are not indifferent to a turn, so
 // the papers that use them turn the views to a canonical heading first.
-class EigenimageRecogniser final : public PlaceRecogniser {
+class EigenimageRecogniser final : public RivalRecogniser {
  public:
   explicit EigenimageRecogniser(int dimensions) : dimensions_(dimensions) {
     require(dimensions >= 1, "eigenimages", dimensions, ">= 1");
@@ -205,9 +214,10 @@ class EigenimageRecogniser final : public PlaceRecogniser {
     }
     coefficients_ = basis_.transpose() * views;
   }
-  [[nodiscard]] std::size_t nearest(const RivalView& query) const override {
+  [[nodiscard]] std::size_t nearest(const RivalView& query,
+                                    std::optional<std::size_t> left_out) const override {
     const Eigen::VectorXf wanted = basis_.transpose() * (column(query.panorama) - mean_);
-    return argmin(static_cast<std::size_t>(coefficients_.cols()), [&](std::size_t i) {
+    return argmin(static_cast<std::size_t>(coefficients_.cols()), left_out, [&](std::size_t i) {
       return (coefficients_.col(static_cast<Eigen::Index>(i)) - wanted).squaredNorm();
     });
   }
@@ -233,7 +243,7 @@ class EigenimageRecogniser final : public PlaceRecogniser {
 // Every pixel, every turn by whole columns: the most that can be had from pixels, at the highest
 // price. The sum of squared differences over all turns comes from the full spectra, which is the
 // same and takes seconds instead of hours.
-class PixelRecogniser final : public PlaceRecogniser {
+class PixelRecogniser final : public RivalRecogniser {
  public:
   [[nodiscard]] std::string name() const override { return "pixels over all turns"; }
   void memorise(const std::vector<RivalView>& references) override {
@@ -243,9 +253,11 @@ class PixelRecogniser final : public PlaceRecogniser {
     views_.clear();
     for (const auto& view : references) views_.push_back(spectrum(view.panorama));
   }
-  [[nodiscard]] std::size_t nearest(const RivalView& query) const override {
+  [[nodiscard]] std::size_t nearest(const RivalView& query,
+                                    std::optional<std::size_t> left_out) const override {
     const Spectrum wanted = spectrum(query.panorama);
-    return argmin(views_.size(), [&](std::size_t i) { return distance(wanted, views_[i]); });
+    return argmin(views_.size(), left_out,
+                  [&](std::size_t i) { return distance(wanted, views_[i]); });
   }
   [[nodiscard]] double bytes_per_view() const override {
     return views_.empty() ? 0.0 : static_cast<double>(views_[0].pixels);
@@ -303,25 +315,121 @@ class PixelRecogniser final : public PlaceRecogniser {
   std::vector<Spectrum> views_;
 };
 
+class PatchNormalisedRecogniser final : public RivalRecogniser {
+ public:
+  [[nodiscard]] std::string name() const override { return "patch-normalised pixels"; }
+  void memorise(const std::vector<RivalView>& references) override {
+    require_references(references);
+    views_.clear();
+    for (const auto& view : references) views_.push_back(normalised(view.panorama));
+  }
+  [[nodiscard]] std::size_t nearest(const RivalView& query,
+                                    std::optional<std::size_t> left_out) const override {
+    const Panorama wanted = normalised(query.panorama);
+    return argmin(views_.size(), left_out,
+                  [&](std::size_t i) { return difference(wanted, views_[i]); });
+  }
+  [[nodiscard]] double bytes_per_view() const override {
+    return views_.empty() ? 0.0 : static_cast<double>(views_[0].values().size());
+  }
+
+ private:
+  // SeqSLAM's 64 x 32 pixels and patches of 8 x 8; a panorama is wider.
+  static constexpr int small_columns = 128;
+  static constexpr int small_rows = 32;
+  static constexpr int half_patch = 4;
+
+  static Panorama shrunk(const Panorama& view) {
+    const int rows = std::min(view.rows(), small_rows);
+    const int columns = std::min(view.columns(), small_columns);
+    Panorama small(rows, columns, std::nullopt);
+    for (int y = 0; y < rows; ++y) {
+      for (int c = 0; c < columns; ++c) {
+        double sum = 0.0;
+        int count = 0;
+        for (int v = y * view.rows() / rows; v < (y + 1) * view.rows() / rows; ++v) {
+          for (int u = c * view.columns() / columns; u < (c + 1) * view.columns() / columns; ++u) {
+            sum += view.at(v, u);
+            ++count;
+          }
+        }
+        small.at(y, c) = static_cast<float>(sum / count);
+      }
+    }
+    return small;
+  }
+
+  static Panorama normalised(const Panorama& view) {
+    const Panorama small = shrunk(view);
+    Panorama result = small;
+    for (int y = 0; y < small.rows(); ++y) {
+      for (int c = 0; c < small.columns(); ++c) {
+        double sum = 0.0;
+        double squares = 0.0;
+        int count = 0;
+        for (int v = std::max(0, y - half_patch); v < std::min(small.rows(), y + half_patch); ++v) {
+          for (int u = c - half_patch; u < c + half_patch; ++u) {
+            const double value = small.at(v, (u + small.columns()) % small.columns());
+            sum += value;
+            squares += value * value;
+            ++count;
+          }
+        }
+        const double mean = sum / count;
+        const double deviation = std::sqrt(std::max(0.0, squares / count - mean * mean));
+        // A patch without structure tells nothing.
+        result.at(y, c) =
+            deviation > 1e-3 ? static_cast<float>((small.at(y, c) - mean) / deviation) : 0.0F;
+      }
+    }
+    return result;
+  }
+
+  static double difference(const Panorama& a, const Panorama& b) {
+    double least = std::numeric_limits<double>::infinity();
+    const auto columns = static_cast<std::size_t>(a.columns());
+    for (std::size_t turn = 0; turn < columns; ++turn) {
+      float sum = 0.0F;
+      for (int y = 0; y < a.rows(); ++y) {
+        const float* const row_a = a.values().data() + static_cast<std::size_t>(y) * columns;
+        const float* const row_b = b.values().data() + static_cast<std::size_t>(y) * columns;
+        for (std::size_t c = 0; c + turn < columns; ++c) {
+          sum += std::abs(row_a[c + turn] - row_b[c]);
+        }
+        for (std::size_t c = columns - turn; c < columns; ++c) {
+          sum += std::abs(row_a[c + turn - columns] - row_b[c]);
+        }
+      }
+      least = std::min(least, static_cast<double>(sum));
+    }
+    return least;
+  }
+
+  std::vector<Panorama> views_;
+};
+
 }  // namespace
 
-std::unique_ptr<PlaceRecogniser> fourier_signature_recogniser(int components) {
+std::unique_ptr<RivalRecogniser> fourier_signature_recogniser(int components) {
   return std::make_unique<FourierSignatureRecogniser>(components);
 }
-std::unique_ptr<PlaceRecogniser> grey_histogram_recogniser(int bins) {
+std::unique_ptr<RivalRecogniser> grey_histogram_recogniser(int bins) {
   return std::make_unique<GreyHistogramRecogniser>(bins);
 }
-std::unique_ptr<PlaceRecogniser> colour_histogram_recogniser(int bins_per_channel) {
+std::unique_ptr<RivalRecogniser> colour_histogram_recogniser(int bins_per_channel) {
   return std::make_unique<ColourHistogramRecogniser>(bins_per_channel);
 }
-std::unique_ptr<PlaceRecogniser> eigenimage_recogniser(int dimensions) {
+std::unique_ptr<RivalRecogniser> eigenimage_recogniser(int dimensions) {
   return std::make_unique<EigenimageRecogniser>(dimensions);
 }
-std::unique_ptr<PlaceRecogniser> zero_phase_recogniser() {
+std::unique_ptr<RivalRecogniser> zero_phase_recogniser() {
   return std::make_unique<ZeroPhaseRecogniser>();
 }
-std::unique_ptr<PlaceRecogniser> pixels_over_all_turns_recogniser() {
+std::unique_ptr<RivalRecogniser> pixels_over_all_turns_recogniser() {
   return std::make_unique<PixelRecogniser>();
+}
+std::unique_ptr<RivalRecogniser> patch_normalised_recogniser() {
+  return std::make_unique<PatchNormalisedRecogniser>();
 }
 
 }  // namespace panonav

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <ctime>
 #include <functional>
 #include <optional>
 #include <string>
@@ -20,7 +19,7 @@ namespace panonav {
 
 namespace {
 
-using MakeRecogniser = std::unique_ptr<PlaceRecogniser> (*)();
+using MakeRecogniser = std::unique_ptr<RivalRecogniser> (*)();
 constexpr std::array<MakeRecogniser, 6> kMakers{
     [] { return fourier_signature_recogniser(m04_components); },
     [] { return grey_histogram_recogniser(); }, [] { return colour_histogram_recogniser(); },
@@ -37,12 +36,6 @@ std::vector<ViewCondition> rival_conditions() {
   std::vector<ViewCondition> conditions(view_conditions().begin(), view_conditions().end());
   conditions.push_back({"dim", "30 % less light", {.exposure = 0.7}});
   return conditions;
-}
-
-double thread_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 // How far a colour is from grey: the difference between its channels, 0 .. 1.
@@ -62,7 +55,7 @@ class Rivals final : public Experiment {
     const Renderer in_colour(place.scene, {.channels = 3}, executor);
     const auto references = with_colour(place, in_colour, place.references, {}, 90000U, executor);
     for (const auto& view : references) colourfulness_.push_back(mean_colourfulness(view.colour));
-    std::array<std::unique_ptr<PlaceRecogniser>, kRivals> recognisers;
+    std::array<std::unique_ptr<RivalRecogniser>, kRivals> recognisers;
     for (std::size_t r = 0; r < kRivals; ++r) {
       recognisers[r] = kMakers[r]();
       recognisers[r]->memorise(references);

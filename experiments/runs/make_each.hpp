@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <ctime>
 #include <optional>
 #include <type_traits>
 #include <utility>
@@ -23,6 +24,13 @@ auto make_each(Executor& executor, std::size_t count, Make make) {
   made.reserve(count);
   for (auto& slot : slots) made.push_back(std::move(*slot));
   return made;
+}
+
+/// Processor time of the calling thread so far.
+[[nodiscard]] inline double thread_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 }  // namespace panonav

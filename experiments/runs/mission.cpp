@@ -138,7 +138,13 @@ RememberedPlace remember_grid(const MissionPlace& place, double spacing_m, std::
     static_cast<void>(memory.append(views[i], {.name = std::to_string(i)}));
   }
   const Lattice lattice = arrange(memory, {}, {}, executor);
-  return {std::move(memory), graph_of_lattice(lattice), std::move(poses), spacing_m};
+  RememberedPlace remembered{std::move(memory), graph_of_lattice(lattice), std::move(poses),
+                             spacing_m};
+  for (const LatticeNode& node : lattice.nodes) {
+    remembered.arranged.push_back(node.component == 0 ? std::optional(node.pose.position())
+                                                      : std::nullopt);
+  }
+  return remembered;
 }
 
 RememberedPlace remember_drive(const MissionPlace& place, const std::vector<Pose2>& poses,

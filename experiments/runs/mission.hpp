@@ -64,6 +64,9 @@ struct RememberedPlace {
   std::vector<Pose2> truth;          ///< by node of the graph; NaN where it is not known
   double spacing_m = 0.0;            ///< of the references
   std::vector<KnownRoute> routes{};  ///< recorded on the way
+  /// Of an arrangement: by node of the graph, where it puts the views of its largest connected
+  /// component; empty: it leaves the view out.
+  std::vector<std::optional<Point2>> arranged{};
 };
 
 /// Views on a grid, 20 cm or more from all things, each in a heading at random, arranged by their

@@ -105,23 +105,23 @@ std::vector<PlaceResult> run_place_experiment(const PlaceRecording& place,
   return results;
 }
 
-std::vector<RecognitionRate> recognition_rates(const std::vector<PlaceRecording>& places,
+std::vector<RecognitionRate> recognition_rates(std::span<const PlaceRecording* const> places,
                                                Executor& executor) {
   const auto name = [](const PlaceRecording& place) {
     return place.scene.name + " " + std::to_string(place.seed);
   };
   std::vector<RecognitionRate> own;
   std::vector<RecognitionRate> others;
-  for (const PlaceRecording& place : places) {
-    const AskedPlace remembered(place, executor);
-    for (const PlaceRecording& asked : places) {
-      std::vector<std::uint8_t> known(asked.queries.size());
+  for (const PlaceRecording* const place : places) {
+    const AskedPlace remembered(*place, executor);
+    for (const PlaceRecording* const asked : places) {
+      std::vector<std::uint8_t> known(asked->queries.size());
       executor.for_chunks(known.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
-        known[i] = remembered.ask(asked.queries[i].panorama).known ? 1 : 0;
+        known[i] = remembered.ask(asked->queries[i].panorama).known ? 1 : 0;
       });
       const auto count = static_cast<std::size_t>(std::ranges::count(known, 1));
-      (&place == &asked ? own : others)
-          .push_back({name(place), name(asked), success_rate(count, known.size())});
+      (place == asked ? own : others)
+          .push_back({name(*place), name(*asked), success_rate(count, known.size())});
     }
   }
   own.insert(own.end(), others.begin(), others.end());

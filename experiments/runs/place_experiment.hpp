@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -48,6 +49,6 @@ struct RecognitionRate {
 
 /// Each place's memory is asked for the queries of all places. Rates of the same place come first.
 [[nodiscard]] std::vector<RecognitionRate> recognition_rates(
-    const std::vector<PlaceRecording>& places, Executor& executor);
+    std::span<const PlaceRecording* const> places, Executor& executor);
 
 }  // namespace panonav

@@ -9,18 +9,39 @@ bool has_data(const std::filesystem::path& data, const std::filesystem::path& pa
   return !data.empty() && std::filesystem::is_directory(data / part);
 }
 
-std::vector<std::string> worlds_in(const std::filesystem::path& data) {
-  std::vector<std::string> worlds{"small_warehouse", "small_house"};
+namespace {
+
+std::vector<std::string> those_in(const std::filesystem::path& data,
+                                  std::vector<std::string> worlds) {
   std::erase_if(worlds, [&](const std::string& name) {
     return !has_data(data, std::filesystem::path("scenes") / name);
   });
   return worlds;
 }
 
+}  // namespace
+
+std::vector<std::string> worlds_in(const std::filesystem::path& data) {
+  return those_in(data, {"small_warehouse", "small_house"});
+}
+
+std::vector<std::string> all_worlds_in(const std::filesystem::path& data) {
+  return those_in(data, {"small_warehouse", "small_house", "industrial_warehouse"});
+}
+
 Scene read_world(const std::filesystem::path& data, const std::string& name) {
+  const std::filesystem::path folder = data / "scenes" / name / "worlds";
+  std::filesystem::path world = folder / (name + ".world");
+  std::error_code ignored;
+  if (!std::filesystem::exists(world, ignored)) {
+    // A folder may hold one world of another name.
+    for (const auto& file : std::filesystem::directory_iterator(folder, ignored)) {
+      if (file.path().extension() == ".world") world = file.path();
+    }
+  }
   GazeboOptions reading;
   reading.textures.read = [](const std::filesystem::path& path) { return read_image(path); };
-  return load_gazebo(data / "scenes" / name / "worlds" / (name + ".world"), reading);
+  return load_gazebo(world, reading);
 }
 
 }  // namespace panonav

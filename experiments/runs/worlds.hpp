@@ -14,6 +14,8 @@ namespace panonav {
 [[nodiscard]] bool has_data(const std::filesystem::path& data, const std::filesystem::path& part);
 /// Of the Gazebo worlds of the experiments those that are there.
 [[nodiscard]] std::vector<std::string> worlds_in(const std::filesystem::path& data);
+/// Those, and the ones that were never used to develop anything.
+[[nodiscard]] std::vector<std::string> all_worlds_in(const std::filesystem::path& data);
 /// One of these. Throws FileError.
 [[nodiscard]] Scene read_world(const std::filesystem::path& data, const std::string& name);
 

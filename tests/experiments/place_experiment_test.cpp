@@ -71,7 +71,9 @@ TEST(PlaceExperiment, OfOnePlaceTellsItFromOthersAndIsTheSameOnAnyNumberOfThread
                                    .columns = 128},
                                   two));
   }
-  const auto rates = recognition_rates(places, two);
+  std::vector<const PlaceRecording*> all;
+  for (const PlaceRecording& place : places) all.push_back(&place);
+  const auto rates = recognition_rates(all, two);
   ASSERT_EQ(rates.size(), 16U);
   for (std::size_t i = 0; i < rates.size(); ++i) {
     std::cout << rates[i].memory << " asked for " << rates[i].queries << ": known "

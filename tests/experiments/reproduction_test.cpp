@@ -76,6 +76,27 @@ TEST_F(Reproductions, MappingIsTheSameOnOneAndTwoThreads) {
   expect_same_on_one_and_two_threads(reproduce, 30, 0);
 }
 
+TEST_F(Reproductions, ElsewhereIsTheSameOnOneAndTwoThreads) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  const auto reproduce = [](const std::filesystem::path& out, Executor& executor) {
+    return reproduce_elsewhere({.out = out,
+                                .built_in = {"office", "lab"},
+                                .scenes = 2,
+                                .queries = 4,
+                                .runs = 2,
+                                .rows = 20,
+                                .seed = 7},
+                               executor);
+  };
+  expect_same_on_one_and_two_threads(reproduce, 25, 0);
+  for (const char* const id :
+       {"elsewhere.places.office.clean.known", "elsewhere.places.lab.radius",
+        "elsewhere.places.other", "elsewhere.places.variant", "elsewhere.home.foreign",
+        "elsewhere.home.noise_16", "elsewhere.tilt.lab.3"}) {
+    EXPECT_TRUE(ids.contains(id)) << id;
+  }
+}
+
 TEST_F(Reproductions, RefuseWhatMakesNoSenseAndFoldersThatCannotBeMade) {
   Executor executor(1);
   const auto out = folder.path();

@@ -48,18 +48,19 @@ RivalView random_rival_view(std::uint64_t seed) {
   return in_colour(random_view(seed), seed);
 }
 
-std::vector<std::unique_ptr<PlaceRecogniser>> all_recognisers() {
-  std::vector<std::unique_ptr<PlaceRecogniser>> list;
+std::vector<std::unique_ptr<RivalRecogniser>> all_recognisers() {
+  std::vector<std::unique_ptr<RivalRecogniser>> list;
   list.push_back(fourier_signature_recogniser(15));
   list.push_back(grey_histogram_recogniser(64));
   list.push_back(colour_histogram_recogniser(32));
   list.push_back(eigenimage_recogniser(15));
   list.push_back(zero_phase_recogniser());
   list.push_back(pixels_over_all_turns_recogniser());
+  list.push_back(patch_normalised_recogniser());
   return list;
 }
 
-TEST(PlaceRecogniser, EveryRivalFindsAMemorisedViewAfterAnyTurn) {
+TEST(RivalRecogniser, EveryRivalFindsAMemorisedViewAfterAnyTurn) {
   std::vector<RivalView> references;
   for (std::uint64_t seed = 0; seed < 20; ++seed) references.push_back(random_rival_view(seed));
   for (const auto& recogniser : all_recognisers()) {

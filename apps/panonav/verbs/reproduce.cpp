@@ -75,39 +75,44 @@ Run declare_reproduce(Arguments& arguments) {
   const MappingReproductionOptions f11;
   const RouteReproductionOptions y03;
   const NavigationReproductionOptions navigation;
-  const auto defaults = [](auto f11_value, auto m03_value, auto m04_value, auto navigation_value,
-                           auto s06_value, auto y03_value) {
-    return " (default: " + std::to_string(f11_value) + " for f11, " + std::to_string(m03_value) +
-           " for m03, " + std::to_string(m04_value) + " for m04, " +
-           std::to_string(navigation_value) + " for navigation, " + std::to_string(s06_value) +
-           " for s06, " + std::to_string(y03_value) + " for y03";
+  const ElsewhereReproductionOptions elsewhere;
+  const auto defaults = [](auto elsewhere_value, auto f11_value, auto m03_value, auto m04_value,
+                           auto navigation_value, auto s06_value, auto y03_value) {
+    return " (default: " + std::to_string(elsewhere_value) + " for elsewhere, " +
+           std::to_string(f11_value) + " for f11, " + std::to_string(m03_value) + " for m03, " +
+           std::to_string(m04_value) + " for m04, " + std::to_string(navigation_value) +
+           " for navigation, " + std::to_string(s06_value) + " for s06, " +
+           std::to_string(y03_value) + " for y03";
   };
   const auto fallback = [](int value) { return " (default: " + std::to_string(value); };
   arguments.option("--seed", wanted->seed,
                    "First of the scene seeds" +
-                       defaults(f11.seed, m03.seed, m04.seed, navigation.seed, s06.seed, y03.seed) +
+                       defaults(elsewhere.seed, f11.seed, m03.seed, m04.seed, navigation.seed,
+                                s06.seed, y03.seed) +
                        ")");
-  arguments.option(
-      "--scenes", wanted->scenes, 1,
-      "Variants of the scene" +
-          defaults(f11.scenes, m03.scenes, m04.scenes, navigation.scenes, s06.scenes, y03.scenes) +
-          ")");
+  arguments.option("--scenes", wanted->scenes, 1,
+                   "Variants of the scene" +
+                       defaults(elsewhere.scenes, f11.scenes, m03.scenes, m04.scenes,
+                                navigation.scenes, s06.scenes, y03.scenes) +
+                       ")");
   arguments.option("--queries", wanted->queries, 1,
-                   "m04: questions in each" + fallback(m04.queries) + ")");
-  arguments.option("--runs", wanted->runs, 2,
-                   "m04: missions of figure 18 in each kind of place" + fallback(m04.missions) +
-                       "); m03: runs in each variant of an office" + fallback(m03.runs) +
-                       "); f11: paths in each Gazebo world" + fallback(f11.runs) +
-                       "); navigation: missions in each kind of place" + fallback(navigation.runs) +
-                       "); y03: runs along routes of 60 m in each place" + fallback(y03.runs) +
-                       ")");
-  arguments.option("--rows", wanted->rows, 1,
-                   "m03, m04: rows of the views" + fallback(m03.rows) + ")");
+                   "m04: questions in each" + fallback(m04.queries) + "); elsewhere: the same" +
+                       fallback(elsewhere.queries) + ")");
   arguments.option(
-      "--data FOLDER", wanted->data,
-      "f11, m03, navigation, s06, y03: folder with the recordings and Gazebo worlds (default: the "
-      "environment's "
-      "PANONAV_DATA; without it they are left out)");
+      "--runs", wanted->runs, 2,
+      "elsewhere: homing runs and missions in each place" + fallback(elsewhere.runs) +
+          "); m04: missions of figure 18 in each kind of place" + fallback(m04.missions) +
+          "); m03: runs in each variant of an office" + fallback(m03.runs) +
+          "); f11: paths in each Gazebo world" + fallback(f11.runs) +
+          "); navigation: missions in each kind of place" + fallback(navigation.runs) +
+          "); y03: runs along routes of 60 m in each place" + fallback(y03.runs) + ")");
+  arguments.option("--rows", wanted->rows, 1,
+                   "elsewhere, m03, m04: rows of the views" + fallback(m03.rows) + ")");
+  arguments.option("--data FOLDER", wanted->data,
+                   "elsewhere, f11, m03, navigation, s06, y03: folder with the recordings and "
+                   "Gazebo worlds (default: the "
+                   "environment's "
+                   "PANONAV_DATA; without it they are left out)");
   const auto parts = tracking_reproduction_parts();
   arguments.choice("--only", wanted->only, {parts.begin(), parts.end()},
                    "m03: this part of the experiments (default: all)");

@@ -95,6 +95,23 @@ PaperReproduction run_navigation(const ReproduceArguments& wanted, const std::fi
   return {std::move(lead), reproduce_navigation(options, executor, progress)};
 }
 
+PaperReproduction run_elsewhere(const ReproduceArguments& wanted, const std::filesystem::path& out,
+                                Executor& executor, const ReproductionProgress& progress) {
+  ElsewhereReproductionOptions options{.out = out, .data = data_folder(wanted)};
+  if (wanted.quick) options = quick_run(options);
+  if (wanted.seed) options.seed = *wanted.seed;
+  if (wanted.scenes) options.scenes = *wanted.scenes;
+  if (wanted.queries) options.queries = *wanted.queries;
+  if (wanted.runs) options.runs = *wanted.runs;
+  if (wanted.rows) options.rows = *wanted.rows;
+  std::string lead =
+      "What panonav does on ground where it was not made: " + std::to_string(options.scenes) +
+      " variants of each built-in scene, and the Gazebo worlds and recordings that "
+      "are at hand; places of one asked of the memory of all others, noise, robots "
+      "that tilt, whole floors. Rivals see the same pictures in the same run.";
+  return {std::move(lead), reproduce_elsewhere(options, executor, progress)};
+}
+
 PaperReproduction run_s06(const ReproduceArguments& wanted, const std::filesystem::path& out,
                           Executor& executor, const ReproductionProgress& progress) {
   HomingReproductionOptions options{.out = out, .data = data_folder(wanted)};
@@ -124,7 +141,7 @@ PaperReproduction run_y03(const ReproduceArguments& wanted, const std::filesyste
   return {std::move(lead), reproduce_y03(options, executor, progress)};
 }
 
-constexpr std::array<ReproducedPaper, 6> papers{{
+constexpr std::array<ReproducedPaper, 7> papers{{
     {.name = "f11",
      .title = "Visual odometry and topological maps: the experiments of [F11]",
      .subject = "visual odometry and maps",
@@ -163,6 +180,14 @@ constexpr std::array<ReproducedPaper, 6> papers{{
      .runs = true,
      .data = true,
      .run = run_y03},
+    {.name = "elsewhere",
+     .title = "Elsewhere: scenes, worlds and recordings beside each other",
+     .subject = "known and unknown places, recordings, rivals",
+     .queries = true,
+     .runs = true,
+     .rows = true,
+     .data = true,
+     .run = run_elsewhere},
 }};
 
 }  // namespace

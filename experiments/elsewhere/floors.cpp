@@ -1,0 +1,65 @@
+// Whole floors, arranged by the similarity of their views alone.
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "experiments/elsewhere/experiments.hpp"
+#include "experiments/runs/mission.hpp"
+#include "experiments/runs/surroundings.hpp"
+#include "experiments/runs/worlds.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/geometry/alignment.hpp"
+#include "panonav/mapping/map_measures.hpp"
+#include "reporting/plot.hpp"
+
+namespace panonav {
+
+void reproduce_floor(const ElsewhereReproductionOptions& options, const std::string& world,
+                     double spacing_m, Executor& executor, Reproduction& result) {
+  const MissionPlace place = make_mission_place(read_world(options.data, world), executor);
+  const RememberedPlace remembered =
+      remember_grid(place, spacing_m, Random(options.seed, 1).next(), executor);
+  std::vector<Point2> truth;
+  for (const Pose2& pose : remembered.truth) truth.push_back(pose.position());
+  const std::string id = "elsewhere.arrange." + world + "." + centimetres_id(spacing_m);
+  const std::string what = world + ", " + std::to_string(truth.size()) + " views every " +
+                           centimetres(spacing_m) + " arranged by their similarity alone";
+  std::vector<Point2> estimate;
+  std::vector<Point2> placed_truth;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    if (!remembered.arranged[i]) continue;
+    estimate.push_back(*remembered.arranged[i]);
+    placed_truth.push_back(truth[i]);
+  }
+  add_rate(result, id + ".placed", what + ": views in the largest connected component",
+           estimate.size(), truth.size());
+  const auto difference = shape_difference(estimate, placed_truth);
+  add_row(result, id + ".shape", what + ": shape difference of the largest component",
+          difference.value, "", at_most(0.05));
+  add_row(result, id + ".trustworthiness", what + ": trustworthiness of its neighbourhoods",
+          neighbour_preservation(estimate, placed_truth, 8).trustworthiness, "");
+  const auto missions =
+      random_missions(place, remembered, {.count = options.runs}, Random(options.seed, 2).next());
+  const auto runs =
+      run_missions(place, remembered, missions, {}, Random(options.seed, 3).next(), executor);
+  std::size_t arrived = 0;
+  for (const MissionRun& run : runs) arrived += run.arrives(0.5 * spacing_m) ? 1 : 0;
+  add_rate(result, id + ".missions", what + ": missions that arrive within half the spacing",
+           arrived, runs.size(), at_least(0.95));
+  const Alignment onto =
+      align(estimate, placed_truth, {.allow_scale = true, .allow_reflection = false});
+  MapLayer arranged{.label = "arranged, after the best rotation and scale",
+                    .colour = PlotColour::orange};
+  for (const Point2& point : estimate) arranged.dots.push_back(onto.apply(point));
+  MapLayer taken{.label = "where the views were taken"};
+  taken.dots = placed_truth;
+  std::vector<MapLayer> layers = scene_layers(place.scene);
+  layers.push_back(std::move(taken));
+  layers.push_back(std::move(arranged));
+  add_plot(result, options.out,
+           "elsewhere_arrange_" + world + "_" + centimetres_id(spacing_m) + ".svg", what,
+           MapPlot{.title = world, .layers = std::move(layers)});
+}
+
+}  // namespace panonav

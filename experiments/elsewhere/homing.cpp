@@ -1,0 +1,196 @@
+// Home vectors where there is a way home, and where there is none.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "experiments/elsewhere/experiments.hpp"
+#include "experiments/runs/homing_run.hpp"
+#include "experiments/runs/make_each.hpp"
+#include "experiments/runs/worlds.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/pipeline/homing_guide.hpp"
+#include "panonav/simulation/scenes.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr double homing_radius_m = 1.5;
+constexpr double arrived_m = 0.1;
+
+/// An answer between two views, and how far the direction is off where there is a true one.
+struct HomeAnswered {
+  bool answered = false;
+  double off_rad = 0.0;
+  double confidence = 0.0;
+};
+
+HomeAnswered ask_home(const Panorama& goal, const Panorama& current) {
+  const HomingGuide guide(Observation(goal), PictureSource{});
+  const WayHome way = guide.home(Observation(current));
+  return {way.direction_rad.has_value(), way.direction_rad.value_or(0.0), way.confidence};
+}
+
+HomeAnswered ask_home(const PlacedView& goal, const PlacedView& current) {
+  HomeAnswered answer = ask_home(goal.panorama, current.panorama);
+  const double truth =
+      std::atan2(goal.pose.y_m - current.pose.y_m, goal.pose.x_m - current.pose.x_m);
+  answer.off_rad = std::abs(angle_difference(answer.off_rad + current.pose.heading_rad, truth));
+  return answer;
+}
+
+/// Neighbouring pixels alike, as in pictures: white noise smoothed along columns.
+Panorama noise(int rows, int columns, int smoothed, std::uint64_t seed) {
+  Random random(seed, 5);
+  Panorama view(rows, columns, ElevationBand{radians(-30.0), radians(40.0)});
+  std::vector<double> line(static_cast<std::size_t>(columns));
+  for (int y = 0; y < rows; ++y) {
+    for (double& value : line) value = random.uniform(0.0, 1.0);
+    for (int c = 0; c < columns; ++c) {
+      double sum = 0.0;
+      for (int i = 0; i < smoothed; ++i) {
+        sum += line[static_cast<std::size_t>((c + i) % columns)];
+      }
+      view.at(y, c) = static_cast<float>(sum / smoothed);
+    }
+  }
+  return view;
+}
+
+std::vector<const PlacedView*> views_of(const PlaceRecording& place) {
+  std::vector<const PlacedView*> views;
+  for (const PlacedView& view : place.references) views.push_back(&view);
+  for (const PlacedView& view : place.queries) views.push_back(&view);
+  return views;
+}
+
+void add_answers(Reproduction& result, const std::string& id, const std::string& what,
+                 std::span<const HomeAnswered> answers, std::optional<Target> target) {
+  add_rate(result, id, what,
+           static_cast<std::size_t>(std::ranges::count_if(answers, &HomeAnswered::answered)),
+           answers.size(), target);
+}
+
+}  // namespace
+
+void reproduce_home_vectors(const ElsewhereReproductionOptions& options,
+                            const std::vector<RecordedGround>& grounds, Executor& executor,
+                            Reproduction& result) {
+  Random random(options.seed, 11);
+  const auto any = [&random](const std::vector<const PlacedView*>& views) {
+    return views[random.index(views.size())];
+  };
+  const auto pairs = static_cast<std::size_t>(options.queries);
+  struct Range {
+    std::string id;
+    double low_m;
+    double high_m;
+  };
+  const std::array<Range, 3> ranges{
+      Range{"0_1m", 0.1, 1.0}, {"1_3m", 1.0, 3.0}, {"3_6m", 3.0, 6.0}};
+  for (const Range& range : ranges) {
+    std::vector<std::pair<const PlacedView*, const PlacedView*>> asked;
+    for (const RecordedGround& ground : grounds) {
+      const auto& place = ground.variants.front();
+      const auto views = views_of(place);
+      std::size_t tries = 0;
+      for (std::size_t found = 0; found < pairs && tries < 200 * pairs; ++tries) {
+        const PlacedView* goal = any(views);
+        const PlacedView* current = any(views);
+        const double far_m = distance(goal->pose.position(), current->pose.position());
+        if (far_m < range.low_m || far_m >= range.high_m) continue;
+        // What a wall hides is another place.
+        if (!place.free_space->is_free_between(goal->pose.position(), current->pose.position())) {
+          continue;
+        }
+        asked.emplace_back(goal, current);
+        ++found;
+      }
+    }
+    const auto answers = make_each(executor, asked.size(), [&](std::size_t i) {
+      return ask_home(*asked[i].first, *asked[i].second);
+    });
+    const auto answered =
+        static_cast<std::size_t>(std::ranges::count_if(answers, &HomeAnswered::answered));
+    const auto off = static_cast<std::size_t>(std::ranges::count_if(
+        answers, [](const auto& one) { return one.answered && one.off_rad > radians(45.0); }));
+    const std::string id = "elsewhere.home." + range.id;
+    const std::string what = "views " + centimetres(range.low_m) + " to " +
+                             centimetres(range.high_m) + " apart, the straight way free: ";
+    add_answers(result, id + ".answered", what + "home vectors with a direction", answers,
+                std::nullopt);
+    if (answered > 0) {
+      add_rate(result, id + ".off", what + "of these, off by more than 45 degrees", off, answered,
+               at_most(0.05));
+    }
+  }
+
+  std::vector<std::pair<const PlacedView*, const PlacedView*>> foreign;
+  for (const RecordedGround& a : grounds) {
+    for (const RecordedGround& b : grounds) {
+      if (&a == &b) continue;
+      const auto goals = views_of(a.variants.front());
+      const auto currents = views_of(b.variants.front());
+      for (std::size_t i = 0; i < pairs; i += 4) foreign.emplace_back(any(goals), any(currents));
+    }
+  }
+  if (!foreign.empty()) {
+    add_answers(result, "elsewhere.home.foreign",
+                "views of two scenes or worlds: home vectors with a direction",
+                make_each(executor, foreign.size(),
+                          [&](std::size_t i) {
+                            return ask_home(foreign[i].first->panorama,
+                                            foreign[i].second->panorama);
+                          }),
+                at_most(0.02));
+  }
+  const PlacedView& some = grounds.front().variants.front().references.front();
+  const int rows = some.panorama.rows();
+  const int columns = some.panorama.columns();
+  for (const int smoothed : {1, 16}) {
+    add_answers(result, "elsewhere.home.noise_" + std::to_string(smoothed),
+                "noise" +
+                    (smoothed > 1 ? " smoothed over " + std::to_string(smoothed) + " columns"
+                                  : std::string()) +
+                    ": home vectors with a direction",
+                make_each(executor, pairs,
+                          [&](std::size_t i) {
+                            return ask_home(noise(rows, columns, smoothed, 2 * i),
+                                            noise(rows, columns, smoothed, 2 * i + 1));
+                          }),
+                at_most(0.02));
+  }
+}
+
+void reproduce_tilted_homing(const ElsewhereReproductionOptions& options, Executor& executor,
+                             Reproduction& result) {
+  for (const std::string& name : elsewhere_grounds(options)) {
+    const bool built_in = std::ranges::find(scene_names(), name) != scene_names().end();
+    HomingPlace place = make_homing_place(
+        built_in ? make_scene(name, {.seed = options.seed}) : read_world(options.data, name), {},
+        executor);
+    const auto tasks = random_homing_tasks(place, options.runs, homing_radius_m, options.seed);
+    for (const int tilt_deg : {0, 3, 6}) {
+      place.camera.frame.tilt_rad = radians(tilt_deg);
+      const auto runs = run_home(place, tasks, {}, options.seed, executor);
+      const auto home =
+          std::ranges::count_if(runs, [](const HomingRun& run) { return run.succeeds(arrived_m); });
+      add_rate(result, "elsewhere.tilt." + name + "." + std::to_string(tilt_deg),
+               name + ", starts within " + centimetres(homing_radius_m) + ", tilt of " +
+                   std::to_string(tilt_deg) +
+                   " degrees in a random direction at each view, not measured: home within " +
+                   centimetres(arrived_m),
+               static_cast<std::size_t>(home), runs.size(),
+               tilt_deg == 3 ? std::optional(at_least(0.9)) : std::nullopt);
+    }
+  }
+}
+
+}  // namespace panonav
