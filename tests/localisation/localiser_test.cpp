@@ -46,6 +46,26 @@ TEST(Localiser, FindsAMemorisedViewItsPositionAndTheTurn) {
   }
 }
 
+// Leaving a view out is only then honest when its neighbours are not supported by it either.
+TEST(Localiser, AnExcludedViewTellsAsMuchAsOneThatIsNotThere) {
+  const RememberedRoom place(51, {}, 0.4);
+  const Localiser whole(place.memory);
+  for (const ViewId view : place.memory.views()) {
+    VisualMemory others = place.memory;
+    others.remove(view);
+    const Localiser without(others, whole.place_model(), whole.position_model(), {}, 0.4);
+    const PackedSignature query = place.memory.packed(view);
+    const Localisation expected = without.localise(query);
+    const std::array excluded{view};
+    const Localisation found = whole.localise(query, {.excluded_views = excluded});
+    ASSERT_EQ(found.matches.size(), expected.matches.size());
+    for (std::size_t i = 0; i < found.matches.size(); ++i) {
+      EXPECT_EQ(found.matches[i].view, expected.matches[i].view);
+    }
+    EXPECT_EQ(found.position->position, expected.position->position);
+  }
+}
+
 TEST(Localiser, HeadingBetweenReferencesIsBetterThanByTheNearestAlone) {
   const RememberedRoom place(52, {}, 0.3);
   const Localiser localiser(place.memory);

@@ -141,7 +141,8 @@ Localisation Localiser::localise(const PackedSignature& query, const SearchMask&
   result.known = min_difference() <= place_model_.threshold;
   // Profiles of the references are kept over all rows.
   if (options_.reranked_views > 0 && mask.allowed_rows.empty()) {
-    support_.put_best_supported_first(ColumnProfiles(query, options_.components), ranked);
+    support_.put_best_supported_first(ColumnProfiles(query, options_.components), ranked,
+                                      mask.excluded_views);
   }
   if (options_.reranked_views == 0) {
     std::ranges::sort(ranked, {}, [](const RankedMatch& r) {

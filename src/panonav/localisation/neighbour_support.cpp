@@ -79,8 +79,8 @@ std::vector<ViewId> NeighbourSupport::neighbours(ViewId view) const {
   return views;
 }
 
-std::optional<double> NeighbourSupport::supported_difference(const ColumnProfiles& query,
-                                                             const RankedMatch& match) const {
+std::optional<double> NeighbourSupport::supported_difference(
+    const ColumnProfiles& query, const RankedMatch& match, std::span<const ViewId> excluded) const {
   const ReferencePose* const pose = placed(match.match.view);
   if (pose == nullptr) return std::nullopt;
   const double heading_rad = *pose->heading_rad + match.columns.heading_rad;
@@ -91,6 +91,8 @@ std::optional<double> NeighbourSupport::supported_difference(const ColumnProfile
   };
   std::vector<Fit> fits;
   std::vector<ViewId> views = neighbours(match.match.view);
+  std::erase_if(views,
+                [&](ViewId view) { return std::ranges::find(excluded, view) != excluded.end(); });
   views.insert(views.begin(), match.match.view);
   for (const ViewId view : views) {
     Fit fit{};
@@ -116,14 +118,15 @@ std::optional<double> NeighbourSupport::supported_difference(const ColumnProfile
 }
 
 void NeighbourSupport::put_best_supported_first(const ColumnProfiles& query,
-                                                std::vector<RankedMatch>& ranked) const {
+                                                std::vector<RankedMatch>& ranked,
+                                                std::span<const ViewId> excluded) const {
   if (ranked.empty() || sites_.empty()) return;
   const double limit = looked_at_share * ranked.front().score();
   const RankedMatch* chosen = nullptr;
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < std::min(max_examined, ranked.size()); ++i) {
     if (ranked[i].score() > limit) break;
-    const auto difference = supported_difference(query, ranked[i]);
+    const auto difference = supported_difference(query, ranked[i], excluded);
     if (difference && ranked[i].score_of(*difference) < least) {
       least = ranked[i].score_of(*difference);
       chosen = &ranked[i];

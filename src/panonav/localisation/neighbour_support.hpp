@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -29,15 +30,16 @@ class NeighbourSupport {
   /// How much the query and the place of `match` differ, as `ColumnMatch::difference`: of the place
   /// and its neighbours, all in the heading that `match` tells, the four that fit best are taken,
   /// and in each column the mean of the two that fit best there. Empty for a view without a
-  /// position or heading. Both over all rows.
-  [[nodiscard]] std::optional<double> supported_difference(const ColumnProfiles& query,
-                                                           const RankedMatch& match) const;
+  /// position or heading. Both over all rows. `excluded` views support nothing.
+  [[nodiscard]] std::optional<double> supported_difference(
+      const ColumnProfiles& query, const RankedMatch& match,
+      std::span<const ViewId> excluded = {}) const;
 
   /// Puts the match with the least score, by its supported difference, and its neighbours first,
   /// each group in the order that it was in. Only matches whose score is within a quarter of the
   /// first one's are looked at, 30 at most. `ranked` stays as it is when no match has neighbours.
-  void put_best_supported_first(const ColumnProfiles& query,
-                                std::vector<RankedMatch>& ranked) const;
+  void put_best_supported_first(const ColumnProfiles& query, std::vector<RankedMatch>& ranked,
+                                std::span<const ViewId> excluded = {}) const;
 
  private:
   struct Site {
