@@ -7,9 +7,11 @@
 #include <utility>
 #include <vector>
 
+#include "experiments/runs/surroundings.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/positions.hpp"
 #include "panonav/route/route_crossing.hpp"
+#include "panonav/simulation/scenes.hpp"
 #include "reporting/picture_plot.hpp"
 #include "reporting/plot.hpp"
 
@@ -30,6 +32,21 @@ std::vector<Pose2> in_path_frame(const LabRoute& lab, const std::vector<Pose2>& 
 MapLayer path_layer(const LabRoute& lab) {
   return line_layer("memorised path", PlotColour::grey,
                     in_path_frame(lab, {lab.route.poses().begin(), lab.route.poses().end()}));
+}
+
+// The lab from above, as it was memorised, in the frame of the path.
+std::vector<MapLayer> with_room(const LabRoute& lab, std::vector<MapLayer> layers) {
+  std::vector<MapLayer> all = scene_layers(make_scene("lab", {.seed = lab.seed}));
+  const Pose2 path_from_world = inverse(lab.world_from_path);
+  for (MapLayer& layer : all) {
+    for (auto* shapes : {&layer.lines, &layer.filled_polygons}) {
+      for (auto& shape : *shapes) {
+        for (Point2& point : shape) point = path_from_world * point;
+      }
+    }
+  }
+  all.insert(all.end(), layers.begin(), layers.end());
+  return all;
 }
 
 // Column of a line shown at place i from the left: clockwise, forward in the middle.
@@ -128,20 +145,22 @@ void draw_drives(const LabRoute& lab, const LocalisedDrives& drives,
                          const DriveErrors& contours) {
     return MapPlot{
         title,
-        {path_layer(lab), line_layer("true", PlotColour::black, in_path_frame(lab, drive.truth)),
-         line_layer("contours, as published", PlotColour::vermilion,
-                    in_path_frame(lab, contours.poses)),
-         line_layer("direct fit", PlotColour::blue, in_path_frame(lab, fit.poses))}};
+        with_room(lab,
+                  {path_layer(lab),
+                   line_layer("true", PlotColour::black, in_path_frame(lab, drive.truth)),
+                   line_layer("contours, as published", PlotColour::vermilion,
+                              in_path_frame(lab, contours.poses)),
+                   line_layer("direct fit", PlotColour::blue, in_path_frame(lab, fit.poses))})};
   };
   const std::string file = "figure_09_drives.svg";
   add_plot(
       result, folder, file,
-      "A robot crosses the memorised path at 30 degrees [Y03 figure 9]; metres. The direct fit "
+      "A robot crosses the memorised path at 30 degrees [Y03 figure 9]. The direct fit "
       "lies on the true drive.",
       std::vector<MapPlot>{panel("scene as memorised", lab.across, drives.fit, drives.contours),
                            panel("things moved, a tenth of what is seen", lab.across_changed,
                                  drives.changed_fit, drives.changed_contours)},
-      1);
+      2);
   const auto series = [](const std::string& label, const DriveErrors& errors) {
     Series line{.label = label, .style = SeriesStyle::lines};
     for (std::size_t i = 0; i < errors.position_m.size(); ++i) {
@@ -169,10 +188,12 @@ void draw_goal_run(const LabRoute& lab, const GoalRun& run, const std::filesyste
       result, folder, file,
       "Closed loop under proportional control [Y03 figure 10]; the estimate lies on the true "
       "drive.",
-      MapPlot{
-          "To a goal over a sub-goal off the path: metres",
-          {path_layer(lab), line_layer("true", PlotColour::black, in_path_frame(lab, run.truth)),
-           line_layer("estimate", PlotColour::blue, in_path_frame(lab, run.estimate)), goals}});
+      MapPlot{"To a goal over a sub-goal off the path",
+              with_room(lab,
+                        {path_layer(lab),
+                         line_layer("true", PlotColour::black, in_path_frame(lab, run.truth)),
+                         line_layer("estimate", PlotColour::blue, in_path_frame(lab, run.estimate)),
+                         goals})});
 }
 
 }  // namespace panonav
