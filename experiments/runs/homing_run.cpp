@@ -26,9 +26,10 @@ HomingPlace make_homing_place(Scene scene, HomingCamera camera, Executor& execut
 HomingView take_homing_view(const HomingPlace& place, const Pose2& pose, std::uint64_t seed) {
   Executor here(1);
   const HomingCamera& camera = place.camera;
-  return homing_view(compute_signature(take_panorama(*place.renderer, pose, camera.rendering,
-                                                     camera.frame, camera.sensor, seed, here),
-                                       camera.components));
+  const Panorama seen = take_panorama(*place.renderer, pose, camera.rendering, camera.frame,
+                                      camera.sensor, seed, here);
+  const Tilt measured = camera.levelled ? frame_tilt(camera.frame, seed) : Tilt{};
+  return homing_view(compute_signature(level_panorama(seen, measured), camera.components));
 }
 
 std::string_view name_of(HomingRunEnd end) {

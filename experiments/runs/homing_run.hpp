@@ -22,7 +22,8 @@ namespace panonav {
 /// The camera of a homing robot and what it keeps of a picture.
 struct HomingCamera {
   PanoramaRendering rendering{.rows = 40, .columns = 256, .rays_per_axis = 1};
-  FrameOptions frame;  ///< height above the floor, tilt
+  FrameOptions frame;     ///< height above the floor, tilt
+  bool levelled = false;  ///< an inertial sensor measures the tilt, and views are turned upright
   SensorOptions sensor;
   int components = 20;
 };

@@ -66,10 +66,13 @@ std::vector<PlaceResult> run_place_experiment(const PlaceRecording& place,
     std::vector<Localisation> answers(asked);
     executor.for_chunks(asked, 1, [&](std::size_t begin, std::size_t, std::size_t) {
       Executor here(1);
-      answers[begin] = remembered.ask(take_panorama(
-          *place.renderer, place.queries[begin].pose, place.rendering,
-          {.camera_height_m = place.scene.camera_height_m, .tilt_rad = condition.tilt_rad},
-          condition.sensor, seed + begin, here));
+      const FrameOptions frame{.camera_height_m = place.scene.camera_height_m,
+                               .tilt_rad = condition.tilt_rad};
+      const Panorama seen =
+          take_panorama(*place.renderer, place.queries[begin].pose, place.rendering, frame,
+                        condition.sensor, seed + begin, here);
+      const Tilt measured = condition.levelled ? frame_tilt(frame, seed + begin) : Tilt{};
+      answers[begin] = remembered.ask(level_panorama(seen, measured));
     });
     seed += asked;
     std::size_t nearest = 0;

@@ -17,6 +17,7 @@ struct PlaceCondition {
   std::string name;
   SensorOptions sensor;
   double tilt_rad = 0.0;  ///< the robot is tilted by this much, in another direction at each place
+  bool levelled = false;  ///< an inertial sensor measures it, and views are turned upright
 };
 
 /// As memorised; light 30 % less and 30 % more, with a tenth of the columns hidden; 5 degrees of

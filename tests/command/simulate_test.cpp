@@ -8,6 +8,8 @@
 
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/io/panorama_reader.hpp"
+#include "panonav/pipeline/observation_source.hpp"
 #include "support/command_runner.hpp"
 
 namespace panonav::testing {
@@ -29,8 +31,8 @@ using Simulate = InTemporaryFolder;
 TEST_F(Simulate, WritesADataSetThatSaysWhereEachViewWasTaken) {
   const std::string out = folder / "run";
   const auto said = answer_of(with_small({"simulate", "office", out, "--grid", "1", "--json"}));
-  EXPECT_EQ(keys_of(said), (std::set<std::string>{"dataset", "scene", "views", "free_area_m2",
-                                                   "warnings"}));
+  EXPECT_EQ(keys_of(said),
+            (std::set<std::string>{"dataset", "scene", "views", "free_area_m2", "warnings"}));
   EXPECT_EQ(said["scene"], "office");
   const Dataset dataset = read_dataset(out);
   ASSERT_GE(dataset.entries.size(), 8U);
@@ -93,6 +95,38 @@ TEST_F(Simulate, SameSeedSamePicturesOtherSeedOthers) {
   EXPECT_GT(first.size(), 300U);
   EXPECT_EQ(first, run("b", "7"));
   EXPECT_NE(first, run("c", "8"));
+}
+
+TEST_F(Simulate, AMeasuredTiltIsWrittenAndTakenOutOfTheViews) {
+  for (const std::string kind : {"panorama", "mirror"}) {
+    SCOPED_TRACE(kind);
+    const auto record = [&](const std::string& name, const std::string& tilt_rad) {
+      const std::string out = folder / (kind + name);
+      run_well({"simulate", "office", out, "--random", "4", "--kind", kind, "--rays-per-axis", "1",
+                "--tilt-rad", tilt_rad});
+      return read_dataset(out);
+    };
+    const Dataset level = record("level", "0");
+    const Dataset tilted = record("tilted", "0.1");
+    const PanoramaReader reader(level.source, {});
+    double levelled_error = 0.0;
+    double tilted_error = 0.0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      EXPECT_FALSE(level.entries[i].tilt);
+      const Observation seen = read_observation(tilted.entries[i]);
+      ASSERT_TRUE(seen.tilt);
+      EXPECT_NEAR(std::hypot(seen.tilt->roll_rad, seen.tilt->pitch_rad), 0.1, 1e-9);
+      const Image& picture = std::get<Image>(seen.picture);
+      const Panorama truth = reader.read(level.entries[i].path);
+      const Panorama blind = reader.convert(picture.view());
+      const Panorama levelled = reader.convert(picture.view(), *seen.tilt);
+      for (std::size_t k = 0; k < truth.values().size(); ++k) {
+        levelled_error += std::abs(levelled.values()[k] - truth.values()[k]);
+        tilted_error += std::abs(blind.values()[k] - truth.values()[k]);
+      }
+    }
+    EXPECT_LT(levelled_error, 0.35 * tilted_error);
+  }
 }
 
 TEST_F(Simulate, FollowsATrajectory) {

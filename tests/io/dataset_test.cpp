@@ -68,6 +68,7 @@ TEST_F(DatasetFolder, WhatIsWrittenReadsBackTheSame) {
   for (std::size_t i = 0; i < 2; ++i) {
     dataset.entries[i].stamp_s = 0.25 * static_cast<double>(i);
     dataset.entries[i].odometry = Pose2{0.1 * static_cast<double>(i), -0.7, 0.3};
+    dataset.entries[i].tilt = Tilt{radians(-2.5), radians(3.0 * static_cast<double>(i))};
   }
   write_dataset(dataset);
   const Dataset back = read_dataset(folder);
@@ -76,6 +77,7 @@ TEST_F(DatasetFolder, WhatIsWrittenReadsBackTheSame) {
     EXPECT_EQ(back.entries[i].stamp_s, dataset.entries[i].stamp_s);
     EXPECT_NEAR(back.entries[i].odometry->heading_rad, 0.3, 1e-12);
     EXPECT_EQ(back.entries[i].pose->position(), dataset.entries[i].pose->position());
+    EXPECT_EQ(back.entries[i].tilt, dataset.entries[i].tilt);
   }
   EXPECT_NEAR(back.source.layout.elevations->top_rad, radians(40.0), 1e-12);
 }
@@ -104,6 +106,10 @@ TEST_F(DatasetFolder, EveryFaultHasItsLine) {
   expect_error("'a.png' for the second time");
   write("poses.csv", "file,x_m,y_m\nc.png,1,2\n");
   expect_error("'c.png', which is not there");
+  write("poses.csv", "file,x_m,y_m,roll_deg\na.png,1,2,3\n");
+  expect_error("no column 'pitch_deg'");
+  write("poses.csv", "file,x_m,y_m,roll_deg,pitch_deg\na.png,1,2,3,-31\n");
+  expect_error("line 2: pitch_deg is -31; allowed: -30 to 30");
   write("poses.csv", "file,x_m,y_m\n");
   expect_error("names no picture");
   write("poses.csv", "file,x_m,y_m,colour\na.png,1,2,3\n");

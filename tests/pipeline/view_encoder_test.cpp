@@ -100,6 +100,23 @@ TEST(ViewEncoder, GivesTheSameBitsFromPicturePanoramaAndObservation) {
   }
 }
 
+TEST(ViewEncoder, TiltIsTakenOutOfPicturesAndPanoramas) {
+  const MemoryHeader header = mirror_header();
+  const ViewEncoder encoder(header, header.source);
+  const Image image = blotchy_image({320, 240}, 1);
+  const Tilt tilt{radians(3.0), radians(-2.0)};
+  Observation picture(image);
+  picture.tilt = tilt;
+  Observation ready(encoder.panorama(image.view()));
+  ready.tilt = tilt;
+  const Panorama level = level_panorama(encoder.panorama(image.view()), tilt);
+  EXPECT_EQ(encoder.panorama(ready), level);
+  EXPECT_EQ(encoder.panorama(picture), encoder.panorama(image.view(), tilt));
+  EXPECT_EQ(encoder.signature(ready), encoder.signature(level));
+  EXPECT_EQ(encoder.signature(picture), encoder.signature(encoder.panorama(picture)));
+  EXPECT_NE(encoder.signature(ready), encoder.signature(image.view()));
+}
+
 TEST(ViewEncoder, ManyThreadsGetTheBitsOfOne) {
   const MemoryHeader header = mirror_header();
   const ViewEncoder encoder(header, header.source);
@@ -134,11 +151,10 @@ TEST(ViewEncoder, RefusesWhatTheMemoryCannotCompare) {
   EXPECT_NE(message_of(Panorama(20, 128, {})).find("elevation band"), std::string::npos);
 
   Observation tilted(blotchy_image({320, 240}, 1));
-  tilted.name = "slope.png";
-  tilted.tilt = Tilt{0.0, radians(0.4)};
+  tilted.tilt = Tilt{0.0, radians(-6.0)};
   EXPECT_EQ(message_of(tilted), "");
-  tilted.tilt = Tilt{0.0, radians(-0.6)};
-  EXPECT_NE(message_of(tilted).find("tilt of slope.png"), std::string::npos);
+  tilted.tilt = Tilt{0.0, radians(-36.0)};
+  EXPECT_NE(message_of(tilted).find("pitch is -36 degrees; allowed: -30 to 30"), std::string::npos);
 
   Observation from_file(Image(320, 200));
   from_file.file = "run/view.png";

@@ -84,24 +84,20 @@ TEST_F(Recording, FramesAreTheSameOneByOneAndInARow) {
   options.poses = 3;
   const auto poses = plan_recording(scene_, space_, options, {}, 2);
   std::vector<Image> first;
-  record(renderer, poses, small_, {}, {}, 5, executor_,
-         [&](std::size_t number, const RecordedPose& pose, const Image& image) {
-           EXPECT_EQ(number, first.size());
-           EXPECT_EQ(pose, poses[number]);
-           first.push_back(image);
-         });
+  record(renderer, poses, small_, {}, {}, 5, executor_, [&](const RecordedFrame& frame) {
+    EXPECT_EQ(frame.number, first.size());
+    EXPECT_EQ(frame.pose, poses[frame.number]);
+    EXPECT_EQ(frame.tilt, Tilt{});
+    first.push_back(frame.picture);
+  });
   ASSERT_EQ(first.size(), 3U);
   EXPECT_EQ(first[0].size(), (ImageSize{64, 10}));
   EXPECT_NE(first[0], first[1]);
   Executor two(2);
   record(renderer, poses, small_, {}, {}, 5, two,
-         [&](std::size_t number, const RecordedPose&, const Image& image) {
-           EXPECT_EQ(image, first[number]);
-         });
+         [&](const RecordedFrame& frame) { EXPECT_EQ(frame.picture, first[frame.number]); });
   record(renderer, poses, small_, {}, {}, 6, executor_,
-         [&](std::size_t number, const RecordedPose&, const Image& image) {
-           EXPECT_NE(image, first[number]);
-         });
+         [&](const RecordedFrame& frame) { EXPECT_NE(frame.picture, first[frame.number]); });
 }
 
 TEST_F(Recording, TiltChangesTheViewAndNothingElseDoes) {

@@ -297,9 +297,10 @@ Dataset record_dataset(const SimulatedWorld& world, const fs::path& folder,
   try {
     record(world.renderer(), poses, world.camera(), wanted.frame, wanted.sensor,
            static_cast<std::uint64_t>(wanted.simulation.scene.seed), executor,
-           [&](std::size_t number, const RecordedPose& recorded, const Image& image) {
+           [&](const RecordedFrame& frame) {
+             const RecordedPose& recorded = frame.pose;
              DatasetEntry entry;
-             entry.file = picture_name(number);
+             entry.file = picture_name(frame.number);
              entry.path = folder / entry.file;
              entry.pose =
                  ReferencePose{recorded.pose.x_m, recorded.pose.y_m, recorded.pose.heading_rad};
@@ -307,7 +308,8 @@ Dataset record_dataset(const SimulatedWorld& world, const fs::path& folder,
                entry.stamp_s = recorded.stamp_s;
                entry.odometry = recorded.odometry;
              }
-             write_png(entry.path, image.view());
+             if (wanted.frame.tilt_rad > 0.0) entry.tilt = frame.tilt;
+             write_png(entry.path, frame.picture.view());
              dataset.entries.push_back(std::move(entry));
              advance();
            });

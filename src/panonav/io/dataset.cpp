@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
 #include <string>
 #include <unordered_set>
 
@@ -22,8 +23,9 @@ namespace fs = std::filesystem;
 
 constexpr std::array<std::string_view, 3> kind_names{"panorama", "equirectangular", "mirror"};
 constexpr std::array<std::string_view, 2> column_directions{"clockwise", "counter-clockwise"};
-constexpr std::array<std::string_view, 8> column_names{
-    "file", "stamp_s", "x_m", "y_m", "heading_deg", "odom_x_m", "odom_y_m", "odom_heading_deg"};
+constexpr std::array<std::string_view, 10> column_names{
+    "file",     "stamp_s",          "x_m",      "y_m",      "heading_deg", "odom_x_m",
+    "odom_y_m", "odom_heading_deg", "roll_deg", "pitch_deg"};
 
 ElevationBand elevation_band(TomlFields& fields, const std::vector<double>& values) {
   const bool fits =
@@ -112,6 +114,7 @@ std::vector<DatasetEntry> read_entries(const fs::path& folder, const fs::path& p
   if (!table.has("file")) throw FileError(path.string(), "has no column 'file'");
   const bool has_position = has_all(table, path, {"x_m", "y_m"});
   const bool has_odometry = has_all(table, path, {"odom_x_m", "odom_y_m", "odom_heading_deg"});
+  const bool has_tilt = has_all(table, path, {"roll_deg", "pitch_deg"});
   if (table.has("heading_deg") && !has_position) {
     throw FileError(path.string(), "has a column 'heading_deg' but no 'x_m' and 'y_m'");
   }
@@ -141,6 +144,15 @@ std::vector<DatasetEntry> read_entries(const fs::path& folder, const fs::path& p
     if (has_odometry) {
       entry.odometry = Pose2{table.number(row, "odom_x_m"), table.number(row, "odom_y_m"),
                              wrap_angle(radians(table.number(row, "odom_heading_deg")))};
+    }
+    if (has_tilt) {
+      const auto angle_rad = [&](std::string_view column) {
+        const double angle = radians(table.number(row, column));
+        if (!(std::abs(angle) <= max_tilt_rad))
+          table.fail(row, column, table.text(row, column), "-30 to 30");
+        return angle;
+      };
+      entry.tilt = Tilt{angle_rad("roll_deg"), angle_rad("pitch_deg")};
     }
     entries.push_back(std::move(entry));
   }
@@ -270,12 +282,14 @@ void write_dataset(const Dataset& dataset) {
       "heading_deg", [](const auto& e) { return e.pose && e.pose->heading_rad.has_value(); });
   const bool odometry =
       all_or_none("odom_x_m", [](const auto& e) { return e.odometry.has_value(); });
+  const bool tilts = all_or_none("roll_deg", [](const auto& e) { return e.tilt.has_value(); });
 
   std::string table = "file";
   if (stamps) table += ",stamp_s";
   if (poses) table += ",x_m,y_m";
   if (headings) table += ",heading_deg";
   if (odometry) table += ",odom_x_m,odom_y_m,odom_heading_deg";
+  if (tilts) table += ",roll_deg,pitch_deg";
   table += "\n";
   for (const auto& entry : entries) {
     if (entry.file.empty() || entry.file.find_first_of("\r\n") != std::string::npos) {
@@ -293,6 +307,10 @@ void write_dataset(const Dataset& dataset) {
       add(entry.odometry->x_m);
       add(entry.odometry->y_m);
       add(written_degrees(entry.odometry->heading_rad));
+    }
+    if (tilts) {
+      add(written_degrees(entry.tilt->roll_rad));
+      add(written_degrees(entry.tilt->pitch_rad));
     }
     table += "\n";
   }

@@ -8,6 +8,7 @@
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav/panorama/picture_source.hpp"
+#include "panonav/panorama/tilt.hpp"
 
 namespace panonav {
 
@@ -18,6 +19,7 @@ struct DatasetEntry {
   std::optional<double> stamp_s;
   std::optional<ReferencePose> pose;  ///< in the world frame
   std::optional<Pose2> odometry;      ///< in the odometry frame
+  std::optional<Tilt> tilt;           ///< as an inertial sensor measured it
   friend bool operator==(const DatasetEntry&, const DatasetEntry&) = default;
 };
 

@@ -1,6 +1,8 @@
 #include "panonav/io/panorama_reader.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <mutex>
 #include <string>
 #include <utility>
 
@@ -22,7 +24,47 @@ void require_whole_sphere(ImageSize size) {
                       "kind panorama, with its elevation band");
 }
 
+/// A band with more rows of the same height at both ends, as far as `limit` goes and at most
+/// `margin_rad`.
+struct WiderBand {
+  int rows = 0;
+  ElevationBand band;
+};
+WiderBand wider(const ElevationBand& band, int rows, const ElevationBand& limit,
+                double margin_rad) {
+  const double row_rad = (band.top_rad - band.bottom_rad) / rows;
+  const auto rows_in = [&](double room_rad) {
+    return static_cast<int>(std::floor(std::clamp(room_rad, 0.0, margin_rad) / row_rad + 1e-6));
+  };
+  const int above = rows_in(limit.top_rad - band.top_rad);
+  const int below = rows_in(band.bottom_rad - limit.bottom_rad);
+  return {rows + above + below,
+          {band.bottom_rad - below * row_rad, band.top_rad + above * row_rad}};
+}
+
+Panorama level_equirectangular(ImageView picture, PictureLayout layout, PanoramaShape shape,
+                               const Tilt& tilt) {
+  const ElevationBand sphere = layout.elevations.value();
+  const ElevationBand band = layout.kept_elevations.value_or(sphere);
+  if (shape.rows == 0) {
+    const double share = (band.top_rad - band.bottom_rad) / (sphere.top_rad - sphere.bottom_rad);
+    shape.rows = std::max(1, static_cast<int>(std::lround(share * picture.height)));
+  }
+  const double row_rad = (band.top_rad - band.bottom_rad) / shape.rows;
+  const double margin_rad = std::hypot(tilt.roll_rad, tilt.pitch_rad) + 2.0 * row_rad;
+  const WiderBand wide = wider(band, shape.rows, sphere, margin_rad);
+  layout.kept_elevations = wide.band;
+  return level_panorama(panorama_from_picture(picture, layout, {wide.rows, shape.columns}), tilt,
+                        shape.rows, band);
+}
+
 }  // namespace
+
+struct PanoramaReader::Wide {
+  std::once_flag is_made;
+  std::optional<Unwarper> unwarper;  // empty: the camera shows no more than the band
+  std::vector<std::uint8_t> hidden;
+};
 
 PanoramaReader::PanoramaReader(PictureSource source, PanoramaShape shape)
     : source_(std::move(source)), shape_(shape) {
@@ -34,14 +76,37 @@ PanoramaReader::PanoramaReader(PictureSource source, PanoramaShape shape)
   options.elevations = source_.layout.kept_elevations;
   unwarper_.emplace(*source_.camera, options);
   if (source_.mask) hidden_ = values_hidden_by(source_.mask->view(), *unwarper_);
+  wide_ = std::make_shared<Wide>();
 }
 
-Panorama PanoramaReader::convert(ImageView picture) const {
-  if (source_.kind == PictureKind::equirectangular) require_whole_sphere(picture.size());
-  if (!unwarper_) return panorama_from_picture(picture, source_.layout, shape_);
-  Panorama panorama = unwarper_->unwrap(picture);
-  if (!hidden_.empty()) fill_hidden_values(panorama, hidden_);
-  return panorama;
+const PanoramaReader::Wide& PanoramaReader::wide() const {
+  std::call_once(wide_->is_made, [&] {
+    constexpr double margin_rad = 0.175;  // 10 degrees: robots lean less
+    const WiderBand band = wider(unwarper_->elevations(), unwarper_->rows(),
+                                 visible_elevations(*source_.camera), margin_rad);
+    if (band.rows == unwarper_->rows()) return;
+    wide_->unwarper.emplace(*source_.camera,
+                            UnwarperOptions{band.rows, unwarper_->columns(), band.band});
+    if (source_.mask) wide_->hidden = values_hidden_by(source_.mask->view(), *wide_->unwarper);
+  });
+  return *wide_;
+}
+
+Panorama PanoramaReader::convert(ImageView picture, const Tilt& tilt) const {
+  validate(tilt);
+  const bool is_level = tilt == Tilt{};
+  if (source_.kind == PictureKind::equirectangular) {
+    require_whole_sphere(picture.size());
+    if (!is_level) return level_equirectangular(picture, source_.layout, shape_, tilt);
+  }
+  if (!unwarper_)
+    return level_panorama(panorama_from_picture(picture, source_.layout, shape_), tilt);
+  const Wide* const more = is_level || !wide().unwarper ? nullptr : &wide();
+  Panorama panorama = (more == nullptr ? *unwarper_ : *more->unwarper).unwrap(picture);
+  const auto& hidden = more == nullptr ? hidden_ : more->hidden;
+  if (!hidden.empty()) fill_hidden_values(panorama, hidden);
+  return is_level ? panorama
+                  : level_panorama(panorama, tilt, unwarper_->rows(), unwarper_->elevations());
 }
 
 Panorama PanoramaReader::read(const std::filesystem::path& file) const {

@@ -2,12 +2,14 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "panonav/core/image.hpp"
 #include "panonav/panorama/picture.hpp"
 #include "panonav/panorama/picture_source.hpp"
+#include "panonav/panorama/tilt.hpp"
 #include "panonav/panorama/unwarper.hpp"
 
 namespace panonav {
@@ -26,17 +28,24 @@ class PanoramaReader {
   [[nodiscard]] const Unwarper* unwarper() const noexcept {
     return unwarper_ && hidden_.empty() ? &*unwarper_ : nullptr;
   }
-  /// Throws ContractError on a picture whose size is not the camera's, and on an equirectangular
-  /// one that is not twice as wide as high (2 % off at most).
-  [[nodiscard]] Panorama convert(ImageView picture) const;
+  /// With the tilt, what a level robot would have seen (`level_panorama`); more than the band is
+  /// looked at for that where the picture shows more. Throws ContractError on a picture whose size
+  /// is not the camera's, on an equirectangular one that is not twice as wide as high (2 % off at
+  /// most), and on a tilt as `level_panorama` does.
+  [[nodiscard]] Panorama convert(ImageView picture, const Tilt& tilt = {}) const;
   /// Reads and converts. Throws FileError that names the file and what is wrong with it.
   [[nodiscard]] Panorama read(const std::filesystem::path& file) const;
 
  private:
+  /// Of mirror pictures: the table of a wider band, made when the first tilted picture comes.
+  struct Wide;
+  const Wide& wide() const;
+
   PictureSource source_;
   PanoramaShape shape_;
   std::optional<Unwarper> unwarper_;
   std::vector<std::uint8_t> hidden_;  ///< by the mask; empty without one
+  std::shared_ptr<Wide> wide_;
 };
 
 }  // namespace panonav

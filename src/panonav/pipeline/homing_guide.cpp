@@ -41,10 +41,10 @@ HomingEncoder::HomingEncoder(const MemoryHeader& header, const PictureSource& so
       horizon_(horizon) {}
 
 Panorama HomingEncoder::own_panorama(const OwnPictures& own, const Observation& observation) const {
-  require_upright(observation);
+  const Tilt tilt = observation.tilt.value_or(Tilt{});
   const auto* ready = std::get_if<Panorama>(&observation.picture);
-  Panorama panorama =
-      ready ? *ready : own.reader.convert(std::get<Image>(observation.picture).view());
+  Panorama panorama = ready ? level_panorama(*ready, tilt)
+                            : own.reader.convert(std::get<Image>(observation.picture).view(), tilt);
   const int most = panorama.columns() / 2;
   if (components_ > most) {
     throw ContractError("components", components_,

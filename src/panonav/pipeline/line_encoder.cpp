@@ -80,9 +80,10 @@ LineEncoder::LineEncoder(const PictureSource& pictures, const RouteSource& route
 
 std::vector<float> LineEncoder::line(const Observation& observation) const {
   return about_picture(observation, [&] {
-    require_upright(observation);
-    if (const auto* ready = std::get_if<Panorama>(&observation.picture)) return line_of(*ready);
-    return line_of(reader_.convert(std::get<Image>(observation.picture).view()));
+    const Tilt tilt = observation.tilt.value_or(Tilt{});
+    if (const auto* ready = std::get_if<Panorama>(&observation.picture))
+      return line_of(level_panorama(*ready, tilt));
+    return line_of(reader_.convert(std::get<Image>(observation.picture).view(), tilt));
   });
 }
 

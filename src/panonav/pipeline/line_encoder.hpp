@@ -35,7 +35,7 @@ class LineEncoder {
   /// Throws ContractError on horizon rows for pictures whose elevations are known.
   LineEncoder(const PictureSource& pictures, const RouteSource& route);
   /// Throws ContractError (FileError where the observation has a file) on a picture that does not
-  /// show the horizon, and on a tilt.
+  /// show the horizon, and on a tilt that cannot be compensated.
   [[nodiscard]] std::vector<float> line(const Observation& observation) const;
 
  private:

@@ -11,16 +11,9 @@
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav/panorama/panorama.hpp"
+#include "panonav/panorama/tilt.hpp"
 
 namespace panonav {
-
-/// Tilt of the camera's axis against the vertical: first about the robot's x axis, then about
-/// its y axis, right-handed [REP 103].
-struct Tilt {
-  double roll_rad = 0.0;
-  double pitch_rad = 0.0;
-  friend bool operator==(const Tilt&, const Tilt&) = default;
-};
 
 /// One moment of a robot: what its camera saw, and what else is known of it. A folder, a video, a
 /// live camera and a recording all become observations, and everything in `pipeline` takes them one
@@ -42,13 +35,11 @@ struct Observation {
   /// In the world frame, where a survey or a simulation knows it. Memories keep it; no estimate of
   /// this picture's own place ever reads it.
   std::optional<ReferencePose> pose;
-  /// Measured by an inertial sensor. Pictures are taken as upright: a tilt of more than half a
-  /// degree is refused with ContractError until unwarping compensates it.
+  /// Measured by an inertial sensor. What is made of the picture is what a level robot would have
+  /// seen; where the elevations of the picture are not known, more than half a degree is refused
+  /// with ContractError.
   std::optional<Tilt> tilt;
 };
-
-/// Throws ContractError on a tilt of more than half a degree.
-void require_upright(const Observation& observation);
 
 /// What `make` makes of the picture. Where that was read from a file, a ContractError becomes a
 /// FileError that names it.

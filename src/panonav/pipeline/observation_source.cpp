@@ -15,6 +15,7 @@ Observation read_observation(const DatasetEntry& entry) {
   observation.stamp_s = entry.stamp_s;
   observation.odometry = entry.odometry;
   observation.pose = entry.pose;
+  observation.tilt = entry.tilt;
   return observation;
 }
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <mutex>
-#include <numbers>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -16,9 +16,6 @@
 namespace panonav {
 
 namespace {
-
-/// Tilt of the camera that changes less than the spacing of rows does.
-constexpr double tolerated_tilt_rad = 0.5 * std::numbers::pi / 180.0;
 
 constexpr PanoramaShape default_shape{80, 512};  // [M04 section 2.1]
 
@@ -65,26 +62,7 @@ void require_same(std::string_view field, int value, int remembered) {
   }
 }
 
-/// What `encode` makes of the picture, an Image or a Panorama.
-template <class Encode>
-auto encoded(const Observation& observation, Encode encode) {
-  return about_picture(observation, [&] {
-    require_upright(observation);
-    return std::visit(encode, observation.picture);
-  });
-}
-
 }  // namespace
-
-void require_upright(const Observation& observation) {
-  const auto& tilt = observation.tilt;
-  if (!tilt) return;
-  if (std::max(std::abs(tilt->roll_rad), std::abs(tilt->pitch_rad)) <= tolerated_tilt_rad) return;
-  throw ContractError("tilt of " + observation.name,
-                      short_number(degrees(tilt->roll_rad)) + ", " +
-                          short_number(degrees(tilt->pitch_rad)) + " degrees",
-                      "-0.5 to 0.5 degrees, as pictures are taken as upright");
-}
 
 /// Buffers of the threads that encode at the moment, kept for those that will.
 class ViewEncoder::Workspaces {
@@ -131,12 +109,12 @@ ViewEncoder::~ViewEncoder() = default;
 ViewEncoder::ViewEncoder(ViewEncoder&&) noexcept = default;
 ViewEncoder& ViewEncoder::operator=(ViewEncoder&&) noexcept = default;
 
-Panorama ViewEncoder::panorama(ImageView picture) const {
+Panorama ViewEncoder::panorama(ImageView picture, const Tilt& tilt) const {
   if (picture_shape_) {
     require_same("rows", picture.height, picture_shape_->rows);
     require_same("columns", picture.width, picture_shape_->columns);
   }
-  return checked(reader_.convert(picture));
+  return checked(reader_.convert(picture, tilt));
 }
 
 Panorama ViewEncoder::checked(Panorama panorama) const {
@@ -153,21 +131,27 @@ void ViewEncoder::check_band(const std::optional<ElevationBand>& band) const {
 }
 
 Panorama ViewEncoder::panorama(const Observation& observation) const {
-  struct Encode {
-    const ViewEncoder& encoder;
-    Panorama operator()(const Image& image) { return encoder.panorama(image.view()); }
-    Panorama operator()(const Panorama& ready) { return encoder.checked(ready); }
-  };
-  return encoded(observation, Encode{*this});
+  return about_picture(observation, [&] {
+    const Tilt tilt = observation.tilt.value_or(Tilt{});
+    if (const auto* image = std::get_if<Image>(&observation.picture))
+      return panorama(image->view(), tilt);
+    return checked(level_panorama(std::get<Panorama>(observation.picture), tilt));
+  });
 }
 
 FourierSignature ViewEncoder::signature(const Observation& observation) const {
-  struct Encode {
-    const ViewEncoder& encoder;
-    FourierSignature operator()(const Image& image) { return encoder.signature(image.view()); }
-    FourierSignature operator()(const Panorama& ready) { return encoder.signature(ready); }
-  };
-  return encoded(observation, Encode{*this});
+  if (observation.tilt.value_or(Tilt{}) != Tilt{}) return signature(panorama(observation));
+  return about_picture(observation, [&] {
+    return std::visit(
+        [this](const auto& picture) {
+          if constexpr (std::is_same_v<std::decay_t<decltype(picture)>, Image>) {
+            return signature(picture.view());
+          } else {
+            return signature(picture);
+          }
+        },
+        observation.picture);
+  });
 }
 
 FourierSignature ViewEncoder::signature(ImageView picture) const {
@@ -201,7 +185,7 @@ PackedSignature ViewEncoder::packed(const Panorama& panorama) const {
 Panorama ViewEncoder::read(const DatasetEntry& entry) const {
   const Image picture = read_image(entry.path);
   try {
-    return panorama(picture.view());
+    return panorama(picture.view(), entry.tilt.value_or(Tilt{}));
   } catch (const ContractError& error) {
     throw FileError(entry.path.string(), error.what());
   }

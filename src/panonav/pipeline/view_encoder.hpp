@@ -40,15 +40,16 @@ class ViewEncoder {
   [[nodiscard]] const MemoryHeader& header() const noexcept { return header_; }
 
   /// The panoramic cylinder. Throws ContractError (FileError where the observation has a file) on a
-  /// picture of another size or band than the memory's, and on a tilt (`Observation::tilt`).
+  /// picture of another size or band than the memory's, and on a tilt (`Observation::tilt`) that
+  /// cannot be compensated.
   [[nodiscard]] Panorama panorama(const Observation& observation) const;
-  [[nodiscard]] Panorama panorama(ImageView picture) const;
+  [[nodiscard]] Panorama panorama(ImageView picture, const Tilt& tilt = {}) const;
   /// Throws FileError on a picture that is missing, damaged or of another size than the memory's.
   [[nodiscard]] Panorama read(const DatasetEntry& entry) const;
 
   /// Of an observation, of a picture as the camera delivers it, or of a panorama that is at hand
-  /// because it is needed for something else: the same bits. Mirror pictures go through the fused
-  /// `SignatureExtractor` without a panorama. Throws as `panorama`.
+  /// because it is needed for something else: the same bits. Mirror pictures of a level robot go
+  /// through the fused `SignatureExtractor` without a panorama. Throws as `panorama`.
   [[nodiscard]] FourierSignature signature(const Observation& observation) const;
   [[nodiscard]] FourierSignature signature(ImageView picture) const;
   [[nodiscard]] FourierSignature signature(const Panorama& panorama) const;

@@ -104,12 +104,11 @@ void set_headings(std::vector<Pose2>& poses, const RecordingOptions& options, Ra
 }
 
 Viewpoint viewpoint(const Pose2& pose, const FrameOptions& options, std::uint64_t seed) {
-  Viewpoint result{.pose = pose, .height_m = options.camera_height_m};
-  Random random(seed, 1);
-  const double towards = random.uniform(-std::numbers::pi, std::numbers::pi);
-  result.roll_rad = options.tilt_rad * std::sin(towards);
-  result.pitch_rad = options.tilt_rad * std::cos(towards);
-  return result;
+  const Tilt tilt = frame_tilt(options, seed);
+  return {.pose = pose,
+          .height_m = options.camera_height_m,
+          .roll_rad = tilt.roll_rad,
+          .pitch_rad = tilt.pitch_rad};
 }
 
 }  // namespace
@@ -136,6 +135,12 @@ void visit_options(FrameOptions& options, OptionVisitor& visitor) {
       option<&T::rays_per_axis>("rays per pixel and axis through a camera", 1, 8),
   };
   table.visit(options, visitor);
+}
+
+Tilt frame_tilt(const FrameOptions& options, std::uint64_t seed) {
+  Random random(seed, 1);
+  const double towards = random.uniform(-std::numbers::pi, std::numbers::pi);
+  return {options.tilt_rad * std::sin(towards), options.tilt_rad * std::cos(towards)};
 }
 
 std::vector<RecordedPose> plan_recording(const Scene& scene, const FreeSpace& space,
@@ -182,15 +187,15 @@ Image take_picture(const Renderer& renderer, const Pose2& pose, const RecordingC
                       through, sensor, seed);
 }
 
-void record(
-    const Renderer& renderer, std::span<const RecordedPose> poses, const RecordingCamera& camera,
-    const FrameOptions& options, const SensorOptions& sensor, std::uint64_t seed,
-    Executor& executor,
-    const std::function<void(std::size_t number, const RecordedPose&, const Image&)>& frame) {
+void record(const Renderer& renderer, std::span<const RecordedPose> poses,
+            const RecordingCamera& camera, const FrameOptions& options, const SensorOptions& sensor,
+            std::uint64_t seed, Executor& executor,
+            const std::function<void(const RecordedFrame&)>& frame) {
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    frame(i, poses[i],
-          take_picture(renderer, poses[i].pose, camera, options, sensor, frame_seed(seed, i),
-                       executor));
+    const std::uint64_t seed_of_frame = frame_seed(seed, i);
+    const Image picture =
+        take_picture(renderer, poses[i].pose, camera, options, sensor, seed_of_frame, executor);
+    frame({i, poses[i], frame_tilt(options, seed_of_frame), picture});
   }
 }
 

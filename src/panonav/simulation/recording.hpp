@@ -11,6 +11,7 @@
 #include "panonav/core/image.hpp"
 #include "panonav/core/options.hpp"
 #include "panonav/motion/odometry.hpp"
+#include "panonav/panorama/tilt.hpp"
 #include "panonav/simulation/free_space.hpp"
 #include "panonav/simulation/renderer.hpp"
 #include "panonav/simulation/sensor.hpp"
@@ -72,6 +73,9 @@ struct FrameOptions {
 };
 void visit_options(FrameOptions& options, OptionVisitor& visitor);
 
+/// How the robot is tilted in the picture of this seed.
+[[nodiscard]] Tilt frame_tilt(const FrameOptions& options, std::uint64_t seed);
+
 /// The picture that the robot takes: a panorama for people (see `to_picture`), or the camera's
 /// image. The same options and seed give the same picture; give each frame its own seed.
 /// Throws OptionError, and ContractError as the renderer does.
@@ -86,12 +90,19 @@ void visit_options(FrameOptions& options, OptionVisitor& visitor);
                                      const FrameOptions& options, const SensorOptions& sensor,
                                      std::uint64_t seed, Executor& executor);
 
+/// One picture of a recording, for as long as it is looked at.
+struct RecordedFrame {
+  std::size_t number = 0;
+  const RecordedPose& pose;
+  Tilt tilt;  ///< as it truly is
+  const Image& picture;
+};
+
 /// Takes all pictures in order and hands each to `frame`, so that only one is in memory. Frame i
 /// has the random stream (seed, i).
-void record(
-    const Renderer& renderer, std::span<const RecordedPose> poses, const RecordingCamera& camera,
-    const FrameOptions& options, const SensorOptions& sensor, std::uint64_t seed,
-    Executor& executor,
-    const std::function<void(std::size_t number, const RecordedPose&, const Image&)>& frame);
+void record(const Renderer& renderer, std::span<const RecordedPose> poses,
+            const RecordingCamera& camera, const FrameOptions& options, const SensorOptions& sensor,
+            std::uint64_t seed, Executor& executor,
+            const std::function<void(const RecordedFrame&)>& frame);
 
 }  // namespace panonav
