@@ -96,7 +96,7 @@ TEST_F(MemoryFileContent, ContentComesBack) {
   EXPECT_EQ(info.links, 1U);
   EXPECT_EQ(info.thumbnails, 13U);
   EXPECT_GT(info.file_bytes, 8192U);
-  EXPECT_EQ(info.format_version, 5);
+  EXPECT_EQ(info.format_version, 6);
   std::uint64_t positions = 0;
   std::uint64_t headings = 0;
   for (const ViewId view : expected.views()) {
@@ -345,7 +345,7 @@ TEST_F(MemoryFileContent, ChainsOfAnOlderVersionAreCountedAndStayAsTheyAre) {
     file.remove(file.views());
   }
   const MemoryFile file = MemoryFile::open(path, Access::read_only);
-  EXPECT_EQ(file.info().format_version, 5);
+  EXPECT_EQ(file.info().format_version, 6);
   EXPECT_EQ(file.info().unused_chains, 1U);
   EXPECT_TRUE(file.verify().empty());
   EXPECT_EQ(chains_in(path), before);
@@ -370,9 +370,47 @@ TEST_F(MemoryFileContent, AnOlderFileIsReadAsItIsAndGrowsWithItsFirstChange) {
   MemoryFile file = MemoryFile::open(path, Access::read_write);
   file.append(random_view(random, shape, 2));
   file.save_map("map", {});
-  EXPECT_EQ(file.info().format_version, 5);
+  EXPECT_EQ(file.info().format_version, 6);
   EXPECT_EQ(file.load().size(), 2U);
   EXPECT_TRUE(file.verify().empty());
+}
+
+// Version 5 had no local features.
+TEST_F(MemoryFileContent, LocalFeaturesAreKeptCheckedAndGoWithTheirView) {
+  Random random(10);
+  const SignatureShape shape = small_header().shape;
+  (void)MemoryFile::create(path, small_header()).append(random_view(random, shape, 1));
+  run_sql(path,
+          "PRAGMA journal_mode=DELETE; DROP TABLE features; PRAGMA user_version=5; PRAGMA "
+          "journal_mode=WAL");
+  const ViewId old{1};
+  {
+    const MemoryFile file = MemoryFile::open(path, Access::read_only);
+    EXPECT_EQ(file.info().format_version, 5);
+    EXPECT_FALSE(file.features(old));
+    EXPECT_TRUE(file.verify().empty());
+  }
+  NewView added = random_view(random, shape, 2);
+  added.features.assign(72, 7);
+  {
+    MemoryFile file = MemoryFile::open(path, Access::read_write);
+    const ViewId view = file.append(added);
+    EXPECT_FALSE(file.features(old));
+    EXPECT_EQ(file.features(view), added.features);
+    EXPECT_EQ(file.info().format_version, 6);
+    EXPECT_EQ(file.info().views_with_features, 1U);
+    EXPECT_EQ(file.info().feature_bytes, 72U);
+    EXPECT_TRUE(file.verify().empty());
+    file.change([&] { file.remove(std::array{view}); }, "removed");
+    EXPECT_EQ(file.info().views_with_features, 0U);
+    file.undo();
+    EXPECT_EQ(file.features(view), added.features);
+    EXPECT_THROW((void)file.features(ViewId{99}), ContractError);
+  }
+  run_sql(path, "UPDATE features SET features = zeroblob(72)");
+  const MemoryFile file = MemoryFile::open(path, Access::read_only);
+  EXPECT_THROW((void)file.features(ViewId{2}), FileError);
+  EXPECT_EQ(file.verify().size(), 1U);
 }
 
 TEST_F(MemoryFileContent, AFileThatClaimsChainsWithoutTheirTablesIsRefused) {

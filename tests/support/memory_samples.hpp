@@ -86,7 +86,8 @@ inline void make_version_1(const std::filesystem::path& path) {
   run_sql(
       path,
       "PRAGMA journal_mode=DELETE; DROP TABLE log; DROP TABLE undo; DROP TABLE maps; DROP TABLE "
-      "routes; DROP TABLE route_blocks; PRAGMA user_version=1; PRAGMA journal_mode=WAL");
+      "routes; DROP TABLE route_blocks; DROP TABLE features; PRAGMA user_version=1; PRAGMA "
+      "journal_mode=WAL");
 }
 
 /// Makes a file of version 1 one of version 2, as programs did that saved chains of snapshots: with

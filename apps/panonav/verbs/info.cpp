@@ -52,6 +52,8 @@ ordered_json as_json(const MemoryFile& memory, const MemoryFileInfo& info) {
                     {"views_with_heading", info.views_with_heading},
                     {"links", info.links},
                     {"thumbnails", info.thumbnails},
+                    {"views_with_features", info.views_with_features},
+                    {"feature_bytes", info.feature_bytes},
                     {"file_bytes", info.file_bytes},
                     {"rows", header.shape.rows},
                     {"components", header.shape.components},
@@ -93,6 +95,11 @@ ExitCode show(const std::string& path, Session& session) {
   session.print("  signatures  " + std::to_string(header.shape.rows) + " rows x " +
                 std::to_string(header.shape.components) + " components, " +
                 std::to_string(2 * header.shape.size()) + " bytes a view");
+  if (info.views_with_features > 0) {
+    session.print("  features    " + std::to_string(info.views_with_features) +
+                  " views with local features, " +
+                  std::to_string(info.feature_bytes / info.views_with_features) + " bytes a view");
+  }
   session.print("  pictures    " + std::string(kind_name(header.source.kind)) + ", " +
                 std::to_string(header.panorama_columns) + " columns, elevations " +
                 (header.elevations

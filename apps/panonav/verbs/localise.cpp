@@ -48,6 +48,9 @@ ordered_json as_json(const LocalisedQuery& answer, bool areas) {
                        {"dissimilarity", match.dissimilarity},
                        {"column_difference", match.column_difference},
                        {"heading_rad", optional_number(match.heading_rad)}});
+    if (match.verified_features) {
+      matches.back()["verified_features"] = *match.verified_features;
+    }
   }
   ordered_json json{{"file", answer.file},
                     {"known", found.known},

@@ -27,6 +27,7 @@ struct MemoriseArguments {
   SignatureOptions signature;
   PreprocessingOptions preprocessing;
   bool no_thumbnails = false;
+  bool no_features = false;
   bool strict = false;
 };
 
@@ -96,6 +97,7 @@ ExitCode memorise(const Arguments& arguments, const MemoriseArguments& wanted, S
                            .signature = wanted.signature,
                            .preprocessing = wanted.preprocessing,
                            .thumbnails = !wanted.no_thumbnails,
+                           .features = !wanted.no_features,
                            .left_out = {}};
   if (!wanted.strict) {
     options.left_out = [&](const Observation& seen, const Error& error) {
@@ -151,6 +153,9 @@ Run declare_memorise(Arguments& arguments) {
   declare_pictures(arguments, wanted->pictures);
   arguments.flag("--no-thumbnails", wanted->no_thumbnails,
                  "Do not keep small pictures of the views");
+  arguments.flag("--no-features", wanted->no_features,
+                 "Do not keep local features, with which views 1 to 2 m apart are told apart: 4 kB "
+                 "a view");
   arguments.flag(
       "--strict", wanted->strict,
       "End at the first picture that cannot be read or is of another size; otherwise it is "

@@ -28,6 +28,20 @@ inline constexpr int matched_query_columns = 32;
 inline constexpr int matched_reference_columns = 128;
 inline constexpr int matched_bands = 16;
 
+/// Descriptors of 256 bits that `nearest_descriptors` takes of a view.
+inline constexpr int max_descriptors = 256;
+
+/// Matched bearings side by side, in a frame between those of both views. Tangents are those of the
+/// elevations. Azimuths of both are mirrored where the query's lies clockwise of the reference's,
+/// so that the angle from the direction of motion to either must have a sine of at least
+/// `min_sine`; 2 for a lane without a match.
+struct BearingLane {
+  static constexpr int size = 16;
+  float query_sine[size], query_cosine[size], query_tangent[size];
+  float reference_sine[size], reference_cosine[size], reference_tangent[size];
+  float min_sine[size];
+};
+
 inline constexpr int similarity_lanes = 12;
 
 /// What reference views around a place tell of a view, side by side. A lane without a reference has

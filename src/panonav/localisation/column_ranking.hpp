@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -13,6 +14,8 @@ namespace panonav {
 struct RankedMatch {
   Match match;
   ColumnMatch columns;
+  /// Of local features (`put_verified_first`); empty where none were compared.
+  std::optional<int> verified_features = std::nullopt;
 
   /// The re-ranking score; the minimum is the best. Most of it comes from the columns. The
   /// dissimilarity, with exponent 1/8, adds what columns are freed of: their brightness. An

@@ -117,7 +117,8 @@ Localiser::Localiser(const VisualMemory& memory, const PlaceModel& place_model,
           position_model_.components, to_text(options_.components) + ", as asked for");
 }
 
-Localisation Localiser::localise(const PackedSignature& query, const SearchMask& mask) const {
+Localisation Localiser::localise(const PackedSignature& query, const SearchMask& mask,
+                                 const LocalFeatures* features) const {
   Localisation result;
   result.components = options_.components == 0 ? memory_->shape().components : options_.components;
   const auto nearest = [&](int wanted) {
@@ -128,7 +129,9 @@ Localisation Localiser::localise(const PackedSignature& query, const SearchMask&
     result.views_compared += found.matches.size();
     return ranking_->rank(query, found.matches, mask.allowed_rows);
   };
-  const int first = std::max(options_.top, PositionModel::candidates);
+  const bool by_features = features != nullptr && features_ && options_.reranked_views > 0;
+  const int first =
+      std::max({options_.top, PositionModel::candidates, by_features ? verified_candidates : 0});
   std::vector<RankedMatch> ranked = nearest(first);
   if (ranked.empty()) return result;
   const auto min_difference = [&] {
@@ -144,6 +147,7 @@ Localisation Localiser::localise(const PackedSignature& query, const SearchMask&
     support_.put_best_supported_first(ColumnProfiles(query, options_.components), ranked,
                                       mask.excluded_views);
   }
+  if (by_features) put_verified_first(*features, features_, ranked);
   if (options_.reranked_views == 0) {
     std::ranges::sort(ranked, {}, [](const RankedMatch& r) {
       return std::pair(r.match.dissimilarity, r.match.view);
@@ -159,12 +163,13 @@ Localisation Localiser::localise(const PackedSignature& query, const SearchMask&
                              r.columns.heading_rad, compass_window_rad,
                              {.components = options_.components});
     }
-    result.matches.push_back({r.match.view, r.match.dissimilarity, r.columns.difference, reading});
+    result.matches.push_back(
+        {r.match.view, r.match.dissimilarity, r.columns.difference, r.verified_features, reading});
   }
   if (result.known) {
     result.position = interpolate_position(*ranking_, position_model_, ranked);
     result.heading_rad = absolute_heading(*memory_, result.matches);
-    if (result.position && options_.reranked_views > 0) {
+    if (result.position && options_.reranked_views > 0 && !by_features) {
       put_nearest_first(*memory_, result.position->position, result.matches);
     }
   }

@@ -19,7 +19,7 @@ namespace {
 
 constexpr const char* parameter_name = "learnt models";
 /// Counts up when what is learnt changes, so that models of an older version are not used.
-constexpr std::string_view learning_version = "1";
+constexpr std::string_view learning_version = "2";
 
 // The members of each model in the order in which they are kept.
 template <class Model, class Visit>
@@ -125,10 +125,27 @@ std::string fingerprint(const VisualMemory& memory) {
 
 }  // namespace
 
-LearntModels learn_models(const VisualMemory& memory) {
+FeatureSource features_in(const MemoryFile& file) {
+  const MemoryHeader& header = file.header();
+  if (!header.elevations || file.info().views_with_features == 0) return {};
+  return [&file, shape = PanoramaShape{header.shape.rows, header.panorama_columns},
+          band = *header.elevations](ViewId view) -> std::optional<LocalFeatures> {
+    const auto bytes = file.features(view);
+    if (!bytes) return std::nullopt;
+    try {
+      return unpack_features(*bytes, shape, band);
+    } catch (const ContractError& error) {
+      throw FileError(file.path().string(), "is damaged: " + std::string(error.what()));
+    }
+  };
+}
+
+LearntModels learn_models(const VisualMemory& memory, const FeatureSource& features) {
   const ColumnRanking ranking(memory);
+  const NeighbourSupport support(ranking);
   LearntModels models{learn_place_model(ranking), learn_position_model(ranking),
-                      NeighbourSupport(ranking).spacing_m(), std::nullopt};
+                      support.spacing_m(), std::nullopt,
+                      features && try_features(ranking, support, features).tell_more()};
   try {
     models.observation = learn_observation_model(ranking);
   } catch (const ContractError&) {  // nothing to learn from
@@ -139,13 +156,14 @@ LearntModels learn_models(const VisualMemory& memory) {
 void keep_models(MemoryFile& file) {
   const VisualMemory memory = file.load();
   if (memory.empty() || kept_models(file, memory)) return;
-  const LearntModels models = learn_models(memory);
+  const LearntModels models = learn_models(memory, features_in(file));
   Writer writer;
   writer.word(learning_version);
   writer.word(fingerprint(memory));
   visit_members(models.place, writer);
   visit_members(models.position, writer);
   writer(models.spacing_m);
+  writer(models.by_features);
   writer(models.observation.has_value());
   if (models.observation) visit_members(*models.observation, writer);
   file.set_parameter(parameter_name, writer.text());
@@ -162,6 +180,7 @@ std::optional<LearntModels> kept_models(const MemoryFile& file, const VisualMemo
   visit_members(models.place, reader);
   visit_members(models.position, reader);
   reader(models.spacing_m);
+  reader(models.by_features);
   bool has_observation = false;
   reader(has_observation);
   if (has_observation) visit_members(models.observation.emplace(), reader);

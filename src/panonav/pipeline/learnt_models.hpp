@@ -2,6 +2,7 @@
 
 #include <optional>
 
+#include "panonav/localisation/feature_ranking.hpp"
 #include "panonav/localisation/observation_model.hpp"
 #include "panonav/localisation/place_model.hpp"
 #include "panonav/localisation/position_model.hpp"
@@ -17,9 +18,17 @@ struct LearntModels {
   double spacing_m = 0.0;  ///< of references with headings (`NeighbourSupport`)
   /// Empty for a memory with too few views with a position, or all of them in one place.
   std::optional<ObservationModel> observation;
+  /// Whether local features decide between the best matches (`FeatureTrial::tell_more`).
+  bool by_features = false;
   friend bool operator==(const LearntModels&, const LearntModels&) = default;
 };
-[[nodiscard]] LearntModels learn_models(const VisualMemory& memory);
+/// `features`: empty where the memory has none.
+[[nodiscard]] LearntModels learn_models(const VisualMemory& memory,
+                                        const FeatureSource& features = {});
+
+/// Reads the local features of a view of the file each time that it is asked; empty where the file
+/// has none. The file must outlive it.
+[[nodiscard]] FeatureSource features_in(const MemoryFile& file);
 
 /// Learns the models of the file's views and keeps them in the file, with a fingerprint of the
 /// views that they were learnt from; does nothing where the file has them. To be called when views

@@ -139,10 +139,12 @@ void Memoriser::store(std::span<const Observation> observations, Executor& execu
     const Observation& seen = observations[i];
     try {
       views[i].info = {seen.name, seen.pose, seen.stamp_s};
-      if (options_.thumbnails) {
+      const bool features = options_.features && file_->header().elevations;
+      if (options_.thumbnails || features) {
         const Panorama panorama = encoder_->panorama(seen);
         views[i].signature = encoder_->packed(panorama);
-        views[i].thumbnail = thumbnail_png(panorama);
+        if (options_.thumbnails) views[i].thumbnail = thumbnail_png(panorama);
+        if (features) views[i].features = pack(encoder_->features(panorama).value());
       } else {
         views[i].signature = encoder_->packed(seen);
       }

@@ -20,6 +20,9 @@ struct MemoriserOptions {
   SignatureOptions signature;          ///< of a new file
   PreprocessingOptions preprocessing;  ///< of a new file
   bool thumbnails = true;              ///< keep small pictures of the views for people
+  /// Keep local features, with which places 1 to 2 m apart are found (about 4 kB a view); none are
+  /// kept where elevations are unknown.
+  bool features = true;
   /// Hears of an observation whose picture does not fit the others, such as one of another size,
   /// which is then left out; empty: `add` throws.
   std::function<void(const Observation&, const Error&)> left_out;

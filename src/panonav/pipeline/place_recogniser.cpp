@@ -1,5 +1,7 @@
 #include "panonav/pipeline/place_recogniser.hpp"
 
+#include <map>
+#include <memory>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -17,6 +19,24 @@ VisualMemory views_of(const MemoryFile& file) {
   return memory;
 }
 
+/// All of the file's, so that it is not needed afterwards.
+FeatureSource kept_features(const FeatureSource& in_file, const VisualMemory& memory) {
+  auto views = std::make_shared<std::map<ViewId, LocalFeatures>>();
+  for (const ViewId view : memory.views()) {
+    if (auto features = in_file(view)) views->emplace(view, std::move(*features));
+  }
+  return [views = std::shared_ptr<const std::map<ViewId, LocalFeatures>>(std::move(views))](
+             ViewId view) -> std::optional<LocalFeatures> {
+    const auto found = views->find(view);
+    return found == views->end() ? std::nullopt : std::optional(found->second);
+  };
+}
+
+bool features_tell_more(const VisualMemory& memory, const FeatureSource& features, int components) {
+  const ColumnRanking ranking(memory, components);
+  return try_features(ranking, NeighbourSupport(ranking), features).tell_more();
+}
+
 Localiser localiser_for(const MemoryFile& file, const VisualMemory& memory,
                         const LocaliserOptions& options) {
   const int most = memory.shape().components;
@@ -25,12 +45,16 @@ Localiser localiser_for(const MemoryFile& file, const VisualMemory& memory,
                         "1 to " + std::to_string(most) + ", the memory's");
   }
   // What is kept was learnt over all components.
-  if (options.components == 0) {
-    if (const auto models = kept_models(file, memory)) {
-      return {memory, models->place, models->position, options, models->spacing_m};
-    }
+  const auto models = options.components == 0 ? kept_models(file, memory) : std::nullopt;
+  Localiser localiser =
+      models ? Localiser(memory, models->place, models->position, options, models->spacing_m)
+             : Localiser(memory, options);
+  const FeatureSource features = features_in(file);
+  if (features &&
+      (models ? models->by_features : features_tell_more(memory, features, options.components))) {
+    localiser.rank_by_features(kept_features(features, memory));
   }
-  return Localiser(memory, options);
+  return localiser;
 }
 
 }  // namespace
@@ -63,13 +87,21 @@ PlaceRecogniser& PlaceRecogniser::operator=(PlaceRecogniser&&) noexcept = defaul
 Place PlaceRecogniser::localise(const Observation& observation,
                                 std::span<const std::string> excluded_names) const {
   const auto& [memory, encoder, localiser, accuracy, areas] = *implementation_;
-  const PackedSignature query = encoder.packed(observation);
+  std::optional<LocalFeatures> features;
+  PackedSignature query;
+  if (localiser.ranks_by_features()) {
+    const Panorama panorama = encoder.panorama(observation);
+    features = encoder.features(panorama);
+    query = encoder.packed(panorama);
+  } else {
+    query = encoder.packed(observation);
+  }
   std::vector<ViewId> excluded;
   for (const std::string& name : excluded_names) {
     if (const auto view = memory.find(name)) excluded.push_back(*view);
   }
   const SearchMask mask{excluded, {}};
-  const Localisation found = localiser.localise(query, mask);
+  const Localisation found = localiser.localise(query, mask, features ? &*features : nullptr);
   Place place{.known = found.known,
               .heading_rad = found.heading_rad,
               .components = found.components,
@@ -77,6 +109,7 @@ Place PlaceRecogniser::localise(const Observation& observation,
   for (const LocalisedMatch& match : found.matches) {
     place.matches.push_back(
         {memory.info(match.view).name, match.view, match.dissimilarity, match.column_difference,
+         match.verified_features,
          match.compass ? std::optional(match.compass->heading_rad) : std::nullopt});
   }
   if (found.position) {

@@ -21,6 +21,9 @@ struct PlaceMatch {
   ViewId view;
   std::uint32_t dissimilarity = 0;  ///< integer L1 over packed magnitudes
   double column_difference = 0.0;   ///< after turning (`ColumnMatch`)
+  /// Local features that agree with one turn and one direction of motion; empty where they do not
+  /// decide.
+  std::optional<int> verified_features;
   /// Of the robot relative to this view; empty when one of them has no structure.
   std::optional<double> heading_rad;
 };

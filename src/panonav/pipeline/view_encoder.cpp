@@ -182,6 +182,10 @@ PackedSignature ViewEncoder::packed(const Panorama& panorama) const {
   return pack(signature(panorama), header_.full_scale);
 }
 
+std::optional<LocalFeatures> ViewEncoder::features(const Panorama& panorama) const {
+  return extract_features(panorama, header_.preprocessing);
+}
+
 Panorama ViewEncoder::read(const DatasetEntry& entry) const {
   const Image picture = read_image(entry.path);
   try {

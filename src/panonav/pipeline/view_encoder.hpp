@@ -12,6 +12,7 @@
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/panorama_reader.hpp"
 #include "panonav/pipeline/observation.hpp"
+#include "panonav/signature/local_features.hpp"
 #include "panonav/signature/signature_extractor.hpp"
 #include "panonav/storage/memory_file.hpp"
 
@@ -56,6 +57,9 @@ class ViewEncoder {
   [[nodiscard]] PackedSignature packed(const Observation& observation) const;
   [[nodiscard]] PackedSignature packed(ImageView picture) const;
   [[nodiscard]] PackedSignature packed(const Panorama& panorama) const;
+
+  /// Of a panorama of the memory's shape; empty where elevations are unknown.
+  [[nodiscard]] std::optional<LocalFeatures> features(const Panorama& panorama) const;
 
  private:
   [[nodiscard]] Panorama checked(Panorama panorama) const;

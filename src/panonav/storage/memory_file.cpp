@@ -49,10 +49,11 @@ std::int64_t view_checksum(RecordBytes& scratch, ViewId id, const ReferenceInfo&
   return static_cast<std::int64_t>(checksum(signature, checksum(scratch.bytes())));
 }
 
-std::int64_t thumbnail_checksum(ViewId view, std::span<const std::uint8_t> picture) {
+// Of a thumbnail or of local features.
+std::int64_t bytes_checksum(ViewId view, std::span<const std::uint8_t> bytes) {
   RecordBytes record;
   record.add(std::int64_t{view.value});
-  return static_cast<std::int64_t>(checksum(picture, checksum(record.bytes())));
+  return static_cast<std::int64_t>(checksum(bytes, checksum(record.bytes())));
 }
 
 std::int64_t link_checksum(const Link& link) {
@@ -218,8 +219,16 @@ void MemoryFile::Implementation::insert(ViewId id, const NewView& view) {
   if (!view.thumbnail.empty()) {
     insert_thumbnail.bind(1, std::int64_t{id.value})
         .bind(2, std::span<const std::uint8_t>(view.thumbnail))
-        .bind(3, thumbnail_checksum(id, view.thumbnail));
+        .bind(3, bytes_checksum(id, view.thumbnail));
     if (insert_thumbnail.run() != 0) database.fail_damaged("a thumbnail without a view");
+  }
+  if (!view.features.empty()) {
+    // Older files that are only read have no such table.
+    Statement insert(database, "INSERT INTO features(view, features, checksum) VALUES(?, ?, ?)");
+    insert.bind(1, std::int64_t{id.value})
+        .bind(2, std::span<const std::uint8_t>(view.features))
+        .bind(3, bytes_checksum(id, view.features));
+    if (insert.run() != 0) database.fail_damaged("local features without a view");
   }
 }
 
@@ -324,6 +333,12 @@ void MemoryFile::remove(std::span<const ViewId> views) {
     }
   }
   if (has_map_table(database)) forget_in_maps(database, views);
+  if (has_feature_table(database)) {
+    Statement features(database, "DELETE FROM features WHERE view = ?");
+    for (const ViewId view : views) {
+      static_cast<void>(features.bind(1, std::int64_t{view.value}).run());
+    }
+  }
   transaction.commit();
 }
 
@@ -425,11 +440,25 @@ std::optional<std::vector<std::uint8_t>> MemoryFile::thumbnail(ViewId view) cons
   Statement row(database, "SELECT picture, checksum FROM thumbnails WHERE view = ?");
   if (!row.bind(1, std::int64_t{view.value}).step()) return std::nullopt;
   const auto picture = row.blob(0);
-  if (row.integer(1) != thumbnail_checksum(view, picture)) {
+  if (row.integer(1) != bytes_checksum(view, picture)) {
     database.fail_damaged("the thumbnail of view " + std::to_string(view.value) +
                           " does not match its checksum");
   }
   return std::vector<std::uint8_t>(picture.begin(), picture.end());
+}
+
+std::optional<std::vector<std::uint8_t>> MemoryFile::features(ViewId view) const {
+  Database& database = implementation_->database;
+  if (!implementation_->contains(view)) refuse_view(view);
+  if (!has_feature_table(database)) return std::nullopt;
+  Statement row(database, "SELECT features, checksum FROM features WHERE view = ?");
+  if (!row.bind(1, std::int64_t{view.value}).step()) return std::nullopt;
+  const auto features = row.blob(0);
+  if (row.integer(1) != bytes_checksum(view, features)) {
+    database.fail_damaged("the local features of view " + std::to_string(view.value) +
+                          " do not match their checksum");
+  }
+  return std::vector<std::uint8_t>(features.begin(), features.end());
 }
 
 void MemoryFile::set_parameter(std::string_view name, std::string_view value) {
@@ -569,18 +598,29 @@ std::vector<MemoryFault> MemoryFile::verify() const {
       row.reset();
     }
   });
-  check(std::nullopt, [&] {
-    Statement ids(database, "SELECT view FROM thumbnails ORDER BY view");
-    ViewId before{0};
-    while (ids.step()) {
-      const ViewId view = implementation_->id_in(ids, 0);
-      if (view <= std::exchange(before, view)) database.fail_damaged("thumbnails are out of order");
-      check(view, [&] {
-        if (!views.contains(view)) database.fail_damaged("a thumbnail without a view");
-        static_cast<void>(thumbnail(view));
-      });
-    }
-  });
+  const auto check_beside_views = [&](const char* table, const auto& read) {
+    check(std::nullopt, [&] {
+      Statement ids(database,
+                    ("SELECT view FROM " + std::string(table) + " ORDER BY view").c_str());
+      ViewId before{0};
+      while (ids.step()) {
+        const ViewId view = implementation_->id_in(ids, 0);
+        if (view <= std::exchange(before, view)) {
+          database.fail_damaged(std::string(table) + " are out of order");
+        }
+        check(view, [&] {
+          if (!views.contains(view)) {
+            database.fail_damaged("an entry of " + std::string(table) + " without a view");
+          }
+          static_cast<void>(read(view));
+        });
+      }
+    });
+  };
+  check_beside_views("thumbnails", [&](ViewId view) { return thumbnail(view); });
+  if (has_feature_table(database)) {
+    check_beside_views("features", [&](ViewId view) { return features(view); });
+  }
   check(std::nullopt, [&] {
     Statement links(database, "SELECT a, b, kind, checksum FROM links ORDER BY a, b");
     std::pair<std::int64_t, std::int64_t> before{0, 0};
@@ -624,6 +664,11 @@ MemoryFileInfo MemoryFile::info() const {
   info.views_with_heading = count("SELECT count(heading_rad) FROM views WHERE id > 0");
   info.links = count("SELECT count(*) FROM links WHERE a > 0");
   info.thumbnails = count("SELECT count(*) FROM thumbnails WHERE view > 0");
+  if (has_feature_table(database)) {
+    info.views_with_features = count("SELECT count(*) FROM features WHERE view > 0");
+    info.feature_bytes =
+        count("SELECT coalesce(sum(length(features)), 0) FROM features WHERE view > 0");
+  }
   if (has_chain_tables(database)) {
     info.unused_chains = count("SELECT count(*) FROM (SELECT 1 FROM chains LIMIT 1000000)");
   }

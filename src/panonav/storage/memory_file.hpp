@@ -40,6 +40,7 @@ struct NewView {
   ReferenceInfo info;
   PackedSignature signature;
   std::vector<std::uint8_t> thumbnail;  ///< a PNG or JPEG file for people to look at; empty: none
+  std::vector<std::uint8_t> features;   ///< packed `LocalFeatures`; empty: none
 };
 
 enum class Access { read_only, read_write };
@@ -58,6 +59,8 @@ struct MemoryFileInfo {
   std::uint64_t views_with_heading = 0;
   std::uint64_t links = 0;
   std::uint64_t thumbnails = 0;
+  std::uint64_t views_with_features = 0;
+  std::uint64_t feature_bytes = 0;  ///< packed local features of all views
   /// Chains of snapshots that an earlier version saved. They are kept, and nothing reads them.
   /// Counted up to a million.
   std::uint64_t unused_chains = 0;
@@ -108,8 +111,8 @@ class MemoryFile {
   ViewId append(const NewView& view);
   /// All views in one transaction: all or none. Much faster than one by one.
   std::vector<ViewId> append(std::span<const NewView> views);
-  /// Also drops the view's links and thumbnail and its node in maps, in one transaction for all.
-  /// Throws ContractError when there is no such view; then nothing is removed.
+  /// Also drops the view's links, thumbnail and features and its node in maps, in one transaction
+  /// for all. Throws ContractError when there is no such view; then nothing is removed.
   void remove(std::span<const ViewId> views);
   void set_pose(ViewId view, const std::optional<ReferencePose>& pose);
   /// Gives a view another name. Throws ContractError when there is no such view, and on a name that
@@ -126,6 +129,9 @@ class MemoryFile {
   [[nodiscard]] std::vector<ViewId> views_with_thumbnail() const;
   /// The picture file that was stored with the view; empty where there is none.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> thumbnail(ViewId view) const;
+
+  /// The packed local features of the view; empty where there are none.
+  [[nodiscard]] std::optional<std::vector<std::uint8_t>> features(ViewId view) const;
 
   /// What was learnt from the views (a model of unknown places, weights), by name, as text.
   void set_parameter(std::string_view name, std::string_view value);

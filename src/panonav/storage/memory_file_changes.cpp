@@ -22,8 +22,8 @@ namespace {
 constexpr int max_undo_bytes = 200 << 20;  // SQLite takes fields of 256 MiB
 
 // Tables whose rows `undo` brings back.
-constexpr std::array<const char*, 7> tables{"views",    "thumbnails", "links",       "maps",
-                                            "settings", "routes",     "route_blocks"};
+constexpr std::array<const char*, 8> tables{"views",    "thumbnails", "links",        "maps",
+                                            "settings", "routes",     "route_blocks", "features"};
 
 struct EndSession {
   void operator()(sqlite3_session* session) const noexcept { sqlite3session_delete(session); }

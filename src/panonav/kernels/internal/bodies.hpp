@@ -28,6 +28,14 @@ struct DistanceBody {
 };
 
 template <Instructions set>
+struct FeatureMatchBody {
+  static void nearest_descriptors(const uint64_t* a, size_t a_count, const uint64_t* b,
+                                  size_t b_count, uint16_t* nearest_of_a, uint16_t* nearest_of_b);
+  static void count_explained(const BearingLane* lanes, size_t lane_count, const float* directions,
+                              size_t direction_count, float square_tolerance, int32_t* counts);
+};
+
+template <Instructions set>
 struct MotionBody {
   static void normal_pairs(const uint64_t* bits, float* first, float* second, int count);
   static void move_poses(double* x_m, double* y_m, double* heading_rad, const double* forward_m,

@@ -29,13 +29,17 @@ struct Table {
 
 // Links have a < b. Every checksum is XXH64 over the other fields of its row (docs/formats.md). The
 // table `log` comes first, so that new files have it on their second page.
-constexpr std::array<Table, 9> tables{{
+constexpr std::array<Table, 10> tables{{
     {"log",
      "CREATE TABLE log(id INTEGER PRIMARY KEY, before BLOB NOT NULL, now BLOB NOT NULL) STRICT", 5},
     {"undo",
      "CREATE TABLE undo(id INTEGER PRIMARY KEY, what TEXT NOT NULL, changes BLOB NOT NULL, "
      "checksum INTEGER NOT NULL) STRICT",
      5},
+    {"features",
+     "CREATE TABLE features(view INTEGER PRIMARY KEY, features BLOB NOT NULL, checksum INTEGER NOT "
+     "NULL) STRICT",
+     6},
     {"links",
      "CREATE TABLE links(a INTEGER NOT NULL, b INTEGER NOT NULL, kind INTEGER NOT NULL, checksum "
      "INTEGER NOT NULL, PRIMARY KEY(a, b)) STRICT, WITHOUT ROWID",
@@ -185,7 +189,7 @@ void upgrade_schema(Database& database) {
   for (const Table& table : tables) {
     if (version < table.since) database.execute(table.sql);
   }
-  database.execute("INSERT INTO log VALUES(1, zeroblob(16), randomblob(16))");
+  if (version < 5) database.execute("INSERT INTO log VALUES(1, zeroblob(16), randomblob(16))");
   database.execute(("PRAGMA user_version=" + std::to_string(memory_format_version)).c_str());
 }
 
@@ -224,8 +228,7 @@ void require_schema(Database& database) {
     }
     wanted.erase(found);
   }
-  if (version == memory_format_version && wanted.contains("chains") &&
-      wanted.contains("chain_snapshots")) {
+  if (version >= 5 && wanted.contains("chains") && wanted.contains("chain_snapshots")) {
     for (const Table& table : chain_tables) wanted.erase(table.name);
   }
   for (const auto& [name, entry] : wanted)

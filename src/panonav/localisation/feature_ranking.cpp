@@ -1,0 +1,90 @@
+#include "panonav/localisation/feature_ranking.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "panonav/localisation/place_model.hpp"
+#include "panonav/localisation/sample.hpp"
+
+namespace panonav {
+
+void put_verified_first(const LocalFeatures& query, const FeatureSource& features,
+                        std::vector<RankedMatch>& ranked) {
+  const auto end = ranked.begin() + static_cast<std::ptrdiff_t>(
+                                        std::min<std::size_t>(verified_candidates, ranked.size()));
+  for (auto match = ranked.begin(); match != end; ++match) {
+    const auto there = features(match->match.view);
+    const FeatureMatch found = there ? match_features(query, *there) : FeatureMatch{};
+    match->verified_features = found.verified;
+    if (found.verified > 0) match->columns.heading_rad = found.heading_rad;
+  }
+  std::stable_sort(ranked.begin(), end, [](const RankedMatch& a, const RankedMatch& b) {
+    return *a.verified_features > *b.verified_features;
+  });
+}
+
+bool FeatureTrial::tell_more() const {
+  const int changed = gained + lost;
+  // P(gained or more of `changed`), each with probability 1/2.
+  double coefficient = 1.0;  // of `changed` over i
+  double sum = 0.0;
+  for (int i = 0; i <= changed; ++i) {
+    if (i >= gained) sum += coefficient;
+    coefficient *= static_cast<double>(changed - i) / (i + 1);
+  }
+  return changed > 0 && sum * std::pow(0.5, changed) <= 0.05;
+}
+
+FeatureTrial try_features(const ColumnRanking& ranking, const NeighbourSupport& support,
+                          const FeatureSource& features) {
+  constexpr int most_sampled = 40;
+  constexpr double right_ratio = 1.5;
+  const VisualMemory& memory = ranking.memory();
+  const std::span<const ViewId> views = memory.views();
+  FeatureTrial trial;
+  if (views.size() < static_cast<std::size_t>(PlaceModel::min_views)) return trial;
+  const bool posed =
+      std::ranges::all_of(views, [&](ViewId view) { return memory.info(view).pose.has_value(); });
+  for (const ViewId view : sample_views(views, most_sampled, 1)) {
+    const auto own = features(view);
+    if (!own) continue;
+    const auto rank = std::ranges::lower_bound(views, view) - views.begin();
+    const auto apart = [&](ViewId other) {
+      if (!posed) {
+        const auto there = std::ranges::lower_bound(views, other) - views.begin();
+        return static_cast<double>(std::abs(there - rank));
+      }
+      return distance(memory.info(other).pose->position(), memory.info(view).pose->position());
+    };
+    // A robot that stands still takes the same view again.
+    std::vector<ViewId> excluded;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const ViewId other : views) {
+      const double distance_m = apart(other);
+      if (distance_m > 0.0) {
+        nearest = std::min(nearest, distance_m);
+      } else {
+        excluded.push_back(other);
+      }
+    }
+    const PackedSignature query = memory.packed(view);
+    const auto found = memory.search(
+        query, {.top = verified_candidates, .components = ranking.components()}, {excluded, {}});
+    std::vector<RankedMatch> ranked = ranking.rank(query, found.matches);
+    if (ranked.empty()) continue;
+    support.put_best_supported_first(ColumnProfiles(query, ranking.components()), ranked, excluded);
+    const auto is_right = [&] { return apart(ranked[0].match.view) <= right_ratio * nearest; };
+    const bool by_columns = is_right();
+    put_verified_first(*own, features, ranked);
+    const bool by_features = is_right();
+    ++trial.sampled_views;
+    trial.columns_right += by_columns ? 1 : 0;
+    trial.features_right += by_features ? 1 : 0;
+    trial.gained += by_features && !by_columns ? 1 : 0;
+    trial.lost += by_columns && !by_features ? 1 : 0;
+  }
+  return trial;
+}
+
+}  // namespace panonav

@@ -1,0 +1,418 @@
+#include "panonav/signature/local_features.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/kernels/feature_match.hpp"
+
+namespace panonav {
+
+namespace {
+
+// How far from the corner the compared places lie, at most, and the half of a stretch of azimuth in
+// which few corners are kept.
+constexpr double patch_rad = radians(8.0);
+constexpr double window_rad = radians(6.0);
+constexpr int kept_in_window = 4;
+// Corners closer than this to the upper or lower edge lack a part of their surroundings.
+constexpr int margin_rows = 3;
+constexpr int descriptor_bits = 256;
+
+// Grey levels with columns repeated beyond both ends and the outer rows repeated: loops need no
+// wrapping.
+template <class Value>
+struct Padded {
+  Padded(int rows_, int columns_, int pad_rows_, int pad_columns_)
+      : rows(rows_),
+        columns(columns_),
+        pad_rows(pad_rows_),
+        pad_columns(pad_columns_),
+        stride(columns_ + 2 * pad_columns_),
+        values(static_cast<std::size_t>(rows_ + 2 * pad_rows_) * static_cast<std::size_t>(stride)) {
+  }
+  /// Row y from column 0 on.
+  Value* row(int y) { return values.data() + offset(y); }
+  const Value* row(int y) const { return values.data() + offset(y); }
+  [[nodiscard]] std::ptrdiff_t offset(int y) const {
+    return static_cast<std::ptrdiff_t>(y + pad_rows) * stride + pad_columns;
+  }
+  void pad() {
+    for (int y = 0; y < rows; ++y) {
+      Value* const at = row(y);
+      for (int x = 1; x <= pad_columns; ++x) {
+        at[-x] = at[columns - 1 - (x - 1) % columns];
+        at[columns + x - 1] = at[(x - 1) % columns];
+      }
+    }
+    for (int y = 1; y <= pad_rows; ++y) {
+      std::copy_n(row(0) - pad_columns, stride, row(-y) - pad_columns);
+      std::copy_n(row(rows - 1) - pad_columns, stride, row(rows - 1 + y) - pad_columns);
+    }
+  }
+  int rows, columns, pad_rows, pad_columns, stride;
+  std::vector<Value> values;
+};
+
+using Grey = Padded<float>;
+
+// Sums over squares of 2 radius + 1 pixels. All values are whole numbers below 2^24, or rounded
+// alike wherever a column stands: sums run in one order.
+Grey box_sums(const Grey& from, int radius, int pad_rows, int pad_columns) {
+  Grey columns(from.rows, from.columns, radius, 0);
+  for (int y = 0; y < from.rows; ++y) {
+    const float* const in = from.row(y);
+    float* const out = columns.row(y);
+    for (int x = 0; x < from.columns; ++x) out[x] = in[x - radius];
+    for (int i = 1 - radius; i <= radius; ++i) {
+      for (int x = 0; x < from.columns; ++x) out[x] += in[x + i];
+    }
+  }
+  columns.pad();
+  Grey sums(from.rows, from.columns, pad_rows, pad_columns);
+  for (int y = 0; y < from.rows; ++y) {
+    float* const out = sums.row(y);
+    for (int j = -radius; j <= radius; ++j) {
+      const float* const in = columns.row(y + j);
+      for (int x = 0; x < from.columns; ++x) out[x] += in[x];
+    }
+  }
+  sums.pad();
+  return sums;
+}
+
+// The smaller eigenvalue of the structure tensor [Shi and Tomasi 1994], over 5 x 5 pixels.
+Grey corner_strengths(const Grey& smooth) {
+  const int rows = smooth.rows;
+  const int columns = smooth.columns;
+  Grey xx(rows, columns, 0, 2);
+  Grey xy(rows, columns, 0, 2);
+  Grey yy(rows, columns, 0, 2);
+  for (int y = 0; y < rows; ++y) {
+    const float* const above = smooth.row(y - 1);
+    const float* const here = smooth.row(y);
+    const float* const below = smooth.row(y + 1);
+    for (int x = 0; x < columns; ++x) {
+      const float along = here[x + 1] - here[x - 1];
+      const float down = below[x] - above[x];
+      xx.row(y)[x] = along * along;
+      xy.row(y)[x] = along * down;
+      yy.row(y)[x] = down * down;
+    }
+  }
+  for (Grey* products : {&xx, &xy, &yy}) {
+    products->pad();
+    *products = box_sums(*products, 2, 0, 0);
+  }
+  Grey strengths(rows, columns, 2, 2);
+  for (int y = 0; y < rows; ++y) {
+    for (int x = 0; x < columns; ++x) {
+      const float a = xx.row(y)[x];
+      const float b = xy.row(y)[x];
+      const float c = yy.row(y)[x];
+      strengths.row(y)[x] = 0.5F * (a + c - std::sqrt((a - c) * (a - c) + 4.0F * b * b));
+    }
+  }
+  strengths.pad();
+  return strengths;
+}
+
+struct Corner {
+  int column, row;
+  float strength;
+};
+
+// A corner is the strongest of the 5 x 5 pixels around it; of equal ones the first.
+bool is_corner(const Grey& strengths, int row, int column) {
+  const float here = strengths.row(row)[column];
+  for (int j = -2; j <= 2; ++j) {
+    const float* const other = strengths.row(row + j) + column;
+    for (int i = -2; i <= 2; ++i) {
+      if (other[i] > here || (other[i] == here && (j < 0 || (j == 0 && i < 0)))) return false;
+    }
+  }
+  return true;
+}
+
+std::vector<Corner> corners_of(const Grey& smooth, int first_row, int end_row) {
+  // 3 x 3 pixels smooth, two lie between those whose difference is a gradient, 25 are added up: a
+  // grey level a pixel in the direction of the weaker gradient.
+  constexpr float weakest = 25.0F * (2.0F * 9.0F) * (2.0F * 9.0F);
+  const Grey strengths = corner_strengths(smooth);
+  std::vector<Corner> all;  // by column
+  for (int x = 0; x < strengths.columns; ++x) {
+    for (int y = first_row; y < end_row; ++y) {
+      const float strength = strengths.row(y)[x];
+      if (strength > weakest && is_corner(strengths, y, x)) all.push_back({x, y, strength});
+    }
+  }
+  const int columns = strengths.columns;
+  const int window = static_cast<int>(window_rad / (2.0 * std::numbers::pi) * columns);
+  std::vector<Corner> kept;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    int stronger = 0;
+    const auto count = [&](std::size_t step) {
+      for (std::size_t n = 1; n < all.size(); ++n) {
+        const Corner& other = all[(i + n * step) % all.size()];
+        const int apart = std::abs(other.column - all[i].column);
+        if (std::min(apart, columns - apart) > window) return;
+        if (other.strength > all[i].strength) ++stronger;
+      }
+    };
+    count(1);                                         // to larger columns, and round
+    if (2 * window < columns) count(all.size() - 1);  // to smaller ones
+    if (stronger < kept_in_window) kept.push_back(all[i]);
+  }
+  if (kept.size() > LocalFeatures::max_count) {
+    std::ranges::stable_sort(kept, std::greater<>(), &Corner::strength);
+    kept.resize(LocalFeatures::max_count);
+  }
+  std::ranges::sort(kept, {}, [](const Corner& c) { return std::pair(c.row, c.column); });
+  return kept;
+}
+
+// Pairs of places around a corner, denser near it, the same for every view [Calonder et al. 2010].
+std::array<std::array<int, 4>, descriptor_bits> pairs_within(int rows, int columns) {
+  Random random(5);
+  const auto drawn = [&](int radius) {
+    double value = 0.0;
+    do value = random.normal(0.0, 0.5 * radius);
+    while (std::abs(value) > radius);
+    return static_cast<int>(std::lround(value));
+  };
+  std::array<std::array<int, 4>, descriptor_bits> pairs{};
+  for (auto& pair : pairs) {
+    do {
+      for (std::size_t i = 0; i < pair.size(); ++i) pair[i] = drawn(i % 2 == 0 ? columns : rows);
+    } while (pair[0] == pair[2] && pair[1] == pair[3]);
+  }
+  return pairs;
+}
+
+double row_height(PanoramaShape shape, ElevationBand band) {
+  return (band.top_rad - band.bottom_rad) / shape.rows;
+}
+
+// What a comparison needs of each feature.
+struct Bearings {
+  explicit Bearings(const LocalFeatures& view) {
+    const double column_rad = 2.0 * std::numbers::pi / view.shape.columns;
+    const double row_rad = row_height(view.shape, view.elevations);
+    words.reserve(4 * view.features.size());
+    for (const LocalFeature& feature : view.features) {
+      const double azimuth = column_rad * feature.column;
+      sines.push_back(static_cast<float>(std::sin(azimuth)));
+      cosines.push_back(static_cast<float>(std::cos(azimuth)));
+      tangents.push_back(
+          static_cast<float>(std::tan(view.elevations.top_rad - (feature.row + 0.5) * row_rad)));
+      words.insert(words.end(), feature.bits.begin(), feature.bits.end());
+    }
+  }
+  std::vector<float> sines, cosines, tangents;
+  std::vector<std::uint64_t> words;
+};
+
+constexpr int turns = 128;
+constexpr int directions = 32;
+constexpr double tolerance_rad = radians(2.0);
+// A feature is at least half as far away as the views are apart, as seen from either.
+constexpr float max_ratio = 2.0F;
+
+struct Circle2 {
+  std::array<float, turns> sines, cosines;
+};
+// Cosines and sines of `step` i.
+Circle2 circle_of(double step) {
+  Circle2 circle{};
+  for (std::size_t i = 0; i < circle.sines.size(); ++i) {
+    circle.sines[i] = static_cast<float>(std::sin(step * static_cast<double>(i)));
+    circle.cosines[i] = static_cast<float>(std::cos(step * static_cast<double>(i)));
+  }
+  return circle;
+}
+
+}  // namespace
+
+std::optional<LocalFeatures> extract_features(const Panorama& panorama,
+                                              const PreprocessingOptions& preprocessing) {
+  if (!panorama.elevations()) return std::nullopt;
+  const PanoramaShape shape{panorama.rows(), panorama.columns()};
+  check_masks(preprocessing, shape.rows);
+  LocalFeatures view{shape, *panorama.elevations(), {}};
+  const int radius_columns = std::max(
+      3, static_cast<int>(std::lround(patch_rad / (2.0 * std::numbers::pi) * shape.columns)));
+  const int radius_rows =
+      std::clamp(static_cast<int>(std::lround(patch_rad / row_height(shape, view.elevations))), 3,
+                 std::max(3, shape.rows));
+  Grey grey(shape.rows, shape.columns, 1, 1);
+  for (int y = 0; y < shape.rows; ++y) {
+    const std::span<const float> from = panorama.row(y);
+    float* const to = grey.row(y);
+    for (int x = 0; x < shape.columns; ++x) {
+      to[x] = static_cast<float>(static_cast<int>(std::clamp(from[x], 0.0F, 1.0F) * 255.0F + 0.5F));
+    }
+  }
+  grey.pad();
+  const Grey smooth = box_sums(grey, 1, std::max(1, radius_rows), radius_columns);
+  const std::vector<Corner> corners =
+      corners_of(smooth, std::max(margin_rows, preprocessing.masked_rows_top),
+                 shape.rows - std::max(margin_rows, preprocessing.masked_rows_bottom));
+  const auto pairs = pairs_within(radius_rows, radius_columns);
+  std::array<std::pair<std::ptrdiff_t, std::ptrdiff_t>, descriptor_bits> offsets;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const auto& [x0, y0, x1, y1] = pairs[i];
+    offsets[i] = {std::ptrdiff_t{y0} * smooth.stride + x0, std::ptrdiff_t{y1} * smooth.stride + x1};
+  }
+  for (const Corner& corner : corners) {
+    LocalFeature& feature = view.features.emplace_back(LocalFeature{
+        static_cast<std::uint16_t>(corner.column), static_cast<std::uint16_t>(corner.row), {}});
+    const float* const here = smooth.row(corner.row) + corner.column;
+    for (std::size_t i = 0; i < offsets.size(); ++i) {
+      const bool brighter = here[offsets[i].first] < here[offsets[i].second];
+      feature.bits[i / 64] |= std::uint64_t{brighter} << (i % 64);
+    }
+  }
+  return view;
+}
+
+std::vector<std::uint8_t> pack(const LocalFeatures& view) {
+  std::vector<std::uint8_t> bytes;
+  bytes.reserve(view.features.size() * LocalFeatures::packed_bytes);
+  const auto put = [&](std::uint64_t value, int count) {
+    for (int i = 0; i < count; ++i) bytes.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
+  };
+  for (const LocalFeature& feature : view.features) {
+    put(feature.column, 2);
+    put(feature.row, 2);
+    for (const std::uint64_t word : feature.bits) put(word, 8);
+  }
+  return bytes;
+}
+
+LocalFeatures unpack_features(std::span<const std::uint8_t> bytes, PanoramaShape shape,
+                              ElevationBand elevations) {
+  constexpr std::size_t size = LocalFeatures::packed_bytes;
+  require(bytes.size() % size == 0 && bytes.size() <= size * LocalFeatures::max_count,
+          "bytes of local features", static_cast<double>(bytes.size()),
+          "36 for each, up to 256 of them");
+  LocalFeatures view{shape, elevations, {}};
+  const auto get = [&](std::size_t at, std::size_t count) {
+    std::uint64_t value = 0;
+    for (std::size_t i = 0; i < count; ++i) value |= std::uint64_t{bytes[at + i]} << (8 * i);
+    return value;
+  };
+  for (std::size_t at = 0; at < bytes.size(); at += size) {
+    LocalFeature feature{
+        static_cast<std::uint16_t>(get(at, 2)), static_cast<std::uint16_t>(get(at + 2, 2)), {}};
+    require(feature.column < shape.columns, "column of a local feature", feature.column,
+            "one of the panorama's");
+    require(feature.row < shape.rows, "row of a local feature", feature.row,
+            "one of the panorama's");
+    for (std::size_t w = 0; w < feature.bits.size(); ++w) feature.bits[w] = get(at + 4 + 8 * w, 8);
+    view.features.push_back(feature);
+  }
+  return view;
+}
+
+FeatureMatch match_features(const LocalFeatures& query, const LocalFeatures& reference) {
+  if (query.shape != reference.shape || query.elevations != reference.elevations) {
+    throw ContractError("local features", "of another panorama", "of one shape and band");
+  }
+  const Bearings seen(query);
+  const Bearings there(reference);
+  const std::size_t count = query.features.size();
+  std::vector<std::uint16_t> of_query(count);
+  std::vector<std::uint16_t> of_reference(reference.features.size());
+  const kernels::Instructions instructions = kernels::chosen_instructions();
+  kernels::nearest_descriptors(seen.words, there.words, of_query, of_reference, instructions);
+  struct Pair {
+    std::size_t query, reference;
+    float sine, cosine;  // of the azimuth in the query minus that in the reference
+  };
+  std::vector<Pair> pairs;
+  for (std::size_t i = 0; i < count && !of_reference.empty(); ++i) {
+    const std::size_t j = of_query[i];
+    if (of_reference[j] != i) continue;
+    pairs.push_back({i, j, seen.sines[i] * there.cosines[j] - seen.cosines[i] * there.sines[j],
+                     seen.cosines[i] * there.cosines[j] + seen.sines[i] * there.sines[j]});
+  }
+
+  static const Circle2 whole = circle_of(2.0 * std::numbers::pi / turns);
+  static const Circle2 half = circle_of(std::numbers::pi / turns);
+  static const std::array<float, 2 * directions> motions = [] {
+    std::array<float, 2 * directions> made{};
+    for (std::size_t d = 0; d < directions; ++d) {
+      const double angle = 2.0 * std::numbers::pi * static_cast<double>(d) / directions;
+      made[2 * d] = static_cast<float>(std::cos(angle));
+      made[2 * d + 1] = static_cast<float>(std::sin(angle));
+    }
+    return made;
+  }();
+  static const auto sine_tolerance = static_cast<float>(std::sin(tolerance_rad));
+  static const auto cosine_tolerance = static_cast<float>(std::cos(tolerance_rad));
+
+  // No turn explains more than the features that it brings within a right angle of each other.
+  std::array<std::pair<int, int>, turns> bounds;  // negative, then the turn: the best come first
+  for (std::size_t t = 0; t < turns; ++t) {
+    int bound = 0;
+    for (const Pair& p : pairs) {
+      bound += p.cosine * whole.cosines[t] - p.sine * whole.sines[t] > 0.0F ? 1 : 0;
+    }
+    bounds[t] = {-bound, static_cast<int>(t)};
+  }
+  std::ranges::sort(bounds);
+
+  FeatureMatch match;
+  constexpr std::size_t lane_size = kernels::BearingLane::size;
+  std::vector<kernels::BearingLane> lanes((pairs.size() + lane_size - 1) / lane_size);
+  std::array<std::int32_t, directions> explained{};
+  for (const auto& [negative_bound, turn] : bounds) {
+    if (-negative_bound <= match.verified) break;
+    const auto t = static_cast<std::size_t>(turn);
+    const float sine = half.sines[t];
+    const float cosine = half.cosines[t];
+    std::size_t used = 0;
+    for (const Pair& p : pairs) {
+      if (p.cosine * whole.cosines[t] - p.sine * whole.sines[t] <= 0.0F) continue;
+      // Parallax, counter-clockwise from the reference's bearing to the query's.
+      const float parallax = p.sine * whole.cosines[t] + p.cosine * whole.sines[t];
+      const float size = std::abs(parallax);
+      const float sign = parallax < 0.0F ? -1.0F : 1.0F;
+      kernels::BearingLane& lane = lanes[used / lane_size];
+      const std::size_t i = used % lane_size;
+      ++used;
+      lane.query_sine[i] = sign * (seen.sines[p.query] * cosine + seen.cosines[p.query] * sine);
+      lane.query_cosine[i] = sign * (seen.cosines[p.query] * cosine - seen.sines[p.query] * sine);
+      lane.reference_sine[i] =
+          sign * (there.sines[p.reference] * cosine - there.cosines[p.reference] * sine);
+      lane.reference_cosine[i] =
+          sign * (there.cosines[p.reference] * cosine + there.sines[p.reference] * sine);
+      lane.query_tangent[i] = seen.tangents[p.query];
+      lane.reference_tangent[i] = there.tangents[p.reference];
+      lane.min_sine[i] =
+          size <= sine_tolerance ? -2.0F : (size * cosine_tolerance - sine_tolerance) / max_ratio;
+    }
+    const std::size_t used_lanes = (used + lane_size - 1) / lane_size;
+    for (std::size_t i = used; i < used_lanes * lane_size; ++i) {
+      kernels::BearingLane& lane = lanes[i / lane_size];
+      const std::size_t at = i % lane_size;
+      lane.query_sine[at] = lane.query_cosine[at] = lane.query_tangent[at] = 0.0F;
+      lane.reference_sine[at] = lane.reference_cosine[at] = lane.reference_tangent[at] = 0.0F;
+      lane.min_sine[at] = 2.0F;
+    }
+    kernels::count_explained(std::span(lanes).first(used_lanes), motions,
+                             sine_tolerance * sine_tolerance, explained, instructions);
+    const std::int32_t most = *std::ranges::max_element(explained);
+    if (most > match.verified) {
+      match.verified = most;
+      match.heading_rad = wrap_angle(2.0 * std::numbers::pi * turn / turns);
+    }
+  }
+  return match;
+}
+
+}  // namespace panonav
