@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
 #include "panonav/simulation/scenes.hpp"
 #include "support/skips.hpp"
 
@@ -54,6 +55,20 @@ TEST(HomingRun, BothDrivesGetHomeInOfficeAndLab) {
       }
     }
   }
+}
+
+TEST(HomingRun, ATiltedRobotGetsHomeWithAnInertialSensorAndWithout) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  Executor executor(2);
+  HomingPlace place = place_of("office");
+  place.camera.frame.tilt_rad = radians(6.0);
+  const auto tasks = random_homing_tasks(place, 20, 1.0, 5);
+  HomingRunOptions blind;
+  blind.vector.tilt = false;
+  EXPECT_LE(successes(run_home(place, tasks, blind, 6, executor)), 10U);
+  EXPECT_GE(successes(run_home(place, tasks, {}, 6, executor)), 17U);
+  place.camera.levelled = true;
+  EXPECT_GE(successes(run_home(place, tasks, {}, 6, executor)), 18U);
 }
 
 TEST(HomingRun, AHolonomicRobotDoesNotTurn) {

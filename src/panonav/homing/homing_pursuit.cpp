@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/relative_pose/relative_tilt.hpp"
 
 namespace panonav {
 
@@ -76,7 +77,22 @@ FourierHomingOptions HomingPursuit::vector_of_stage(const HomingView& current) c
   return vector;
 }
 
-PursuitDecision HomingPursuit::decide(const HomingView& current) {
+// As a robot would see it that is tilted as the one at home was. The heading is better known once
+// the view is level, and then the tilt, too.
+HomingView HomingPursuit::tilted_as_at_home(const HomingView& seen) const {
+  constexpr int passes = 2;
+  HomingView level = seen;
+  for (int i = 0; i < passes; ++i) {
+    const HomeVector vector = home_vector(home_, level, vector_);
+    const Tilt tilt = relative_tilt(home_, seen, vector.heading_rad);
+    if (tilt == Tilt{}) return seen;
+    level = levelled(seen, tilt);
+  }
+  return level;
+}
+
+PursuitDecision HomingPursuit::decide(const HomingView& seen) {
+  const HomingView current = vector_.tilt && home_.elevations() ? tilted_as_at_home(seen) : seen;
   PursuitDecision decision;
   decision.difference = image_difference(home_, current);
   ++steps_since_min_;

@@ -73,13 +73,16 @@ class HomingPursuit {
   explicit HomingPursuit(HomingView home, const HomingPursuitOptions& options = {},
                          const FourierHomingOptions& vector = {});
 
-  /// Throws ContractError as `home_vector`. After a decision that stops, further ones do too.
-  [[nodiscard]] PursuitDecision decide(const HomingView& current);
+  /// With the option `tilt` of the home vector and known elevations, the tilt of the robot against
+  /// the one at home is found and taken out first (`relative_tilt`). Throws ContractError as
+  /// `home_vector`. After a decision that stops, further ones do too.
+  [[nodiscard]] PursuitDecision decide(const HomingView& seen);
 
   [[nodiscard]] const HomingView& home() const noexcept { return home_; }
   [[nodiscard]] int steps() const noexcept { return steps_; }
 
  private:
+  [[nodiscard]] HomingView tilted_as_at_home(const HomingView& seen) const;
   [[nodiscard]] FourierHomingOptions vector_of_stage(const HomingView& current) const;
   [[nodiscard]] bool goes_on(double difference) const noexcept;
 

@@ -1,0 +1,179 @@
+#include "panonav/relative_pose/relative_tilt.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "panonav/geometry/angles.hpp"
+#include "panonav/signature/fourier_signature.hpp"
+
+namespace panonav {
+
+namespace {
+
+/// Coarse structure first, which the tilt moves by less than its own size.
+struct TiltStage {
+  int frequencies;
+  double smoothed_rad;  // of the Gaussian over rows
+};
+constexpr std::array<TiltStage, 2> tilt_stages{{{6, radians(5.0)}, {12, radians(2.0)}}};
+constexpr int tilt_iterations = 3;
+constexpr int tilt_columns = 48;
+/// Rows at either end are partly out of sight once a view is levelled.
+constexpr double tilt_margin_rad = radians(5.0);
+/// What is expected before anything is seen, one standard deviation: two views tilted by some 3
+/// degrees each; displacements of a third of the distance of things; headings known to 10 degrees.
+constexpr double usual_tilt_rad = 0.06;
+constexpr double usual_displacement = 0.3;
+constexpr double usual_turn_rad = 0.2;
+
+/// The cylinder of the first frequencies.
+Panorama cylinder(const HomingView& view, int frequencies, int columns) {
+  Panorama panorama(view.rows(), columns, view.elevations());
+  for (int k = 0; k < std::min(frequencies, view.components()); ++k) {
+    for (int c = 0; c < columns; ++c) {
+      const double phase = 2.0 * std::numbers::pi * k * c / columns;
+      const auto cosine = static_cast<float>(k == 0 ? 0.5 : std::cos(phase));
+      const auto sine = static_cast<float>(std::sin(phase));
+      for (int y = 0; y < view.rows(); ++y)
+        panorama.at(y, c) += view.a(y, k) * cosine + view.b(y, k) * sine;
+    }
+  }
+  return panorama;
+}
+
+Panorama smoothed_over_rows(const Panorama& panorama, double sigma_rows) {
+  const int reach = static_cast<int>(std::ceil(2.5 * sigma_rows));
+  std::vector<float> kernel;
+  float sum = 0.0F;
+  for (int d = -reach; d <= reach; ++d) {
+    kernel.push_back(static_cast<float>(std::exp(-0.5 * d * d / (sigma_rows * sigma_rows))));
+    sum += kernel.back();
+  }
+  Panorama result(panorama.rows(), panorama.columns(), panorama.elevations());
+  for (int y = 0; y < panorama.rows(); ++y) {
+    for (int d = -reach; d <= reach; ++d) {
+      const int from = std::clamp(y + d, 0, panorama.rows() - 1);
+      const float weight = kernel[static_cast<std::size_t>(d + reach)] / sum;
+      for (int c = 0; c < panorama.columns(); ++c) result.at(y, c) += weight * panorama.at(from, c);
+    }
+  }
+  return result;
+}
+
+/// Turn, displacement in two directions, pitch, roll.
+constexpr std::size_t unknowns = 5;
+struct TiltNormal {
+  std::array<std::array<double, unknowns>, unknowns> matrix{};
+  std::array<double, unknowns> right{};
+  double energy = 0.0;
+  double values = 0.0;
+};
+
+/// What is left of the home view once the current one is levelled, and how the unknowns change it.
+TiltNormal tilt_normal(const Panorama& home, const Panorama& level, int margin) {
+  TiltNormal normal;
+  const int columns = level.columns();
+  const int rows = level.rows();
+  const auto& band = *level.elevations();
+  const double across = columns / (4.0 * std::numbers::pi);
+  const double down = rows / (2.0 * (band.top_rad - band.bottom_rad));
+  for (int y = margin; y < rows - margin; ++y) {
+    const double elevation = level.elevation_rad(y);
+    const double tangent = std::tan(elevation);
+    const double approach = std::sin(elevation) * std::cos(elevation);
+    for (int c = 0; c < columns; ++c) {
+      const int left = c == 0 ? columns - 1 : c - 1;
+      const int right = c + 1 == columns ? 0 : c + 1;
+      const double cosine = std::cos(2.0 * std::numbers::pi * c / columns);
+      const double sine = std::sin(2.0 * std::numbers::pi * c / columns);
+      const double aside = across * static_cast<double>(level.at(y, right) - level.at(y, left));
+      const double up = down * static_cast<double>(level.at(y - 1, c) - level.at(y + 1, c));
+      const std::array<double, unknowns> slopes{
+          aside, aside * sine + up * approach * cosine, -aside * cosine + up * approach * sine,
+          up * cosine + aside * tangent * sine, -up * sine + aside * tangent * cosine};
+      const auto rest = static_cast<double>(home.at(y, c) - level.at(y, c));
+      for (std::size_t i = 0; i < unknowns; ++i) {
+        for (std::size_t j = 0; j <= i; ++j) normal.matrix[i][j] += slopes[i] * slopes[j];
+        normal.right[i] += slopes[i] * rest;
+      }
+      normal.energy += rest * rest;
+      normal.values += 1.0;
+    }
+  }
+  return normal;
+}
+
+/// Of a symmetric, positive definite system of which the lower half is given: Cholesky's rule.
+std::array<double, unknowns> solved(TiltNormal normal) {
+  auto& m = normal.matrix;
+  auto& x = normal.right;
+  for (std::size_t i = 0; i < unknowns; ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      double sum = m[i][j];
+      for (std::size_t k = 0; k < j; ++k) sum -= m[i][k] * m[j][k];
+      m[i][j] = i == j ? std::sqrt(std::max(sum, 1e-300)) : sum / m[j][j];
+    }
+    for (std::size_t k = 0; k < i; ++k) x[i] -= m[i][k] * x[k];
+    x[i] /= m[i][i];
+  }
+  for (std::size_t i = unknowns; i-- > 0;) {
+    for (std::size_t k = i + 1; k < unknowns; ++k) x[i] -= m[k][i] * x[k];
+    x[i] /= m[i][i];
+  }
+  return x;
+}
+
+}  // namespace
+
+Tilt relative_tilt(const HomingView& home, const HomingView& current, double heading_rad) {
+  constexpr int min_rows = 10;
+  Tilt tilt;
+  if (!home.elevations() || home.elevations() != current.elevations() ||
+      home.rows() != current.rows() || home.rows() < min_rows) {
+    return tilt;
+  }
+  const auto& band = *home.elevations();
+  const double row_rad = (band.top_rad - band.bottom_rad) / home.rows();
+  const int margin =
+      std::clamp(static_cast<int>(std::ceil(tilt_margin_rad / row_rad)), 1, (home.rows() - 2) / 3);
+  const HomingView aligned = turn(home, -heading_rad);
+  for (const TiltStage& stage : tilt_stages) {
+    const double sigma_rows = stage.smoothed_rad / row_rad;
+    const Panorama wanted =
+        smoothed_over_rows(cylinder(aligned, stage.frequencies, tilt_columns), sigma_rows);
+    const Panorama seen =
+        smoothed_over_rows(cylinder(current, stage.frequencies, tilt_columns), sigma_rows);
+    for (int i = 0; i < tilt_iterations; ++i) {
+      TiltNormal normal = tilt_normal(wanted, level_panorama(seen, tilt), margin);
+      if (!(normal.energy > 0.0)) return tilt;
+      const double noise = normal.energy / normal.values;
+      const double certain = noise / (usual_tilt_rad * usual_tilt_rad);
+      normal.matrix[0][0] += noise / (usual_turn_rad * usual_turn_rad);
+      for (const std::size_t displacement : {1U, 2U})
+        normal.matrix[displacement][displacement] +=
+            noise / (usual_displacement * usual_displacement);
+      normal.matrix[3][3] += certain;
+      normal.matrix[4][4] += certain;
+      normal.right[3] -= certain * tilt.pitch_rad;
+      normal.right[4] -= certain * tilt.roll_rad;
+      const auto step = solved(normal);
+      constexpr double largest_rad = 0.2;  // of robots that tilt by 6 degrees, twice
+      tilt.pitch_rad = std::clamp(tilt.pitch_rad + step[3], -largest_rad, largest_rad);
+      tilt.roll_rad = std::clamp(tilt.roll_rad + step[4], -largest_rad, largest_rad);
+    }
+  }
+  return tilt;
+}
+
+HomingView levelled(const HomingView& view, const Tilt& tilt) {
+  // Four columns a period and more, so that interpolation takes little of the finest.
+  const int columns = 4 * view.components();
+  return homing_view(compute_signature(
+      level_panorama(cylinder(view, view.components(), columns), tilt), view.components()));
+}
+
+}  // namespace panonav
