@@ -108,7 +108,8 @@ void memorise(benchmark::State& state, bool thumbnails) {
   for (auto _ : state) {
     const auto path = folder.path() / "memory.panonav";
     std::filesystem::remove(path);
-    MemoriserOptions options{.source = PictureSource{}, .thumbnails = thumbnails};
+    MemoriserOptions options{
+        .source = PictureSource{}, .thumbnails = thumbnails, .features = false};
     options.source->kind = PictureKind::mirror;
     options.source->camera = mirror_camera();
     Memoriser memoriser(path, options);
@@ -134,7 +135,7 @@ void localise(benchmark::State& state) {
   const auto path = folder.path() / "memory.panonav";
   const auto seen = pictures();
   {
-    MemoriserOptions options{.source = PictureSource{}, .thumbnails = false};
+    MemoriserOptions options{.source = PictureSource{}, .thumbnails = false, .features = false};
     options.source->kind = PictureKind::mirror;
     options.source->camera = mirror_camera();
     Memoriser memoriser(path, options);
