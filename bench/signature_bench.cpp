@@ -12,6 +12,7 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/kernels/polar.hpp"
 #include "panonav/kernels/row_transform.hpp"
+#include "panonav/panorama/tilt.hpp"
 #include "panonav/signature/compass.hpp"
 #include "panonav/signature/dissimilarity.hpp"
 #include "panonav/signature/signature_extractor.hpp"
@@ -66,6 +67,14 @@ void unwrap(benchmark::State& state) {
   count_images(state);
 }
 BENCHMARK(unwrap);
+
+void level(benchmark::State& state) {
+  const Unwarper unwarper(mirror_camera(), {rows, columns});
+  const Panorama seen = unwarper.unwrap(images()[0].view());
+  for (auto _ : state) benchmark::DoNotOptimize(level_panorama(seen, {0.03, -0.04}));
+  count_images(state);
+}
+BENCHMARK(level);
 
 Panorama random_panorama(std::uint64_t seed) {
   Random random(seed);
