@@ -8,6 +8,8 @@
 
 #include "experiments/reproduction.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/geometry/alignment.hpp"
+#include "panonav/mapping/lattice.hpp"
 #include "panonav/simulation/scenes.hpp"
 #include "support/skips.hpp"
 
@@ -50,6 +52,23 @@ const MissionPlace& office() {
   static const MissionPlace place =
       make_mission_place(make_scene("office", {.seed = 71}), executor);
   return place;
+}
+
+TEST(RememberedGrid, RoomsAndCorridorsAreArrangedWithoutFolding) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  Executor two(2);
+  const MissionPlace place = make_mission_place(make_scene("loop", {.seed = 2}), two);
+  const RememberedPlace remembered = remember_grid(place, 0.3, 5, two);
+  const Lattice lattice = arrange(remembered.memory, {}, {}, two);
+  std::vector<Point2> found;
+  std::vector<Point2> truth;
+  for (std::size_t i = 0; i < lattice.nodes.size(); ++i) {
+    if (lattice.nodes[i].component != 0) continue;
+    found.push_back(lattice.nodes[i].pose.position());
+    truth.push_back(remembered.truth[i].position());
+  }
+  EXPECT_GE(found.size(), 4 * lattice.nodes.size() / 10);
+  EXPECT_LT(shape_difference(found, truth).value, 0.05);
 }
 
 TEST(Missions, ArriveOverAMemoryWithoutPositionsAndAreRepeatable) {

@@ -10,7 +10,9 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/alignment.hpp"
+#include "panonav/geometry/angles.hpp"
 #include "panonav/mapping/dissimilarity_curve.hpp"
+#include "panonav/mapping/internal/lattice_growth.hpp"
 #include "panonav/mapping/internal/lattice_solver.hpp"
 #include "panonav/mapping/lattice_graph.hpp"
 
@@ -234,6 +236,107 @@ TEST(LatticeSolver, RefusesWhatIsOutOfRange) {
   refused({.a = 0, .b = 1, .turn = SpringTurn{std::nan(""), 0.1}});
   poses[0].x_m = std::nan("");
   EXPECT_THROW((void)solve_lattice({}, poses), ContractError);
+}
+
+/// Views of two halls, and springs between those of one hall that stand near each other, read with
+/// errors as from phases. The nearer, the less is left unexplained.
+struct TwoHalls {
+  std::vector<Pose2> poses;
+  std::vector<LatticeSpring> springs;
+  static constexpr std::size_t views = 36;  // of each
+
+  explicit TwoHalls(std::uint64_t seed) : random(seed) {
+    for (std::size_t i = 0; i < 2 * views; ++i) {
+      const std::size_t at = i % views;
+      poses.push_back({static_cast<double>(at % 6), static_cast<double>(at / 6),
+                       random.uniform(-std::numbers::pi, std::numbers::pi)});
+    }
+    for (std::size_t a = 0; a < 2 * views; ++a) {
+      for (std::size_t b = a + 1; b < 2 * views; ++b) {
+        if (a / views != b / views) continue;
+        const double far = distance(poses[a].position(), poses[b].position());
+        if (far < 2.1) link(a, b, inverse(poses[a]) * poses[b], 0.1 * far);
+      }
+    }
+  }
+  void link(std::size_t a, std::size_t b, const Pose2& step, double residual) {
+    const Pose2 back = inverse(step);
+    LatticeSpring spring{.a = a, .b = b, .dissimilarity = residual};
+    spring.phases =
+        PhaseReading{.turn_rad = wrap_angle(step.heading_rad + random.normal(0.0, 0.03)),
+                     .direction_a_rad = std::atan2(step.y_m, step.x_m) + random.normal(0.0, 0.08),
+                     .direction_b_rad = std::atan2(back.y_m, back.x_m) + random.normal(0.0, 0.08),
+                     .length = std::hypot(step.x_m, step.y_m) * std::exp(random.normal(0.0, 0.15)),
+                     .points = true,
+                     .residual = residual + random.uniform(0.0, 0.05)};
+    springs.push_back(spring);
+  }
+  /// Places of the two halls that look alike: in the one as in the other, but never as much as
+  /// neighbours.
+  void link_alike(std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t a = 7 * i % views;
+      const std::size_t b = views + (a + 1) % views;
+      link(a, b, {1.0, 0.0, random.uniform(-std::numbers::pi, std::numbers::pi)}, 0.15);
+    }
+  }
+  Random random;
+};
+
+TEST(LatticeGrowth, FindsTheShapeAndKeepsWhatOnlyLooksAlikeApart) {
+  TwoHalls halls(3);
+  halls.link_alike(8);
+  const GrownLayout grown = grow_components(halls.poses.size(), halls.springs, 1.0);
+  std::vector<Point2> found;
+  std::vector<Point2> truth;
+  for (std::size_t i = 0; i < halls.poses.size(); ++i) {
+    ASSERT_EQ(grown.start.components[i], i / TwoHalls::views) << i;
+    if (i >= TwoHalls::views) continue;
+    found.push_back(grown.start.poses[i].position());
+    truth.push_back(halls.poses[i].position());
+    EXPECT_NEAR(angle_difference(grown.start.poses[i].heading_rad - halls.poses[i].heading_rad,
+                                 grown.start.poses[0].heading_rad - halls.poses[0].heading_rad),
+                0.0, 0.1);
+  }
+  EXPECT_LT(shape_difference(found, truth).value, 0.01);
+  for (const LatticeSpring& spring : halls.springs) {
+    const bool false_one = spring.a / TwoHalls::views != spring.b / TwoHalls::views;
+    EXPECT_EQ(grown.weights.contains({spring.a, spring.b}), !false_one);
+  }
+}
+
+TEST(LatticeGrowth, AFalseSpringDoesNotFoldAHall) {
+  TwoHalls halls(4);
+  // Opposite corners look alike.
+  halls.link(0, TwoHalls::views - 1, {0.5, 0.0, 1.0}, 0.12);
+  halls.link(1, TwoHalls::views - 2, {0.5, 0.0, -2.0}, 0.12);
+  const GrownLayout grown = grow_components(halls.poses.size(), halls.springs, 1.0);
+  const double across =
+      distance(grown.start.poses[0].position(), grown.start.poses[TwoHalls::views - 1].position());
+  EXPECT_NEAR(across, std::hypot(5.0, 5.0), 0.7);
+  EXPECT_FALSE(fits(halls.springs.back(), 1.0, grown.start.poses[1],
+                    grown.start.poses[TwoHalls::views - 2]));
+}
+
+TEST(LatticeGrowth, TheOrderOfViewsDoesNotMatter) {
+  TwoHalls halls(5);
+  halls.link_alike(8);
+  const GrownLayout grown = grow_components(halls.poses.size(), halls.springs, 1.0);
+  const std::size_t last = halls.poses.size() - 1;
+  std::vector<LatticeSpring> reversed = halls.springs;
+  for (LatticeSpring& spring : reversed) {
+    spring.a = last - spring.a;
+    spring.b = last - spring.b;
+  }
+  const GrownLayout again = grow_components(halls.poses.size(), reversed, 1.0);
+  std::vector<Point2> one;
+  std::vector<Point2> other;
+  for (std::size_t i = 0; i < TwoHalls::views; ++i) {
+    one.push_back(grown.start.poses[i].position());
+    other.push_back(again.start.poses[last - i].position());
+    EXPECT_EQ(again.start.components[last - i], again.start.components[last]);
+  }
+  EXPECT_LT(shape_difference(one, other).value, 1e-3);
 }
 
 }  // namespace

@@ -117,6 +117,7 @@ ordered_json as_json(const ArrangeArguments& wanted, const Lattice& lattice,
   ordered_json json{{"memory", wanted.memory},
                     {"views", lattice.nodes.size()},
                     {"connected_components", std::move(components)},
+                    {"candidates", lattice.candidates},
                     {"springs", lattice.springs.size()},
                     {"springs_rejected", number_rejected(lattice)},
                     {"metric", lattice.metric},
@@ -134,7 +135,8 @@ ordered_json as_json(const ArrangeArguments& wanted, const Lattice& lattice,
 
 void print_result(const Lattice& lattice, const VisualMemory& memory, Session& session) {
   session.print(session.strong(std::to_string(lattice.nodes.size())) + " views arranged by " +
-                std::to_string(lattice.springs.size()) + " springs, " +
+                std::to_string(lattice.springs.size()) + " springs of " +
+                std::to_string(lattice.candidates) + " candidates, " +
                 std::to_string(number_rejected(lattice)) + " of them rejected; unit: " +
                 (lattice.metric ? "metres" : "the distance to the nearest view (median)"));
   if (lattice.components.size() > 1) {

@@ -12,6 +12,7 @@
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/positions.hpp"
+#include "panonav/mapping/internal/lattice_growth.hpp"
 #include "panonav/mapping/internal/lattice_solver.hpp"
 #include "panonav/mapping/internal/lattice_springs.hpp"
 #include "panonav/mapping/internal/lattice_start.hpp"
@@ -22,6 +23,7 @@ namespace panonav {
 namespace {
 
 constexpr double kSmallestLengthError = 0.02;  // of the lengths that phases tell, relative
+constexpr double kAgreeing = 0.25;             // of the weights that growing gives
 constexpr double kGivenUp = 0.25;              // springs of less weight do not count for the curve
 constexpr std::size_t kFarPairs = 2000;        // drawn for the level of far views
 // Of headings laid out by motion and phases; below what symmetric rooms may turn places by.
@@ -73,9 +75,13 @@ class Arranger {
         link_near_views();
         fit_curve();
       }
-      choose_springs();
-      start_where_needed();
-      relax();
+      if (grows()) {
+        grow();
+      } else {
+        choose_springs();
+        start_where_needed();
+        relax();
+      }
       set_unit();
     }
     finish();
@@ -261,6 +267,40 @@ class Arranger {
         std::max(kSmallestLengthError, normal_over_median * upper_median(ratios));
   }
 
+  /// Where motion tells nothing and phases are read, the layout grows from what is certain.
+  [[nodiscard]] bool grows() const { return options_.phases && motions_.empty(); }
+
+  /// The springs are those inside the components that agree with the layout. Views that none of
+  /// these holds to their component leave it.
+  void grow() {
+    measure(proposals_);
+    auto grown = grow_components(size(), measured_, lattice_.errors.phase_unit, start_);
+    start_ = std::move(grown.start);
+    proposals_ = std::move(grown.proposals);
+    lattice_.energy = grown.energy;
+    lattice_.iterations += grown.iterations;
+    auto& springs = lattice_.springs;
+    springs.clear();
+    std::vector<GraphEdge> edges;
+    for (const LatticeSpring& spring : measured_) {
+      const auto weight = grown.weights.find({spring.a, spring.b});
+      const bool points = spring.phases && spring.phases->points;
+      if (weight == grown.weights.end() || (!points && weight->second < kAgreeing) ||
+          !fits(spring, lattice_.errors.phase_unit, start_.poses[spring.a],
+                start_.poses[spring.b])) {
+        continue;
+      }
+      springs.push_back(spring);
+      springs.back().length = rest_length(spring);
+      springs.back().stiffness = lattice_.curve.stiffness(springs.back().length);
+      springs.back().weight = weight->second;
+      edges.push_back({spring.a, spring.b, 1.0});
+    }
+    start_.components = LatticeGraph(size(), edges).components();
+    start_.handedness_known.assign(size(), 0);
+    for (const GraphEdge& edge : edges) start_.handedness_known[start_.components[edge.a]] = 1;
+  }
+
   /// Springs within the curve's range whose views agree with each other and with a third one.
   void choose_springs() {
     auto& springs = lattice_.springs;
@@ -416,6 +456,7 @@ class Arranger {
   }
 
   void finish() {
+    lattice_.candidates = measured_.size();
     // In the unit of the result.
     fit_curve();
     learn_errors(lattice_.springs, lattice_.curve, lattice_.errors);
@@ -444,6 +485,7 @@ class Arranger {
   std::vector<LatticeSpring> measured_;  // ascending (a, b)
   bool curve_is_fitted_ = false;
   LatticeStart start_;
+  std::vector<NodePair> proposals_;  // worth measuring in the next round
   Lattice lattice_;
 };
 

@@ -88,6 +88,9 @@ struct Lattice {
   std::vector<LatticeComponent> components;  ///< the largest first
   DissimilarityCurve curve{1.0};
   SpringErrors errors;
+  /// Pairs of views whose relative pose was read, or whose dissimilarity, without phases; those
+  /// that are no springs were rejected.
+  std::size_t candidates = 0;
   /// True: metres, from the coarse motion. False: the unit is the median distance of a view to its
   /// nearest one.
   bool metric = false;
@@ -101,11 +104,15 @@ struct Lattice {
 /// 1. Each view gets springs to its `neighbours` most similar views, so cost grows with the views
 ///    and not with their pairs.
 /// 2. With phases, both views of a spring give direction and turn of the other one. Pairs whose
-///    answers differ by more than 45 degrees are unrelated and get no spring; nor do pairs of whose
-///    triangles with third views not more than half close.
-/// 3. The start is deterministic: multidimensional scaling of the shortest paths along the springs.
-///    Directions distinguish a mirror image; without phases it cannot be distinguished.
-/// 4. The energy of springs and, with phases, of directions and turns is minimised; outliers are
+///    answers differ by more than 45 degrees are unrelated and get no spring. Where there is no
+///    motion, connected components then grow from the springs that are most certain, and what
+///    contradicts is left out (internal/lattice_growth.hpp); in each round views that came to lie
+///    near each other are measured, too. Components that nothing certain joins stay apart.
+/// 3. Otherwise pairs of whose triangles with third views not more than half close get no spring,
+///    and the start is deterministic: multidimensional scaling of the shortest paths along the
+///    springs. Directions distinguish a mirror image; without phases it cannot be distinguished.
+/// 4. There the energy of springs and, with phases, of directions and turns is minimised; outliers
+/// are
 ///    rejected (internal/lattice_solver.hpp).
 /// 5. The curve from dissimilarity to distance is fitted to the arrangement, pairs beyond its range
 ///    are left out, views that came to lie near each other get springs too, and 3 or 4 are done

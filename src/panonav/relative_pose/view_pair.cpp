@@ -19,6 +19,7 @@ std::optional<PhaseReading> read_phases(const HomingView& a, const HomingView& b
   PhaseReading reading;
   reading.turn_rad = wrap_angle(-from_b.heading_rad + 0.5 * turns_differ);
   reading.turn_disagreement_rad = std::abs(turns_differ);
+  reading.residual = 0.5 * (from_a.residual + from_b.residual);
   // As likely as not the vector is but the error of reading it.
   reading.points = from_a.confidence > 0.5 && from_b.confidence > 0.5;
   if (!reading.points) return reading;

@@ -22,6 +22,9 @@ struct PhaseReading {
   /// False for pictures of one place, where no direction is meant; directions and length are then
   /// 0.
   bool points = false;
+  /// Share of the energy of both views that turn and displacement leave unexplained, 0 .. 1: the
+  /// mean of both answers.
+  double residual = 1.0;
 };
 
 /// A turn that is known coarsely from another source.
