@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <string>
 #include <vector>
 
 #include "panonav/core/error.hpp"
@@ -85,6 +86,54 @@ TEST(InterpolatedPosition, BeatsTheNearestReferenceAndItsRadiusHolds95PerCent) {
   EXPECT_LT(order_statistic(errors, 0.95), order_statistic(nearest_errors, 0.95));
   // 95 % of 200, less three standard errors.
   EXPECT_GE(inside, 180);
+}
+
+// A corner of the room is there twice, as in a building whose rooms are furnished alike.
+TEST(InterpolatedPosition, PlacesThatLookAlikeWidenTheRadiusThereAndNowhereElse) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  const RememberedRoom place(36, {5.0, 4.0, 6, 0.12}, 0.3);
+  constexpr double away_m = 30.0;
+  constexpr double corner_m = 1.6;
+  VisualMemory memory = place.memory;
+  Random random(35, 4);
+  int twins = 0;
+  for (const Point2 p : place.grid) {
+    if (p.x_m > corner_m || p.y_m > corner_m) continue;
+    const Point2 beside{p.x_m + 0.1, p.y_m + 0.1};
+    if (!place.room.is_free(beside)) continue;
+    memory.append(compute_signature(place.room.see({beside.x_m, beside.y_m, 1.0}, 16, 96,
+                                                   {1.0, 0.01}, random.next())),
+                  {"twin_" + std::to_string(twins++),
+                   ReferencePose{beside.x_m + away_m, beside.y_m, 1.0},
+                   {}});
+  }
+  ASSERT_GE(twins, 10);
+  const ColumnRanking ranking(memory);
+  const PositionModel model = learn_position_model(ranking);
+  ASSERT_TRUE(model.learnt && model.ambiguous_from);
+  std::vector<double> radii;
+  std::vector<double> radii_in_the_corner;
+  int inside = 0;
+  int asked = 0;
+  for (int i = 0; i < 120; ++i) {
+    const Pose2 pose = place.room.between(place.grid, place.step_m, random);
+    const bool in_the_corner = pose.x_m < corner_m - 0.3 && pose.y_m < corner_m - 0.3;
+    const bool beside = pose.x_m < corner_m + 0.6 && pose.y_m < corner_m + 0.6;
+    if (beside && !in_the_corner) continue;
+    const auto found = ranked_matches(
+        memory, pack(compute_signature(place.room.see(pose, 16, 96, {1.0, 0.01}, random.next())),
+                     memory.full_scale()));
+    const auto estimate = interpolate_position(ranking, model, found);
+    ASSERT_TRUE(estimate && estimate->radius_m);
+    (in_the_corner ? radii_in_the_corner : radii).push_back(*estimate->radius_m);
+    inside += distance(estimate->position, pose.position()) <= *estimate->radius_m ? 1 : 0;
+    ++asked;
+  }
+  ASSERT_GE(radii.size(), 40U);
+  ASSERT_GE(radii_in_the_corner.size(), 3U);
+  EXPECT_LT(quantile(radii, 0.5), 2.0 * place.step_m);
+  EXPECT_GT(quantile(radii_in_the_corner, 0.5), 0.9 * away_m);
+  EXPECT_GE(inside, 0.9 * asked);
 }
 
 TEST(PositionModel, OfFewOrUnposedViewsIsTheNearestReference) {

@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
+#include <vector>
 
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/voronoi.hpp"
@@ -24,6 +26,10 @@ constexpr std::array<double, 3> exponents = {1.0, 1.25, 1.5};
 // noise.
 constexpr double min_variance = 0.1;
 constexpr double coverage = 0.95;
+// Farther than any neighbourhood of a place on a grid.
+constexpr double elsewhere_spacings = 3.0;
+// Half of what the radius may miss.
+constexpr double max_wrong = 0.5 * (1.0 - coverage);
 
 // Posed views, the best match first.
 struct Neighbours {
@@ -66,6 +72,17 @@ Neighbours gather(const ColumnRanking& ranking, std::span<const RankedMatch> mat
     }
   }
   return n;
+}
+
+// Of the best match's difference to that of the best match elsewhere; 0 where there is no other.
+double ratio_to_elsewhere(const Neighbours& n, double spacing_m) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 1; i < n.views.size(); ++i) {
+    if (distance(n.positions[i], n.positions[0]) <= elsewhere_spacings * spacing_m) continue;
+    least = std::min(least, n.to_query(static_cast<Eigen::Index>(i)));
+  }
+  if (!(least < std::numeric_limits<double>::infinity())) return 0.0;
+  return least > 0.0 ? std::sqrt(n.to_query(0) / least) : 1.0;
 }
 
 struct Kriged {
@@ -143,6 +160,7 @@ PositionModel learn_position_model(const ColumnRanking& ranking,
   PositionModel model;
   model.components = ranking.components();
   const double spacing_m = VoronoiCells(positions).spacing_m();
+  model.spacing_m = spacing_m;
   if (posed.size() < PositionModel::min_views || spacing_m == 0.0) return model;
 
   const std::vector<ViewId> sample =
@@ -201,10 +219,32 @@ PositionModel learn_position_model(const ColumnRanking& ranking,
   std::vector<double> ratios;
   for (std::size_t i = 0; i < best_errors.size(); ++i) {
     const double variance = best_variances[i] + min_variance * model.variance_unit;
-    if (variance > 0.0) ratios.push_back(best_errors[i] / std::sqrt(variance));
+    if (variance > 0.0 && is_near(i)) ratios.push_back(best_errors[i] / std::sqrt(variance));
   }
   model.median_error_m = quantile(best_errors, 0.5);
   model.error95_m = quantile(best_errors, coverage);
+  // The largest share of views, from the clearest on, of which hardly any was found elsewhere.
+  std::vector<std::pair<double, std::size_t>> by_ratio;
+  for (std::size_t i = 0; i < neighbours.size(); ++i) {
+    by_ratio.emplace_back(ratio_to_elsewhere(neighbours[i], spacing_m), i);
+  }
+  std::ranges::sort(by_ratio);
+  std::size_t clear = 0;
+  std::size_t wrong = 0;
+  for (std::size_t i = 0; i < by_ratio.size(); ++i) {
+    wrong += is_near(by_ratio[i].second) ? 0 : 1;
+    if (static_cast<double>(wrong) <= max_wrong * static_cast<double>(i + 1)) clear = i + 1;
+  }
+  std::vector<double> ambiguous;
+  for (std::size_t i = clear; i < by_ratio.size(); ++i) {
+    ambiguous.push_back(best_errors[by_ratio[i].second]);
+  }
+  if (!ambiguous.empty()) {
+    model.ambiguous_from = by_ratio[clear].first;
+    model.ambiguous_radius_m = quantile(ambiguous, coverage);
+  }
+  // None near: then every answer is ambiguous.
+  if (ratios.empty() && !ambiguous.empty()) ratios.push_back(0.0);
   if (ratios.empty()) return model;
   // The quantile of a sample of n that a further draw stays below with at least this probability.
   const double n = static_cast<double>(ratios.size());
@@ -231,6 +271,10 @@ std::optional<PositionEstimate> interpolate_position(const ColumnRanking& rankin
   estimate.position = kriged.position;
   estimate.radius_m = model.radius_m_per_deviation *
                       std::sqrt(kriged.variance + min_variance * model.variance_unit);
+  if (model.ambiguous_from &&
+      ratio_to_elsewhere(neighbours, model.spacing_m) >= *model.ambiguous_from) {
+    estimate.radius_m = std::max(*estimate.radius_m, model.ambiguous_radius_m);
+  }
   for (std::size_t i = 0; i < kriged.used.size(); ++i) {
     estimate.shares.push_back({neighbours.views[kriged.used[i]], kriged.weights[i]});
   }

@@ -35,16 +35,24 @@ struct PositionModel {
   double difference_unit = 1.0;         ///< median squared difference to the nearest view
   double variance_unit = 0.0;           ///< median kriging variance
   double radius_m_per_deviation = 0.0;  ///< radius that holds 95 % over the kriging deviation
-  double median_error_m = 0.0;          ///< of the views left out
-  double error95_m = 0.0;               ///< 95 % of the views left out were nearer
+  double spacing_m = 0.0;               ///< of the posed views
+  /// From this ratio on, of the best match's difference to that of the best match elsewhere (more
+  /// than 3 spacings from it), the wrong one of two places that look alike may have been taken;
+  /// empty where that hardly happens. Then the radius is at least the other number.
+  std::optional<double> ambiguous_from;
+  double ambiguous_radius_m = 0.0;
+  double median_error_m = 0.0;  ///< of the views left out
+  double error95_m = 0.0;       ///< 95 % of the views left out were nearer
   friend bool operator==(const PositionModel&, const PositionModel&) = default;
 };
 
 /// Learns the neighbourhood and the exponent that place the views of the memory best when each is
-/// left out in turn, and then how large a radius holds 95 % of those errors. Views left out are
-/// farther from the other references than queries between the references are, so the radius rather
-/// holds too many than too few. Throws OptionError. Cost: `sampled_views` searches
-/// and about 1 ms for each.
+/// left out in turn, and then how large a radius holds 95 % of the errors of those that were found
+/// near their place. Where more than 1 of 40 was found elsewhere, in a place that looks alike,
+/// those are told by how little better they match than elsewhere, and have a radius of their own.
+/// Views left out are farther from the other references than queries between the references are, so
+/// the radius rather holds too many than too few. Throws OptionError. Cost: `sampled_views`
+/// searches and about 1 ms for each.
 [[nodiscard]] PositionModel learn_position_model(const ColumnRanking& ranking,
                                                  const PositionModelOptions& options = {});
 
