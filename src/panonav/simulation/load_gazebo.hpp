@@ -26,12 +26,12 @@ struct GazeboOptions {
 /// sides; light that adds up beyond white on the floor is scaled down as a whole. Visuals that are
 /// more than half transparent and what is not seen (collisions, joints, plugins) are left out.
 ///
-/// As Gazebo does, it goes on where something is missing or faulty: an include or a mesh that is not
-/// found or damaged, a model that includes itself, a shape without its size, actors, height maps.
-/// Each such thing is left out with a line in Scene::warnings that names the world, the models and
-/// the thing, once however often it occurs. Names whose letters only differ in case are found, with
-/// a warning. `model://sun` and `model://ground_plane` need no folder. Throws FileError on a world
-/// that is missing, no XML or shows nothing, and when panonav was built without assimp.
+/// As Gazebo does, it goes on where something is missing or faulty: an include or a mesh that is
+/// not found or damaged, a model that includes itself, a shape without its size, actors, height
+/// maps. Each such thing is left out with a line in Scene::warnings that names the world, the
+/// models and the thing, once however often it occurs. Names whose letters only differ in case are
+/// found, with a warning. `model://sun` and `model://ground_plane` need no folder. Throws FileError
+/// on a world that is missing, no XML or shows nothing, and when panonav was built without assimp.
 [[nodiscard]] Scene load_gazebo(const std::filesystem::path& world,
                                 const GazeboOptions& options = {});
 
