@@ -14,7 +14,7 @@
 #include "panonav/memory/view_source.hpp"
 #include "panonav/navigation/area_views.hpp"
 #include "panonav/navigation/direction_field.hpp"
-#include "panonav/navigation/obstacle.hpp"
+#include "panonav/navigation/internal/obstacle.hpp"
 #include "panonav/navigation/place_scale.hpp"
 #include "panonav/relative_pose/fourier_homing.hpp"
 #include "panonav/relative_pose/view_pair.hpp"

@@ -1,4 +1,4 @@
-#include "panonav/navigation/route_pilot.hpp"
+#include "panonav/navigation/internal/route_pilot.hpp"
 
 #include <gtest/gtest.h>
 

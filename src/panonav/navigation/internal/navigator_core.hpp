@@ -15,9 +15,9 @@
 #include "panonav/navigation/area_planner.hpp"
 #include "panonav/navigation/area_views.hpp"
 #include "panonav/navigation/direction_field.hpp"
+#include "panonav/navigation/internal/route_pilot.hpp"
 #include "panonav/navigation/navigator.hpp"
 #include "panonav/navigation/place_scale.hpp"
-#include "panonav/navigation/route_pilot.hpp"
 
 namespace panonav {
 

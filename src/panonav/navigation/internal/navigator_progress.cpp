@@ -8,7 +8,7 @@
 
 #include "panonav/geometry/angles.hpp"
 #include "panonav/navigation/internal/navigator_core.hpp"
-#include "panonav/navigation/obstacle.hpp"
+#include "panonav/navigation/internal/obstacle.hpp"
 #include "panonav/relative_pose/fourier_homing.hpp"
 
 namespace panonav {

@@ -1,4 +1,4 @@
-#include "panonav/navigation/obstacle.hpp"
+#include "panonav/navigation/internal/obstacle.hpp"
 
 #include <algorithm>
 #include <cmath>
