@@ -2,6 +2,7 @@
 // crash.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 #include <string>
 
@@ -11,6 +12,7 @@
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/option_file.hpp"
+#include "panonav/io/toml_fields.hpp"
 #include "panonav/io/trajectory_file.hpp"
 #include "support/picture_samples.hpp"
 #include "support/temporary_folder.hpp"
@@ -144,6 +146,30 @@ TEST_F(AnyBytes, TomlBeyondAsciiStandsInQuotationMarksAlone) {
   EXPECT_EQ(refusal("\xEF\xBB\xBF[s]\na = \"\xC3\xA9\"\nb = '\\\xC3\xA9' # \xC3\xA9\n"
                     "c = \"\\\"\xC3\xA9#\"\n\"\xC3\xA9\" = ''\n"),
             "no error");
+}
+
+TEST_F(AnyBytes, ANumberFollowedByATextBeyondAsciiIsNoToml) {
+  for (const std::string text : {"a = [1, 2.\"x\xEF\xBB\xBB\"]\n", "a = 2[\"\xEF\xBF\xBD\"]\n"}) {
+    EXPECT_TRUE(
+        contains(message_of<FileError>([&] { (void)OptionFile(folder.write("u.toml", text)); }),
+                 "line 1 is not TOML"))
+        << text;
+  }
+  // What is read is what was written.
+  const TomlTable table = read_toml(folder.write(
+      "v.toml",
+      "a = \"\xC3\xA9\\\"\xF0\x9F\x98\x80\"\nb = '\\\"\xC3\xA9' # \xC3\xA9\n\"\xC3\xA9\" = 1\n"));
+  const auto text_of = [&](std::string_view name) {
+    const auto found = std::ranges::find(table, name, &TomlField::name);
+    return found == table.end() ? "" : std::get<std::string>(found->value.content);
+  };
+  EXPECT_EQ(text_of("a"), "\xC3\xA9\"\xF0\x9F\x98\x80");
+  EXPECT_EQ(text_of("b"), "\\\"\xC3\xA9");
+  EXPECT_TRUE(
+      std::ranges::any_of(table, [](const TomlField& field) { return field.name == "\xC3\xA9"; }));
+  EXPECT_TRUE(contains(
+      message_of<FileError>([&] { (void)read_toml(folder.write("w.toml", "a = \"\xC3\"\n")); }),
+      "line 1 has a control character or bytes that are not UTF-8"));
 }
 
 TEST_F(AnyBytes, DeeplyNestedToml) {

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <sstream>
 #include <type_traits>
 #include <utility>
@@ -59,23 +60,48 @@ TomlTable copy_of(const toml::table& table) {
   return result;
 }
 
-// The parser follows names that are joined by dots by recursion without a bound, and characters
-// beyond ASCII lead it to a statement that it calls unreachable, wherever it looks for blanks:
-// around names and values and within texts of several lines. Throws FileError where the text has
-// such.
-void require_plain(std::string_view text, const std::filesystem::path& path) {
+// Appends what stands between quotation marks as text that is ASCII alone; `quoted`: with escapes.
+void append_escaped(std::string& result, std::string_view content, bool quoted) {
+  constexpr std::string_view digits = "0123456789ABCDEF";
+  while (!content.empty()) {
+    const auto first = static_cast<unsigned char>(content.front());
+    const std::size_t size = first < 0x80U ? 1 : first < 0xE0U ? 2 : first < 0xF0U ? 3 : 4;
+    if (size == 1) {
+      if (!quoted && (first == '"' || first == '\\')) result += '\\';
+      result += content.front();
+    } else {
+      std::uint32_t number = first & (0x7FU >> size);
+      for (std::size_t i = 1; i < size; ++i) {
+        number = number << 6U | (static_cast<unsigned char>(content[i]) & 0x3FU);
+      }
+      result += "\\U";
+      for (int shift = 28; shift >= 0; shift -= 4) result += digits[(number >> shift) & 15U];
+    }
+    content.remove_prefix(size);
+  }
+}
+
+// The same TOML in ASCII alone. The parser follows names that are joined by dots by recursion
+// without a bound, and characters beyond ASCII lead it to a statement that it calls unreachable,
+// wherever it looks for blanks: around names and values, within texts of several lines, and where
+// a number is followed by what looks like a text. Throws FileError where the text has too many
+// dots, such characters outside of quotation marks, or quotation marks that it may take for others.
+std::string plain_text(std::string_view text, const std::filesystem::path& path) {
   constexpr int max_parts = 64;
   constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
   if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
+  std::string result;
   for (int number = 1; !text.empty(); ++number) {
-    const std::size_t end = std::min(text.find('\n'), text.size());
+    const std::size_t text_size = text.size();
+    const std::size_t end = std::min(text.find('\n'), text_size);
     const std::string_view line = text.substr(0, end);
     text.remove_prefix(std::min(end + 1, text.size()));
     const auto refuse = [&](const std::string& what) {
       throw FileError(path.string(), "line " + std::to_string(number) + " has " + what);
     };
     int dots = 0;
-    for (std::size_t i = 0; i < line.size() && line[i] != '#'; ++i) {
+    std::size_t i = 0;
+    for (; i < line.size() && line[i] != '#'; ++i) {
       const char c = line[i];
       constexpr std::string_view borders = "=,[]{}";
       if (static_cast<unsigned char>(c) >= 0x80U) {
@@ -85,7 +111,10 @@ void require_plain(std::string_view text, const std::filesystem::path& path) {
       if (c == '.' && ++dots >= max_parts) {
         refuse("a name of too many parts; allowed: up to " + std::to_string(max_parts));
       }
-      if (c != '"' && c != '\'') continue;
+      if (c != '"' && c != '\'') {
+        result += c;
+        continue;
+      }
       if (line.substr(i).starts_with(std::string(3, c))) {
         refuse("a text in three quotation marks; allowed: one, around a text on one line");
       }
@@ -93,12 +122,32 @@ void require_plain(std::string_view text, const std::filesystem::path& path) {
       if (i > 0 && before.find(line[i - 1]) == std::string_view::npos) {
         refuse("a quotation mark within a name or a value; allowed: around them");
       }
+      const std::size_t begin = i + 1;
       for (++i; i < line.size() && line[i] != c; ++i) {
         if (c == '"' && line[i] == '\\') ++i;
       }
       if (i >= line.size()) refuse("a quotation mark that is not closed");
+      const std::string_view content = line.substr(begin, i - begin);
+      const bool is_ascii = std::ranges::all_of(
+          content, [](char one) { return static_cast<unsigned char>(one) < 0x80U; });
+      if (!is_ascii && readable_line(content) != content) {
+        refuse("a control character or bytes that are not UTF-8 in a text");
+      }
+      const char mark = is_ascii ? c : '"';
+      result += mark;
+      if (is_ascii) {
+        result += content;
+      } else {
+        append_escaped(result, content, c == '"');
+      }
+      result += mark;
     }
+    for (; i < line.size(); ++i) {  // a comment
+      result += static_cast<unsigned char>(line[i]) < 0x80U ? line[i] : '?';
+    }
+    if (end < text_size) result += '\n';
   }
+  return result;
 }
 
 std::optional<double> as_number(const TomlValue& value) {
@@ -114,9 +163,9 @@ std::optional<double> as_number(const TomlValue& value) {
 TomlTable read_toml(const std::filesystem::path& path) {
   const auto bytes = read_file(path, document_limit_bytes);
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  require_plain(text, path);
+  const std::string plain = plain_text(text, path);
   try {
-    return copy_of(toml::parse(text));
+    return copy_of(toml::parse(std::string_view(plain)));
   } catch (const toml::parse_error& error) {
     throw FileError(path.string(), "line " + std::to_string(error.source().begin.line) +
                                        " is not TOML: " + readable_line(error.description()));
@@ -234,7 +283,7 @@ std::optional<std::size_t> TomlFields::choice(std::string_view field,
 void TomlFields::fail(std::string_view field, std::string_view found,
                       std::string_view allowed) const {
   const std::string where = section_.empty() ? std::string() : "[" + section_ + "] ";
-  throw FileError(path_.string(), where + std::string(field) + " is " + std::string(found) +
+  throw FileError(path_.string(), where + readable_line(field) + " is " + readable_line(found) +
                                       "; allowed: " + std::string(allowed));
 }
 
