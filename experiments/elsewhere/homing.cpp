@@ -29,13 +29,12 @@ constexpr double arrived_m = 0.1;
 struct HomeAnswered {
   bool answered = false;
   double off_rad = 0.0;
-  double confidence = 0.0;
 };
 
 HomeAnswered ask_home(const Panorama& goal, const Panorama& current) {
   const HomingGuide guide(Observation(goal), PictureSource{});
   const WayHome way = guide.home(Observation(current));
-  return {way.direction_rad.has_value(), way.direction_rad.value_or(0.0), way.confidence};
+  return {way.direction_rad.has_value(), way.direction_rad.value_or(0.0)};
 }
 
 HomeAnswered ask_home(const PlacedView& goal, const PlacedView& current) {

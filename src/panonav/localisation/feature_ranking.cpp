@@ -38,7 +38,7 @@ bool FeatureTrial::tell_more() const {
 
 FeatureTrial try_features(const ColumnRanking& ranking, const NeighbourSupport& support,
                           const FeatureSource& features) {
-  constexpr int most_sampled = 40;
+  constexpr int max_sampled = 40;
   constexpr double right_ratio = 1.5;
   const VisualMemory& memory = ranking.memory();
   const std::span<const ViewId> views = memory.views();
@@ -46,7 +46,7 @@ FeatureTrial try_features(const ColumnRanking& ranking, const NeighbourSupport& 
   if (views.size() < static_cast<std::size_t>(PlaceModel::min_views)) return trial;
   const bool posed =
       std::ranges::all_of(views, [&](ViewId view) { return memory.info(view).pose.has_value(); });
-  for (const ViewId view : sample_views(views, most_sampled, 1)) {
+  for (const ViewId view : sample_views(views, max_sampled, 1)) {
     const auto own = features(view);
     if (!own) continue;
     const auto rank = std::ranges::lower_bound(views, view) - views.begin();
