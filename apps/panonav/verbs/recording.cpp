@@ -60,15 +60,15 @@ void note_other_kind(const Dataset& recording, Session& session) {
   if (recording.source.kind != PictureKind::panorama) return;
   const auto& band = recording.source.layout.elevations;
   if (band && band->top_rad - band->bottom_rad < radians(170.0)) return;
-  const fs::path& first = recording.entries.front().path;
+  const DatasetEntry& first = recording.entries.front();
   ImageSize size;
   try {
-    size = read_image_size(first);
+    size = first.store ? read_picture(first).size() : read_image_size(first.path);
   } catch (const Error&) {
     return;  // who reads its pixels says what is wrong
   }
   if (size.width != 2 * size.height) return;
-  session.note("hint: " + readable_line(first.string()) + " is " + std::to_string(size.width) +
+  session.note("hint: " + readable_line(first.path.string()) + " is " + std::to_string(size.width) +
                " x " + std::to_string(size.height) +
                " px; a picture of the whole sphere is of the kind equirectangular, a panorama has "
                "an elevation band");

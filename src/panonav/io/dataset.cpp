@@ -12,6 +12,7 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/io/camera_file.hpp"
+#include "panonav/io/image_file.hpp"
 #include "panonav/io/internal/csv_table.hpp"
 #include "panonav/io/toml_fields.hpp"
 
@@ -252,6 +253,10 @@ Dataset read_picture_folder(const fs::path& folder, PictureSource source,
     dataset.entries.push_back(std::move(entry));
   }
   return dataset;
+}
+
+Image read_picture(const DatasetEntry& entry) {
+  return entry.store ? entry.store->read(entry.store_index) : read_image(entry.path);
 }
 
 Dataset single_picture(const fs::path& file, PictureSource source) {

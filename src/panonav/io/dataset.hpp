@@ -1,10 +1,13 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "panonav/core/image.hpp"
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav/panorama/picture_source.hpp"
@@ -12,16 +15,31 @@
 
 namespace panonav {
 
+/// Pictures that do not lie in a file each: those of a video, of a recording of topics.
+class PictureStore {
+ public:
+  virtual ~PictureStore() = default;
+  /// The picture of this number. Several threads may call at a time; in ascending order it costs
+  /// least. Throws FileError.
+  [[nodiscard]] virtual Image read(std::size_t index) const = 0;
+};
+
 /// One picture of a data set and what is known of it.
 struct DatasetEntry {
   std::string file;            ///< as the data set names it, relative to its folder; unique
-  std::filesystem::path path;  ///< where it lies
+  std::filesystem::path path;  ///< where it lies: its own file, or that of all pictures
   std::optional<double> stamp_s;
   std::optional<ReferencePose> pose;  ///< in the world frame
   std::optional<Pose2> odometry;      ///< in the odometry frame
   std::optional<Tilt> tilt;           ///< as an inertial sensor measured it
+  /// Holds the picture; empty: `path` is the picture's own file.
+  std::shared_ptr<const PictureStore> store;
+  std::size_t store_index = 0;
   friend bool operator==(const DatasetEntry&, const DatasetEntry&) = default;
 };
+
+/// The picture, from its own file or from its store. Throws FileError.
+[[nodiscard]] Image read_picture(const DatasetEntry& entry);
 
 /// A recording: pictures in order, and how they become panoramic cylinders. Pictures are read when
 /// they are needed (PanoramaReader).

@@ -4,12 +4,11 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
-#include "panonav/io/image_file.hpp"
 
 namespace panonav {
 
 Observation read_observation(const DatasetEntry& entry) {
-  Observation observation(read_image(entry.path));
+  Observation observation(read_picture(entry));
   observation.name = entry.file;
   observation.file = entry.path;
   observation.stamp_s = entry.stamp_s;

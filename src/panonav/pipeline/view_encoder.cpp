@@ -187,7 +187,7 @@ std::optional<LocalFeatures> ViewEncoder::features(const Panorama& panorama) con
 }
 
 Panorama ViewEncoder::read(const DatasetEntry& entry) const {
-  const Image picture = read_image(entry.path);
+  const Image picture = read_picture(entry);
   try {
     return panorama(picture.view(), entry.tilt.value_or(Tilt{}));
   } catch (const ContractError& error) {
