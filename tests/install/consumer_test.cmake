@@ -26,7 +26,7 @@ endif()
 
 # Memory and localisation need Eigen and nothing else.
 set(without)
-foreach(package SQLite3 ZLIB PNG JPEG embree assimp pugixml nlohmann_json)
+foreach(package SQLite3 ZLIB BZip2 yaml-cpp PNG JPEG embree assimp pugixml nlohmann_json)
   list(APPEND without -DCMAKE_DISABLE_FIND_PACKAGE_${package}=ON)
 endforeach()
 build_project(${SOURCE} ${prefix}/consumer_build ${without})

@@ -1,0 +1,463 @@
+// Recordings: what is written comes back, files of other programs are read, damage keeps what comes
+// before it.
+#include "panonav/io/recording.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <limits>
+#include <thread>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/io/mcap_writer.hpp"
+#include "support/temporary_folder.hpp"
+
+namespace panonav::testing {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Message {
+  std::string topic;
+  std::int64_t time_ns = 0;
+  std::vector<std::uint8_t> bytes;
+  friend bool operator==(const Message&, const Message&) = default;
+};
+using Messages = std::vector<Message>;
+
+std::vector<std::uint32_t> all_topics(const Recording& recording) {
+  std::vector<std::uint32_t> topics(recording.topics().size());
+  for (std::uint32_t i = 0; i < topics.size(); ++i) topics[i] = i;
+  return topics;
+}
+
+Messages in_sequence(const Recording& recording, std::optional<TimeSpan> within = {}) {
+  Messages messages;
+  recording.for_each(all_topics(recording), within, [&](const MessagePlace& place, auto bytes) {
+    messages.push_back(
+        {recording.topics()[place.topic].name, place.time_ns, {bytes.begin(), bytes.end()}});
+  });
+  return messages;
+}
+
+Messages one_by_one(const Recording& recording, std::optional<TimeSpan> within = {}) {
+  Messages messages;
+  for (const auto& place : recording.places(all_topics(recording), within)) {
+    messages.push_back(
+        {recording.topics()[place.topic].name, place.time_ns, recording.read(place)});
+  }
+  return messages;
+}
+
+// The messages of `tests/io/mcap_core.mjs`, as they lie in tests/io/data.
+Messages golden_messages() {
+  Messages messages;
+  for (int i = 0; i < 20; ++i) {
+    Message message{i % 3 == 2 ? "/text" : "/imu", 1'000'000'000LL + 10'000'000LL * i, {}};
+    for (int k = 0; k < 10 + 3 * i; ++k) {
+      message.bytes.push_back(static_cast<std::uint8_t>(7 * i + k));
+    }
+    messages.push_back(std::move(message));
+  }
+  return messages;
+}
+
+fs::path golden(std::string_view name) {
+  return fs::path(PANONAV_TEST_DATA) / name;
+}
+
+struct Written {
+  Messages messages;  ///< in order of time
+  fs::path path;
+};
+
+constexpr const char* three_topics[] = {"/a", "/b", "/c"};
+
+// Random messages of three topics, out of order by up to `jump_ns`.
+Written write_some(const fs::path& path, const McapWriterOptions& options, int count,
+                   std::uint64_t seed, std::size_t largest = 300, int jump_ns = 50) {
+  Random random(seed);
+  Written written{{}, path};
+  McapWriter writer(path, options);
+  const auto schema = writer.add_schema("std_msgs/msg/Byte", "ros2msg", "byte data");
+  for (const char* topic : three_topics) (void)writer.add_channel(topic, "cdr", schema);
+  for (int i = 0; i < count; ++i) {
+    const auto channel = static_cast<std::uint16_t>(random.index(3));
+    Message message{
+        three_topics[channel],
+        1000 + 10 * i + static_cast<int>(random.index(static_cast<std::uint64_t>(jump_ns))),
+        std::vector<std::uint8_t>(random.index(largest + 1))};
+    const bool is_even = random.index(2) == 0;  // so that some can be packed
+    for (auto& byte : message.bytes) {
+      byte = is_even ? std::uint8_t{7} : static_cast<std::uint8_t>(random.next());
+    }
+    writer.write(channel, message.time_ns, message.time_ns, message.bytes);
+    written.messages.push_back(std::move(message));
+  }
+  writer.close();
+  std::ranges::stable_sort(written.messages, {}, &Message::time_ns);
+  return written;
+}
+
+class RecordingTest : public InTemporaryFolder {};
+
+TEST_F(RecordingTest, WhatIsWrittenComesBackInOrderOfTime) {
+  for (const auto compression :
+       {McapCompression::none, McapCompression::lz4, McapCompression::zstd}) {
+    for (const std::size_t chunk_bytes : {1, 700, 5000, 1 << 20}) {
+      SCOPED_TRACE(chunk_bytes);
+      const Written written =
+          write_some(folder / "a.mcap", {compression, chunk_bytes, "ros2"}, 300, chunk_bytes);
+      ASSERT_TRUE(is_recording(written.path));
+      const auto recording = Recording::open(written.path);
+      EXPECT_EQ(in_sequence(*recording), written.messages);
+      EXPECT_EQ(one_by_one(*recording), written.messages);
+      EXPECT_TRUE(recording->warnings().empty()) << recording->warnings()[0];
+      ASSERT_TRUE(recording->time());
+      EXPECT_EQ(recording->time()->begin_ns, written.messages.front().time_ns);
+      EXPECT_EQ(recording->time()->end_ns, written.messages.back().time_ns);
+      ASSERT_EQ(recording->topics().size(), 3U);
+      for (const auto& topic : recording->topics()) {
+        EXPECT_EQ(topic.type, "std_msgs/Byte");
+        EXPECT_EQ(topic.encoding, MessageEncoding::cdr);
+        EXPECT_EQ(topic.messages,
+                  std::ranges::count(written.messages, topic.name, &Message::topic));
+      }
+    }
+  }
+}
+
+TEST_F(RecordingTest, ASpanAndTopicsAreAFilterOfAll) {
+  const Written written = write_some(folder / "a.mcap", {McapCompression::lz4, 2000, ""}, 500, 3);
+  const auto recording = Recording::open(written.path);
+  Random random(5);
+  std::size_t found = 0;
+  for (int trial = 0; trial < 50; ++trial) {
+    const auto begin = static_cast<std::int64_t>(900 + random.index(5500));
+    const TimeSpan within{begin, begin + static_cast<std::int64_t>(random.index(2000))};
+    Messages expected;
+    std::ranges::copy_if(written.messages, std::back_inserter(expected), [&](const Message& m) {
+      return m.time_ns >= within.begin_ns && m.time_ns <= within.end_ns;
+    });
+    EXPECT_EQ(in_sequence(*recording, within), expected);
+    EXPECT_EQ(one_by_one(*recording, within), expected);
+    found += expected.size();
+    std::erase_if(expected, [](const Message& m) { return m.topic != "/b"; });
+    Messages only_b;
+    for (std::uint32_t topic = 0; topic < 3; ++topic) {
+      if (recording->topics()[topic].name != "/b") continue;
+      for (const auto& place : recording->places(std::array{topic}, within)) {
+        only_b.push_back({"/b", place.time_ns, recording->read(place)});
+      }
+    }
+    EXPECT_EQ(only_b, expected);
+  }
+  EXPECT_GT(found, 1000U);
+  EXPECT_THROW((void)recording->places(std::array<std::uint32_t, 1>{3}), ContractError);
+}
+
+TEST_F(RecordingTest, ThreadsReadAtATime) {
+  const Written written = write_some(folder / "a.mcap", {McapCompression::zstd, 3000, ""}, 400, 4);
+  const auto recording = Recording::open(written.path);
+  const auto places = recording->places(all_topics(*recording));
+  ASSERT_EQ(places.size(), written.messages.size());
+  std::vector<int> wrong(4);
+  std::vector<std::thread> threads;
+  for (std::size_t t = 0; t < wrong.size(); ++t) {
+    threads.emplace_back([&, t] {
+      for (std::size_t i = t; i < places.size(); i += wrong.size() - 1) {
+        wrong[t] += recording->read(places[i]) != written.messages[i].bytes ? 1 : 0;
+      }
+    });
+  }
+  for (auto& thread : threads) thread.join();
+  EXPECT_EQ(wrong, std::vector<int>(4));
+}
+
+TEST_F(RecordingTest, ReadsFilesOfTheReferenceLibrary) {
+  for (const char* name : {"mcap_none.mcap", "mcap_lz4.mcap", "mcap_zstd.mcap",
+                           "mcap_unchunked.mcap", "mcap_bare.mcap"}) {
+    SCOPED_TRACE(name);
+    const auto recording = Recording::open(golden(name));
+    EXPECT_EQ(in_sequence(*recording), golden_messages());
+    EXPECT_EQ(one_by_one(*recording), golden_messages());
+    EXPECT_TRUE(recording->warnings().empty()) << recording->warnings()[0];
+    ASSERT_EQ(recording->topics().size(), 2U);
+    EXPECT_EQ(recording->topics()[0].name, "/imu");
+    EXPECT_EQ(recording->topics()[0].type, "sensor_msgs/Imu");
+    EXPECT_EQ(recording->topics()[0].encoding, MessageEncoding::cdr);
+    EXPECT_EQ(recording->topics()[0].messages, 14U);
+    EXPECT_EQ(recording->topics()[1].encoding, MessageEncoding::other);
+  }
+}
+
+// Where the reference library is at hand (see mcap_core.mjs), it reads what we write.
+TEST_F(RecordingTest, TheReferenceLibraryReadsOurFiles) {
+  if (std::getenv("MCAP_NODE") == nullptr) GTEST_SKIP() << "MCAP_NODE is not set";
+  for (const auto compression :
+       {McapCompression::none, McapCompression::lz4, McapCompression::zstd}) {
+    const auto path = folder / "ours.mcap";
+    {
+      McapWriter writer(path, {compression, 300, "ros2"});
+      const auto schema = writer.add_schema("sensor_msgs/msg/Imu", "ros2msg", "float64 x");
+      const auto imu = writer.add_channel("/imu", "cdr", schema, {{"k", "v"}});
+      const auto text = writer.add_channel("/text", "json", 0);
+      for (const Message& message : golden_messages()) {
+        writer.write(message.topic == "/imu" ? imu : text, message.time_ns, message.time_ns,
+                     message.bytes);
+      }
+      writer.attach("a.txt", "text/plain", 5, std::array<std::uint8_t, 3>{1, 2, 3});
+      writer.add_metadata("m", {{"a", "b"}});
+    }
+    const std::string script = std::string(PANONAV_TEST_DATA) + "/../mcap_core.mjs";
+    const auto answer = [&](const fs::path& file) {
+      const auto out = folder / "out.json";
+      EXPECT_EQ(std::system(
+                    ("node '" + script + "' read '" + file.string() + "' > '" + out.string() + "'")
+                        .c_str()),
+                0);
+      return bytes_of(out);
+    };
+    std::string ours = answer(path);
+    std::string theirs = answer(golden("mcap_none.mcap"));
+    for (std::string* text : {&ours, &theirs}) text->erase(text->find(",\"chunks\""));
+    EXPECT_EQ(ours, theirs);
+    EXPECT_TRUE(contains(ours, "\"streamed\":20"));
+  }
+}
+
+TEST_F(RecordingTest, ACutFileGivesWhatComesBeforeTheCut) {
+  for (const auto compression :
+       {McapCompression::none, McapCompression::lz4, McapCompression::zstd}) {
+    const Written written =
+        write_some(folder / "a.mcap", {compression, 400, "ros2"}, 20, 9, 100, 1);
+    const std::string bytes = bytes_of(written.path);
+    std::size_t before = 0, cut_within_chunks = 0;
+    const std::size_t step = compression == McapCompression::none ? 1 : 5;
+    for (std::size_t size = 8; size < bytes.size(); size += step) {
+      const auto path = folder.write("cut.mcap", bytes.substr(0, size));
+      const auto recording = Recording::open(path);
+      const Messages messages = in_sequence(*recording);
+      ASSERT_LE(messages.size(), written.messages.size());
+      ASSERT_TRUE(std::equal(messages.begin(), messages.end(), written.messages.begin()));
+      ASSERT_GE(messages.size(), before) << size;
+      cut_within_chunks += messages.size() > before ? 1 : 0;
+      before = messages.size();
+      if (messages.size() < written.messages.size()) {
+        ASSERT_EQ(recording->warnings().size(), 1U) << size;
+      }
+    }
+    EXPECT_EQ(before, written.messages.size());
+    // Uncompressed chunks give every message that is whole, packed ones at least every chunk.
+    EXPECT_GE(cut_within_chunks, compression == McapCompression::none ? 20U : 3U);
+  }
+}
+
+TEST_F(RecordingTest, AWriterThatIsKilledLeavesWhatItWrote) {
+  const auto path = folder / "a.mcap";
+  McapWriter writer(path, {McapCompression::zstd, 1 << 20, ""});
+  const auto channel = writer.add_channel("/a", "cdr", 0);
+  writer.write(channel, 1, 1, std::array<std::uint8_t, 2>{1, 2});
+  writer.flush();
+  writer.write(channel, 2, 2, {});
+  const auto recording = Recording::open(path);
+  EXPECT_EQ(in_sequence(*recording), (Messages{{"/a", 1, {1, 2}}}));
+  EXPECT_EQ(recording->warnings().size(), 1U);
+  writer.close();
+  EXPECT_EQ(in_sequence(*Recording::open(path)), (Messages{{"/a", 1, {1, 2}}, {"/a", 2, {}}}));
+  writer.close();
+  EXPECT_THROW(writer.write(channel, 3, 3, {}), ContractError);
+}
+
+TEST_F(RecordingTest, AFullDiskIsReported) {
+  if (!fs::exists("/dev/full")) GTEST_SKIP();
+  const auto full = message_of<FileError>([] { McapWriter writer("/dev/full"); });
+  EXPECT_TRUE(contains(full, "/dev/full: cannot be written: No space left"));
+  EXPECT_THROW(McapWriter writer(folder / "no" / "a.mcap"), FileError);
+}
+
+// Where a chunk's checksum is wrong the others are read.
+TEST_F(RecordingTest, ADamagedChunkIsLeftOutAndNamed) {
+  const Written written = write_some(folder / "a.mcap", {McapCompression::none, 900, ""}, 60, 2);
+  std::string bytes = bytes_of(written.path);
+  // Within the bytes of the last message of the second chunk.
+  const auto places = Recording::open(written.path)->places(std::array<std::uint32_t, 3>{0, 1, 2});
+  const auto in_second = std::ranges::find(places, 1U, &MessagePlace::block);
+  ASSERT_NE(in_second, places.end());
+  const auto& victim = *in_second;
+  const auto content = Recording::open(written.path)->read(victim);
+  ASSERT_GE(content.size(), 8U);
+  const auto at = bytes.find(std::string(content.begin(), content.end()));
+  ASSERT_NE(at, std::string::npos);
+  bytes[at + 3] = static_cast<char>(bytes[at + 3] ^ 1);
+  Messages others;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    if (places[i].block != victim.block) others.push_back(written.messages[i]);
+  }
+  const auto damaged = folder.write("damaged.mcap", bytes);
+  // Without its footer the file is read from its beginning to its end.
+  const auto unclosed = folder.write("unclosed.mcap", bytes.substr(0, bytes.size() - 20));
+  for (const auto& path : {damaged, unclosed}) {
+    const auto recording = Recording::open(path);
+    EXPECT_EQ(in_sequence(*recording), others);
+    ASSERT_EQ(recording->warnings().size(), 1U);
+    EXPECT_TRUE(contains(recording->warnings()[0], path.string() + ": the chunk at byte "));
+    EXPECT_TRUE(contains(recording->warnings()[0], "its checksum is wrong"));
+  }
+  EXPECT_THROW((void)Recording::open(damaged)->read(victim), FileError);
+  // Times outside of the chunk do not touch it: the index says where it lies.
+  const auto recording = Recording::open(damaged);
+  const auto last = TimeSpan{places.back().time_ns, places.back().time_ns};
+  EXPECT_EQ(in_sequence(*recording, last).size(), 1U);
+  EXPECT_TRUE(recording->warnings().empty());
+}
+
+TEST_F(RecordingTest, ADamagedSummaryIsReplacedByAPassOverTheFile) {
+  const Written written = write_some(folder / "a.mcap", {McapCompression::lz4, 900, ""}, 60, 2);
+  std::string bytes = bytes_of(written.path);
+  bytes[bytes.size() - 100] = static_cast<char>(bytes[bytes.size() - 100] ^ 1);
+  const auto recording = Recording::open(folder.write("b.mcap", bytes));
+  EXPECT_EQ(in_sequence(*recording), written.messages);
+  ASSERT_EQ(recording->warnings().size(), 1U);
+  EXPECT_TRUE(contains(recording->warnings()[0], "its summary is damaged"));
+}
+
+std::string number(std::uint64_t value, int bytes) {
+  std::string text;
+  for (int i = 0; i < bytes; ++i) text += static_cast<char>(value >> (8 * i));
+  return text;
+}
+std::string text(std::string_view text) {
+  return number(text.size(), 4) + std::string(text);
+}
+std::string record(int kind, const std::string& body) {
+  return number(static_cast<std::uint64_t>(kind), 1) + number(body.size(), 8) + body;
+}
+const std::string mcap_begin = "\x89MCAP0\r\n" + record(1, text("") + text(""));
+const std::string mcap_channel =
+    record(4, number(0, 2) + number(0, 2) + text("/a") + text("cdr") + number(0, 4));
+std::string mcap_message(std::uint64_t time, const std::string& bytes) {
+  return record(5, number(0, 2) + number(0, 4) + number(time, 8) + number(time, 8) + bytes);
+}
+std::string mcap_chunk(std::string_view packing, const std::string& packed, std::uint64_t size) {
+  return record(6, number(0, 16) + number(size, 8) + number(0, 4) + text(packing) +
+                       number(packed.size(), 8) + packed);
+}
+const std::string mcap_end = record(15, number(0, 4)) + record(2, number(0, 20)) + "\x89MCAP0\r\n";
+
+TEST_F(RecordingTest, WhatIsTooLargeIsLeftOutInOneLine) {
+  // 64 MiB of nothing as Zstandard: a few bytes.
+  const std::string bomb(
+      "\x28\xB5\x2F\xFD\xA4\0\0\0\x04\x4D\0\0\x10\0\0\x01\0\xFB\xFF\x39\xC0\x02\x02\0\x10\0", 26);
+  const std::string good = mcap_chunk("", mcap_channel + mcap_message(5, "x"),
+                                      (mcap_channel + mcap_message(5, "x")).size());
+  const auto expect_one_line = [&](const std::string& bytes, std::string_view what) {
+    const auto recording =
+        Recording::open(folder.write("a.mcap", mcap_begin + bytes + good + mcap_end),
+                        {.chunk_bytes = 1 << 20, .messages = 100});
+    EXPECT_EQ(in_sequence(*recording), (Messages{{"/a", 5, {'x'}}}));
+    ASSERT_EQ(recording->warnings().size(), 1U) << what;
+    EXPECT_TRUE(contains(recording->warnings()[0], what));
+  };
+  expect_one_line(mcap_chunk("zstd", bomb, 64U << 20U),
+                  "has 67108864 bytes; allowed: up to 1048576");
+  expect_one_line(mcap_chunk("zstd", bomb, 1000), "cannot be unpacked");
+  expect_one_line(mcap_chunk("lz4", bomb, 1000), "cannot be unpacked");
+  expect_one_line(mcap_chunk("", "abc", ~std::uint64_t{0}), "allowed: up to 1048576");
+  expect_one_line(mcap_chunk("", "abc", 2), "tells two sizes");
+  expect_one_line(mcap_chunk("rar", "abc", 3), "is packed by 'rar'; allowed: none, lz4, zstd");
+  expect_one_line(record(6, "short"), "its head is wrong");
+  expect_one_line(mcap_message(3, "x"), "messages of channel 0 are left out");
+  expect_one_line(mcap_channel + mcap_message(3, std::string(1 << 21, 'x')),
+                  "bytes and is left out");
+  std::string many;
+  for (int i = 0; i < 101; ++i) many += mcap_message(7, "");
+  EXPECT_TRUE(contains(message_of<FileError>([&] {
+                         (void)Recording::open(
+                             folder.write("b.mcap", mcap_begin + mcap_channel + many + mcap_end),
+                             {.chunk_bytes = 1 << 20, .messages = 100});
+                       }),
+                       "has too many messages to list; allowed: up to 100"));
+}
+
+TEST_F(RecordingTest, UnknownRecordsAreSkippedAndTimeMayRunBack) {
+  const std::string bytes = mcap_begin + record(0x80, "mine") + mcap_channel +
+                            mcap_message(9, "c") + mcap_message(4, "a") + record(0x7F, "") +
+                            mcap_message(4, "b") + mcap_message(~std::uint64_t{0}, "z");
+  const auto recording = Recording::open(folder.write("a.mcap", bytes + mcap_end));
+  const Messages expected{{"/a", 4, {'a'}},
+                          {"/a", 4, {'b'}},
+                          {"/a", 9, {'c'}},
+                          {"/a", std::numeric_limits<std::int64_t>::max(), {'z'}}};
+  EXPECT_EQ(in_sequence(*recording), expected);
+  EXPECT_EQ(one_by_one(*recording), expected);
+  EXPECT_TRUE(recording->warnings().empty());
+}
+
+TEST_F(RecordingTest, WhatIsNoRecordingIsRefusedInOneLine) {
+  const auto refusal = [&](const fs::path& path) {
+    EXPECT_FALSE(is_recording(path));
+    const std::string line = message_of<FileError>([&] { (void)Recording::open(path); });
+    EXPECT_TRUE(contains(line, path.string() + ": "));
+    EXPECT_EQ(line.find('\n'), std::string::npos);
+    return line;
+  };
+  EXPECT_TRUE(contains(refusal(folder / "none.mcap"), "is missing"));
+  EXPECT_TRUE(contains(refusal(folder.write("empty.mcap", "")), "is no recording"));
+  EXPECT_TRUE(contains(refusal(folder.write("text.mcap", "hello")), "is no recording"));
+  EXPECT_TRUE(contains(refusal(folder.path()), "is no recording"));
+  // A file that ends behind its first bytes is one without messages.
+  const auto recording = Recording::open(folder.write("begun.mcap", "\x89MCAP0\r\n"));
+  EXPECT_TRUE(recording->topics().empty());
+  EXPECT_FALSE(recording->time());
+  EXPECT_EQ(recording->warnings().size(), 1U);
+}
+
+// Whatever the bytes are: messages, warnings or one line.
+TEST_F(RecordingTest, MutatedFilesNeitherCrashNorEndInSeveralLines) {
+  const RecordingLimits limits{.chunk_bytes = 1 << 20, .messages = 10000};
+  int changed = 0;
+  for (const char* name : {"mcap_none.mcap", "mcap_lz4.mcap", "mcap_zstd.mcap",
+                           "mcap_unchunked.mcap", "mcap_bare.mcap"}) {
+    const std::string good = bytes_of(golden(name));
+    Random random(1);
+    for (int trial = 0; trial < 100; ++trial) {
+      std::string bytes = good;
+      for (std::uint64_t edits = 1 + random.index(3); edits > 0; --edits) {
+        const auto at = random.index(bytes.size());
+        if (random.index(3) == 0) {
+          // A length at the end of its range.
+          for (std::size_t i = at; i < std::min<std::size_t>(at + 8, bytes.size()); ++i)
+            bytes[i] = '\xFF';
+        } else {
+          bytes[at] = static_cast<char>(random.next());
+        }
+      }
+      const auto path = folder.write("any", bytes);
+      try {
+        const auto recording = Recording::open(path, limits);
+        const Messages messages = in_sequence(*recording);
+        changed += messages != golden_messages() ? 1 : 0;
+        for (const auto& place : recording->places(all_topics(*recording))) {
+          try {
+            (void)recording->read(place);
+          } catch (const FileError&) {
+          }
+        }
+        for (const auto& line : recording->warnings()) {
+          EXPECT_EQ(line.find('\n'), std::string::npos);
+        }
+      } catch (const FileError& error) {
+        ++changed;
+        EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
+      }
+    }
+  }
+  EXPECT_GT(changed, 50);
+}
+
+}  // namespace
+}  // namespace panonav::testing
