@@ -15,6 +15,7 @@
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/option_file.hpp"
+#include "panonav/io/ros_messages.hpp"
 #include "panonav/io/trajectory_file.hpp"
 #include "panonav/panorama/preprocessing.hpp"
 #include "panonav/storage/memory_file.hpp"
@@ -30,11 +31,11 @@ namespace {
 namespace fs = std::filesystem;
 using Bytes = std::span<const std::uint8_t>;
 
-template <class Read>
+template <class Allowed = FileError, class Read>
 void expect_value_or_line(const Read& read) {
   try {
     read();
-  } catch (const FileError& error) {
+  } catch (const Allowed& error) {
     const std::string_view message = error.what();
     if (message.empty() || message.find('\n') != std::string_view::npos) {
       throw std::logic_error("not one line: " + std::string(message));
@@ -52,8 +53,9 @@ Bytes bytes_of(std::string_view text) {
   return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
 
+constexpr ImageLimits small{.side_px = 4096, .area_px = 1 << 22, .scanned_px = 1 << 27};
+
 void read_picture(Bytes bytes) {
-  constexpr ImageLimits small{.side_px = 4096, .area_px = 1 << 22, .scanned_px = 1 << 27};
   expect_value_or_line([&] { (void)decode_image(bytes, "picture", small); });
 }
 
@@ -171,6 +173,71 @@ void read_memory_sql(Bytes bytes) {
   read_all_of(path);
 }
 
+/// The message is what its bytes say: written, it reads as itself.
+template <class Message>
+Message read_ros_message(Bytes bytes, MessageEncoding encoding) {
+  const auto message = ros::read_message<Message>(bytes, encoding);
+  const auto written = ros::write_message(message, encoding);
+  const auto again = ros::read_message<Message>(written, encoding);
+  if (ros::write_message(again, encoding) != written) {
+    throw std::logic_error("a message changes on its way");
+  }
+  return message;
+}
+
+// The first byte chooses the type and, from 16 on, CDR.
+void read_ros_bytes(Bytes bytes) {
+  if (bytes.empty()) return;
+  const Bytes rest = bytes.subspan(1);
+  const MessageEncoding encoding = bytes[0] < 16 ? MessageEncoding::ros1 : MessageEncoding::cdr;
+  expect_value_or_line<Error>([&] {
+    switch (bytes[0] % 16) {
+      case 0:
+        (void)ros::picture_of(read_ros_message<ros::Image>(rest, encoding), small);
+        break;
+      case 1:
+        (void)ros::picture_of(read_ros_message<ros::CompressedImage>(rest, encoding), "picture",
+                              small);
+        break;
+      case 2:
+        (void)read_ros_message<ros::Imu>(rest, encoding);
+        break;
+      case 3:
+        (void)read_ros_message<ros::PointCloud2>(rest, encoding);
+        break;
+      case 4:
+        (void)read_ros_message<ros::Odometry>(rest, encoding);
+        break;
+      case 5:
+        (void)read_ros_message<ros::Path>(rest, encoding);
+        break;
+      case 6:
+        (void)read_ros_message<ros::OccupancyGrid>(rest, encoding);
+        break;
+      case 7:
+        (void)read_ros_message<ros::TFMessage>(rest, encoding);
+        break;
+      case 8:
+        (void)read_ros_message<ros::PointStamped>(rest, encoding);
+        break;
+      case 9:
+        (void)read_ros_message<ros::PoseStamped>(rest, encoding);
+        break;
+      case 10:
+        (void)read_ros_message<ros::PoseWithCovarianceStamped>(rest, encoding);
+        break;
+      case 11:
+        (void)read_ros_message<ros::PoseArray>(rest, encoding);
+        break;
+      case 12:
+        (void)read_ros_message<ros::DiagnosticArray>(rest, encoding);
+        break;
+      default:
+        break;
+    }
+  });
+}
+
 #ifdef PANONAV_FUZZ_WORLDS
 void read_world(Bytes bytes) {
   expect_value_or_line([&] { (void)load_gazebo(file_of("world.sdf", bytes)); });
@@ -188,6 +255,7 @@ constexpr std::array targets{
     FuzzTarget{"tum", read_tum},
     FuzzTarget{"memory", read_memory},
     FuzzTarget{"memory_sql", read_memory_sql},
+    FuzzTarget{"ros_messages", read_ros_bytes},
 #ifdef PANONAV_FUZZ_WORLDS
     FuzzTarget{"world", read_world},
 #endif

@@ -259,6 +259,13 @@ Image read_picture(const DatasetEntry& entry) {
   return entry.store ? entry.store->read(entry.store_index) : read_image(entry.path);
 }
 
+std::vector<std::uint8_t> read_encoded_picture(const DatasetEntry& entry) {
+  if (!entry.store) return read_encoded_image(entry.path);
+  if (auto encoded = entry.store->encoded(entry.store_index)) return std::move(*encoded);
+  const Image picture = entry.store->read(entry.store_index);
+  return encode_png(picture.view());
+}
+
 Dataset single_picture(const fs::path& file, PictureSource source) {
   std::error_code error;
   if (!fs::is_regular_file(file, error))

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -22,6 +23,11 @@ class PictureStore {
   /// The picture of this number. Several threads may call at a time; in ascending order it costs
   /// least. Throws FileError.
   [[nodiscard]] virtual Image read(std::size_t index) const = 0;
+  /// The JPEG or PNG that holds it, as it was recorded; empty where there is none. Likewise.
+  [[nodiscard]] virtual std::optional<std::vector<std::uint8_t>> encoded(
+      std::size_t /*index*/) const {
+    return std::nullopt;
+  }
 };
 
 /// One picture of a data set and what is known of it.
@@ -40,6 +46,8 @@ struct DatasetEntry {
 
 /// The picture, from its own file or from its store. Throws FileError.
 [[nodiscard]] Image read_picture(const DatasetEntry& entry);
+/// The same as a JPEG or PNG: the bytes of its own file, or what its store has; else a PNG.
+[[nodiscard]] std::vector<std::uint8_t> read_encoded_picture(const DatasetEntry& entry);
 
 /// A recording: pictures in order, and how they become panoramic cylinders. Pictures are read when
 /// they are needed (PanoramaReader).

@@ -16,20 +16,6 @@ constexpr std::size_t image_limit_bytes = std::size_t{1} << 30U;
 
 using Bytes = std::span<const std::uint8_t>;
 
-enum class Format { png, jpeg };
-
-Format format_of(Bytes bytes, std::string_view name) {
-  constexpr std::array<std::uint8_t, 8> png{0x89, 'P', 'N', 'G', 0x0D, 0x0A, 0x1A, 0x0A};
-  constexpr std::array<std::uint8_t, 3> jpeg{0xFF, 0xD8, 0xFF};
-  const auto starts_with = [&](Bytes magic) {
-    return bytes.size() >= magic.size() && std::equal(magic.begin(), magic.end(), bytes.begin());
-  };
-  if (starts_with(png)) return Format::png;
-  if (starts_with(jpeg)) return Format::jpeg;
-  throw FileError(name, bytes.empty() ? "is empty; allowed: a PNG or JPEG picture"
-                                      : "is no picture that can be read; allowed: PNG, JPEG");
-}
-
 // Which source pixel an upright picture shows at (u, v); EXIF 2.32, tag 0x0112.
 struct Source {
   int u;
@@ -60,9 +46,27 @@ Source source_of(int orientation, ImageSize stored, int u, int v) {
 
 }  // namespace
 
+ImageFormat image_format(Bytes bytes, std::string_view name) {
+  constexpr std::array<std::uint8_t, 8> png{0x89, 'P', 'N', 'G', 0x0D, 0x0A, 0x1A, 0x0A};
+  constexpr std::array<std::uint8_t, 3> jpeg{0xFF, 0xD8, 0xFF};
+  const auto starts_with = [&](Bytes magic) {
+    return bytes.size() >= magic.size() && std::equal(magic.begin(), magic.end(), bytes.begin());
+  };
+  if (starts_with(png)) return ImageFormat::png;
+  if (starts_with(jpeg)) return ImageFormat::jpeg;
+  throw FileError(name, bytes.empty() ? "is empty; allowed: a PNG or JPEG picture"
+                                      : "is no picture that can be read; allowed: PNG, JPEG");
+}
+
+std::vector<std::uint8_t> read_encoded_image(const std::filesystem::path& path) {
+  auto bytes = read_file(path, image_limit_bytes);
+  (void)image_format(bytes, path.string());
+  return bytes;
+}
+
 Image decode_image(Bytes bytes, std::string_view name, const ImageLimits& limits) {
-  return format_of(bytes, name) == Format::png ? detail::decode_png(bytes, name, limits)
-                                               : detail::decode_jpeg(bytes, name, limits);
+  return image_format(bytes, name) == ImageFormat::png ? detail::decode_png(bytes, name, limits)
+                                                       : detail::decode_jpeg(bytes, name, limits);
 }
 
 Image read_image(const std::filesystem::path& path, const ImageLimits& limits) {
@@ -73,8 +77,8 @@ Image read_image(const std::filesystem::path& path, const ImageLimits& limits) {
 ImageSize read_image_size(const std::filesystem::path& path, const ImageLimits& limits) {
   const auto bytes = read_file(path, image_limit_bytes);
   const std::string name = path.string();
-  return format_of(bytes, name) == Format::png ? detail::png_size(bytes, name, limits)
-                                               : detail::jpeg_size(bytes, name, limits);
+  return image_format(bytes, name) == ImageFormat::png ? detail::png_size(bytes, name, limits)
+                                                       : detail::jpeg_size(bytes, name, limits);
 }
 
 std::vector<std::uint8_t> encode_png(ImageView image) {

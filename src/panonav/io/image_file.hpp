@@ -28,6 +28,14 @@ struct ImageLimits {
 /// bytes.
 [[nodiscard]] Image read_image(const std::filesystem::path& path, const ImageLimits& limits = {});
 
+enum class ImageFormat { png, jpeg };
+
+/// By the first bytes. Throws FileError, which names `name`, when they are of neither.
+[[nodiscard]] ImageFormat image_format(std::span<const std::uint8_t> bytes, std::string_view name);
+
+/// The bytes of a PNG or JPEG file. Throws FileError when it begins otherwise.
+[[nodiscard]] std::vector<std::uint8_t> read_encoded_image(const std::filesystem::path& path);
+
 /// Width and height of the upright picture from the head of the file, without decoding the pixels.
 /// Throws FileError.
 [[nodiscard]] ImageSize read_image_size(const std::filesystem::path& path,
