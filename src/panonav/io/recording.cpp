@@ -241,8 +241,10 @@ std::unique_ptr<const RecordingFile> open_file(const fs::path& path,
     case FileKind::mcap:
       return open_mcap(path, limits);
     case FileKind::bag:
-    case FileKind::database:
+      return open_ros1_bag(path, limits);
     case FileKind::old_bag:
+      throw FileError(path.string(), "is a bag of an old version; allowed: 2.0 (rosbag migrate)");
+    case FileKind::database:
     case FileKind::other:
       break;
   }

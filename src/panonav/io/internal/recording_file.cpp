@@ -204,10 +204,8 @@ void ChunkedFile::list(std::size_t block, const std::vector<bool>& wanted, const
                        std::size_t most, std::vector<MessagePlace>& places) const {
   const Block& from = blocks_.at(block);
   std::vector<Entry> read;
-  if (!from.entries && (from.index_bytes == 0 || !list_index(from, read))) {
-    if (from.index_bytes > 0) {
-      warn("the index of " + chunk_at(from.at) + " is damaged; the chunk itself is read");
-    }
+  if (!from.entries && (!list_index(from, read) || read.size() != from.messages)) {
+    warn("the index of " + chunk_at(from.at) + " is damaged; the chunk itself is read");
     read.clear();
     if (!walk(content(block)->bytes(), read)) {
       warn(chunk_at(from.at) + " is damaged; what comes before the damage is read");

@@ -126,7 +126,8 @@ class ChunkedFile : public RecordingFile {
     bool is_cut = false;  ///< the file ends within the chunk
     std::optional<TimeSpan> time;
     std::uint64_t index_at = 0;                 ///< of the index behind the chunk
-    std::uint64_t index_bytes = 0;              ///< 0: not known
+    std::uint64_t index_bytes = 0;              ///< 0: there is none
+    std::uint64_t messages = 0;                 ///< that the index has
     std::optional<std::vector<Entry>> entries;  ///< of files without an index
   };
   /// What stands in front of a chunk's bytes.
