@@ -4,6 +4,7 @@
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <unordered_set>
 
@@ -253,6 +254,53 @@ Dataset read_picture_folder(const fs::path& folder, PictureSource source,
     dataset.entries.push_back(std::move(entry));
   }
   return dataset;
+}
+
+std::vector<std::size_t> selected_pictures(const std::vector<double>& stamps_s,
+                                           const PictureSelection& selection) {
+  constexpr double rounding_s = 1e-4;
+  std::vector<std::size_t> selected;
+  std::size_t passed = 0;
+  double last_s = -std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < stamps_s.size(); ++i) {
+    const double since_first_s = stamps_s[i] - stamps_s.front();
+    if (selection.from_s && since_first_s < *selection.from_s - rounding_s) continue;
+    if (selection.to_s && since_first_s > *selection.to_s + rounding_s) continue;
+    if (selection.every_s && stamps_s[i] - last_s < *selection.every_s - rounding_s) continue;
+    last_s = stamps_s[i];
+    if (passed++ % static_cast<std::size_t>(selection.every) == 0) selected.push_back(i);
+  }
+  return selected;
+}
+
+void select_pictures(Dataset& dataset, const PictureSelection& selection) {
+  const std::string name = dataset.folder.string();
+  std::vector<double> stamps_s(dataset.entries.size(), 0.0);
+  if (selection.by_time()) {
+    for (std::size_t i = 0; i < stamps_s.size(); ++i) {
+      const DatasetEntry& entry = dataset.entries[i];
+      if (!entry.stamp_s) {
+        throw FileError(name, "stamp_s of " + entry.file +
+                                  " is missing; pictures can be chosen by time only where all have "
+                                  "stamps");
+      }
+      stamps_s[i] = *entry.stamp_s;
+      if (i > 0 && stamps_s[i] < stamps_s[i - 1]) {
+        throw FileError(name, "stamp_s of " + entry.file + " is " + to_text(stamps_s[i]) +
+                                  "; allowed where pictures are chosen by time: at least " +
+                                  to_text(stamps_s[i - 1]) + ", the stamp before it");
+      }
+    }
+  }
+  std::vector<DatasetEntry> kept;
+  for (const std::size_t i : selected_pictures(stamps_s, selection)) {
+    kept.push_back(std::move(dataset.entries[i]));
+  }
+  if (kept.empty()) {
+    throw FileError(name, "has no picture in the time that was asked for; it is " +
+                              short_number(stamps_s.back() - stamps_s.front()) + " s long");
+  }
+  dataset.entries = std::move(kept);
 }
 
 Image read_picture(const DatasetEntry& entry) {

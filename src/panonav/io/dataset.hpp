@@ -65,6 +65,25 @@ struct Dataset {
 /// picture at all.
 [[nodiscard]] Dataset read_dataset(const std::filesystem::path& folder);
 
+/// Which pictures of a recording are taken. Times are seconds from its first picture.
+struct PictureSelection {
+  int every = 1;                  ///< each n-th of those that the times leave
+  std::optional<double> every_s;  ///< the first, then the next one that is at least this much later
+  std::optional<double> from_s;
+  std::optional<double> to_s;  ///< this moment included
+
+  [[nodiscard]] bool by_time() const noexcept { return every_s || from_s || to_s; }
+};
+
+/// The numbers of the pictures with these ascending stamps that the selection takes. A tenth of a
+/// millisecond does not count.
+[[nodiscard]] std::vector<std::size_t> selected_pictures(const std::vector<double>& stamps_s,
+                                                         const PictureSelection& selection);
+
+/// Drops the other entries. Throws FileError when times are asked for and an entry has no stamp or
+/// one before that of its predecessor, and when nothing is left.
+void select_pictures(Dataset& dataset, const PictureSelection& selection);
+
 struct PictureFolderOptions {
   bool recursive = false;  ///< pictures of the folders within count, too; links are not followed
 };
