@@ -218,6 +218,71 @@ TEST_F(RecordingTest, ACutBagGivesWhatComesBeforeTheCut) {
   }
 }
 
+TEST_F(RecordingTest, ReadsRecordingsOfRosbag2) {
+  for (const auto& path : {golden("rosbag2"), golden("packed.db3")}) {
+    SCOPED_TRACE(path);
+    ASSERT_TRUE(is_recording(path));
+    const auto recording = Recording::open(path);
+    EXPECT_EQ(in_sequence(*recording), golden_messages());
+    EXPECT_EQ(one_by_one(*recording), golden_messages());
+    EXPECT_TRUE(recording->warnings().empty()) << recording->warnings()[0];
+    ASSERT_EQ(recording->topics().size(), 2U);
+    EXPECT_EQ(recording->topics()[0].type, "sensor_msgs/Imu");
+    EXPECT_EQ(recording->topics()[0].encoding, MessageEncoding::cdr);
+    EXPECT_EQ(recording->topics()[0].messages, 14U);
+    EXPECT_EQ(recording->time(), (TimeSpan{1'000'000'000, 1'190'000'000}));
+    const TimeSpan within{1'050'000'000, 1'100'000'000};
+    EXPECT_EQ(in_sequence(*recording, within).size(), 6U);
+    EXPECT_EQ(one_by_one(*recording, within).size(), 6U);
+  }
+}
+
+TEST_F(RecordingTest, AFolderOfRosbag2IsReadWithoutTheFilesThatAreMissing) {
+  const auto metadata = [&](std::string_view files) {
+    folder.write("metadata.yaml",
+                 "rosbag2_bagfile_information:\n  relative_file_paths: " + std::string(files));
+  };
+  metadata("[bag/one.mcap, ../none.db3, packed.db3.zstd]");
+  EXPECT_TRUE(contains(message_of<FileError>([&] { (void)Recording::open(folder.path()); }),
+                       "has no file that can be read: "));
+  fs::copy(golden("mcap_lz4.mcap"), folder / "one.mcap");
+  const auto recording = Recording::open(folder.path());
+  EXPECT_EQ(in_sequence(*recording), golden_messages());
+  ASSERT_EQ(recording->warnings().size(), 2U);
+  EXPECT_TRUE(contains(recording->warnings()[0], (folder / "none.db3").string() + ": is missing"));
+  EXPECT_TRUE(contains(recording->warnings()[1], "is packed as a whole"));
+  // The same file twice: what has one time comes in the order of the files.
+  metadata("[one.mcap, one.mcap]");
+  const auto twice = Recording::open(folder.path());
+  EXPECT_EQ(twice->topics()[0].messages, 28U);
+  const auto messages = in_sequence(*twice);
+  ASSERT_EQ(messages.size(), 40U);
+  for (std::size_t i = 0; i < 40; ++i) EXPECT_EQ(messages[i], golden_messages()[i / 2]);
+  for (const std::string& bad : std::initializer_list<std::string>{
+           "", "{}", "[]", "[[1]]", "[a", "*x", std::string(100000, '[')}) {
+    metadata(bad);
+    const std::string line = message_of<FileError>([&] { (void)Recording::open(folder.path()); });
+    EXPECT_TRUE(contains(line, (folder / "metadata.yaml").string() + ": ")) << bad.substr(0, 10);
+    EXPECT_EQ(line.find('\n'), std::string::npos);
+  }
+}
+
+TEST_F(RecordingTest, ADatabaseOfSomethingElseIsRefused) {
+  std::string bytes = bytes_of(golden("packed.db3"));
+  const auto refusal = [&](const std::string& changed) {
+    return message_of<FileError>([&] { (void)Recording::open(folder.write("a.db3", changed)); });
+  };
+  std::string other = bytes;
+  other.replace(other.find("CREATE TABLE topics"), 19, "CREATE TABLE tropes");
+  other.replace(other.find("topicstopics"), 12, "tropestropes");
+  EXPECT_TRUE(contains(refusal(other), "is no recording of rosbag2: it lacks the tables"));
+  EXPECT_TRUE(contains(refusal(bytes.substr(0, 300)), "is damaged or no recording of rosbag2"));
+  other = bytes;
+  other.replace(68, 4, "PNAV");
+  EXPECT_TRUE(contains(refusal(other), "is no recording"));
+  EXPECT_FALSE(is_recording(folder / "a.db3"));
+}
+
 // A recorder notes the size of a chunk when the chunk is full.
 TEST_F(RecordingTest, ABagWhoseLastChunkHasNoSizeYetIsReadToItsEnd) {
   std::string bytes = bytes_of(golden("bag_unclosed.bag"));
@@ -502,7 +567,7 @@ TEST_F(RecordingTest, MutatedFilesNeitherCrashNorEndInSeveralLines) {
   int changed = 0;
   for (const char* name :
        {"mcap_none.mcap", "mcap_lz4.mcap", "mcap_zstd.mcap", "mcap_unchunked.mcap",
-        "mcap_bare.mcap", "bag_none.bag", "bag_bz2.bag", "bag_lz4.bag"}) {
+        "mcap_bare.mcap", "bag_none.bag", "bag_bz2.bag", "bag_lz4.bag", "packed.db3"}) {
     const std::string good = bytes_of(golden(name));
     Random random(1);
     for (int trial = 0; trial < 100; ++trial) {

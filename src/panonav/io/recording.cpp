@@ -11,6 +11,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/io/internal/recording_file.hpp"
+#include "panonav/io/internal/rosbag2.hpp"
 
 namespace panonav {
 
@@ -195,7 +196,8 @@ class FilesRecording : public Recording {
     constexpr std::array<std::uint8_t, 4> zstd_magic{0x28, 0xB5, 0x2F, 0xFD};
     if (topics_[place.topic].encoding == MessageEncoding::cdr && message.bytes.size() >= 4 &&
         std::ranges::equal(message.bytes.first(4), zstd_magic)) {
-      auto unpacked = unpack(message.bytes, Packing::zstd, limits_.chunk_bytes);
+      auto unpacked = unpack(message.bytes, Packing::zstd,
+                             zstd_content_bytes(message.bytes, limits_.chunk_bytes));
       if (!unpacked.whole) {
         throw FileError(file.path().string(), "a packed message cannot be unpacked, or not to " +
                                                   std::to_string(limits_.chunk_bytes) + " bytes");
@@ -245,6 +247,7 @@ std::unique_ptr<const RecordingFile> open_file(const fs::path& path,
     case FileKind::old_bag:
       throw FileError(path.string(), "is a bag of an old version; allowed: 2.0 (rosbag migrate)");
     case FileKind::database:
+      return open_rosbag2_database(path, limits);
     case FileKind::other:
       break;
   }
@@ -255,19 +258,44 @@ std::unique_ptr<const RecordingFile> open_file(const fs::path& path,
                   "folders of rosbag2 with metadata.yaml");
 }
 
+bool is_rosbag2_folder(const fs::path& path) {
+  std::array<char, 4096> first{};
+  std::ifstream(path / "metadata.yaml", std::ios::binary).read(first.data(), first.size());
+  return std::string_view(first.data(), first.size()).find("rosbag2_bagfile_information") !=
+         std::string_view::npos;
+}
+
 }  // namespace
 
 std::unique_ptr<const Recording> Recording::open(const fs::path& path,
                                                  const RecordingLimits& limits) {
   Files files;
-  files.push_back(open_file(path, limits));
-  return std::make_unique<const FilesRecording>(std::move(files), std::vector<std::string>{},
-                                                limits);
+  std::vector<std::string> warnings;
+  if (!is_rosbag2_folder(path)) {
+    files.push_back(open_file(path, limits));
+  } else {
+    // The other files of a recording are there where one is not.
+    for (const fs::path& file : read_rosbag2_folder(path)) {
+      try {
+        if (file.extension() == ".zstd") {
+          throw FileError(file.string(),
+                          "is packed as a whole, which is not supported; unpack it and take the "
+                          "ending .zstd from its name in metadata.yaml");
+        }
+        files.push_back(open_file(file, limits));
+      } catch (const FileError& error) {
+        warnings.emplace_back(error.what());
+      }
+    }
+    if (files.empty())
+      throw FileError(path.string(), "has no file that can be read: " + warnings[0]);
+  }
+  return std::make_unique<const FilesRecording>(std::move(files), std::move(warnings), limits);
 }
 
 bool is_recording(const fs::path& path) noexcept {
   try {
-    return kind_of(path) != FileKind::other;
+    return kind_of(path) != FileKind::other || is_rosbag2_folder(path);
   } catch (...) {
     return false;
   }

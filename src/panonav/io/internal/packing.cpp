@@ -114,6 +114,12 @@ Unpacked unpack(std::span<const std::uint8_t> packed, Packing packing, std::size
   return result;
 }
 
+std::size_t zstd_content_bytes(std::span<const std::uint8_t> packed, std::size_t most) noexcept {
+  // What is not known is a number beyond all sizes.
+  return static_cast<std::size_t>(
+      std::min<std::uint64_t>(ZSTD_getFrameContentSize(packed.data(), packed.size()), most));
+}
+
 void pack(std::span<const std::uint8_t> bytes, Packing packing, std::vector<std::uint8_t>& packed) {
   std::size_t size = 0;
   if (packing == Packing::lz4) {
