@@ -2,6 +2,7 @@
 
 #include <sqlite3.h>
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <memory>
@@ -15,6 +16,7 @@
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/option_file.hpp"
+#include "panonav/io/recording.hpp"
 #include "panonav/io/ros_messages.hpp"
 #include "panonav/io/trajectory_file.hpp"
 #include "panonav/panorama/preprocessing.hpp"
@@ -102,6 +104,29 @@ void read_csv(Bytes bytes) {
 }
 void read_tum(Bytes bytes) {
   expect_value_or_line([&] { (void)read_trajectory(file_of("t.tum", bytes)); });
+}
+
+void read_recording(Bytes bytes) {
+  expect_value_or_line([&] {
+    constexpr RecordingLimits small{.chunk_bytes = 1 << 20, .messages = 100'000};
+    const auto recording = Recording::open(file_of("recording", bytes), small);
+    std::vector<std::uint32_t> topics;
+    for (std::uint32_t i = 0; i < recording->topics().size(); ++i) topics.push_back(i);
+    std::size_t read = 0;
+    recording->for_each(topics, {},
+                        [&](const MessagePlace&, Bytes message) { read += message.size(); });
+    const auto places = recording->places(topics);
+    if (!std::ranges::is_sorted(places, {}, &MessagePlace::time_ns)) {
+      throw std::logic_error("places are not in order of time");
+    }
+    for (const MessagePlace& place : places) {
+      expect_value_or_line([&] { read += recording->read(place).size(); });
+    }
+    if (read > 0 && topics.empty()) throw std::logic_error("messages without a topic");
+    for (const std::string& line : recording->warnings()) {
+      expect_value_or_line([&] { throw FileError("recording", line); });
+    }
+  });
 }
 
 void read_all_of(const fs::path& path) {
@@ -253,6 +278,9 @@ constexpr std::array targets{
     FuzzTarget{"poses", read_poses},
     FuzzTarget{"csv", read_csv},
     FuzzTarget{"tum", read_tum},
+    FuzzTarget{"mcap", read_recording},
+    FuzzTarget{"bag", read_recording},
+    FuzzTarget{"db3", read_recording},
     FuzzTarget{"memory", read_memory},
     FuzzTarget{"memory_sql", read_memory_sql},
     FuzzTarget{"ros_messages", read_ros_bytes},
