@@ -106,7 +106,7 @@ TEST(Usage, WrongUseIsOneLineWithAHint) {
   EXPECT_TRUE(contains(refusal({}), "a verb is missing; see panonav --help"));
   EXPECT_TRUE(contains(refusal({"frobnicate"}), "'frobnicate' is no verb; see"));
   (void)refusal({"--no-such-flag"});
-  EXPECT_TRUE(contains(refusal({"info"}), "MEMORY is required"));
+  EXPECT_TRUE(contains(refusal({"info"}), "FILE is required"));
   EXPECT_TRUE(contains(refusal({"info", "a", "b"}), "'b' is one argument too many"));
   EXPECT_TRUE(contains(refusal({"info", "a", "--threads"}), "--threads wants a value: INT"));
   EXPECT_TRUE(contains(refusal({"info", "a", "--json=yes"}), "--json takes no value"));

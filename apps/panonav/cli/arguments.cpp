@@ -186,6 +186,12 @@ void Arguments::option(const std::string& flag, std::optional<std::pair<double, 
   });
 }
 
+void Arguments::option(const std::string& flag, const std::string& words,
+                       std::optional<std::pair<std::string, std::string>>& value,
+                       const std::string& help) {
+  add(flag, words, help, [&value](auto typed) { value = {typed[0], typed[1]}; });
+}
+
 void Arguments::option(const std::string& flag, int& value, int low, const std::string& help) {
   auto& info = add(flag, "INT", help, [&value, low, name = long_form(flag)](auto words) {
     value = whole_number(name, words.front(), low);

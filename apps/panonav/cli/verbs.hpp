@@ -16,6 +16,7 @@ namespace panonav::command {
 [[nodiscard]] Verb demo_verb();
 [[nodiscard]] Verb evaluate_verb();
 [[nodiscard]] Verb export_verb();
+[[nodiscard]] Verb convert_verb();
 [[nodiscard]] Verb forget_verb();
 [[nodiscard]] Verb gallery_verb();
 [[nodiscard]] Verb help_verb();

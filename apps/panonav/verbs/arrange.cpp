@@ -25,6 +25,7 @@ namespace {
 struct ArrangeArguments {
   std::string memory;
   std::optional<std::string> odometry;
+  PictureArguments pictures;  // of a recording of topics, whose pictures are not read
   std::optional<std::string> tum;
   std::optional<std::string> graph;
   std::optional<std::string> picture;
@@ -34,11 +35,13 @@ struct ArrangeArguments {
 };
 
 /// Motion between consecutive pictures of the data set that the memory knows by name.
-std::vector<CoarseMotion> motions_of(const ArrangeArguments& wanted, const VisualMemory& memory) {
+std::vector<CoarseMotion> motions_of(const ArrangeArguments& wanted, const PictureSource& source,
+                                     const VisualMemory& memory, Session& session) {
   std::vector<CoarseMotion> motions;
   if (!wanted.odometry) return motions;
   const Dataset recording =
-      read_described(*wanted.odometry, "odom_x_m,odom_y_m,odom_heading_deg", "1.5,0.25,90");
+      read_described(*wanted.odometry, wanted.pictures, source,
+                     "odom_x_m,odom_y_m,odom_heading_deg", "1.5,0.25,90", session);
   std::optional<std::pair<ViewId, Pose2>> before;
   for (const DatasetEntry& entry : recording.entries) {
     const auto view = memory.find(entry.file);
@@ -176,7 +179,8 @@ ExitCode arrange_views(const ArrangeArguments& wanted, Session& session) {
   }
   session.detail(std::to_string(memory.size()) + " views loaded");
   const Lattice lattice =
-      arrange(memory, wanted.lattice, motions_of(wanted, memory), session.executor());
+      arrange(memory, wanted.lattice, motions_of(wanted, file.header().source, memory, session),
+              session.executor());
   session.detail("views arranged");
   if (!wanted.no_save) store_lattice(lattice, memory, file);
   if (wanted.tum) write_trajectory(*wanted.tum, trajectory_of(lattice, memory));
@@ -205,8 +209,10 @@ ExitCode arrange_views(const ArrangeArguments& wanted, Session& session) {
 Run declare_arrange(Arguments& arguments) {
   auto wanted = std::make_shared<ArrangeArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file; its views may be in any order");
-  arguments.option("--odometry DATASET", wanted->odometry,
-                   "Take the robot's motion between views from this data set, by file name");
+  arguments.option(
+      "--odometry DATASET", wanted->odometry,
+      "Take the robot's motion between views from this data set or recording, by name");
+  declare_topics(arguments, wanted->pictures.topics);
   arguments.option(
       "--tum FILE", wanted->tum,
       "Write the poses of the largest component to this file: TUM text, or CSV for a name "

@@ -219,9 +219,9 @@ ExitCode catchment(const Arguments& arguments, const CatchmentArguments& wanted,
   settings.longest_step_given = arguments.given("run", "max_step_m");
   settings.obstacle_given = arguments.given("run", "obstacle_m");
   const auto recording =
-      wanted.ahead || picture_source(wanted.pictures)
-          ? open_recording(wanted.dataset, wanted.pictures, std::nullopt, session)
-          : read_described(wanted.dataset, pose_columns, pose_values);
+      wanted.ahead ? open_recording(wanted.dataset, wanted.pictures, std::nullopt, session)
+                   : read_described(wanted.dataset, wanted.pictures, std::nullopt, pose_columns,
+                                    pose_values, session);
   std::optional<Dataset> second;
   if (wanted.current)
     second = open_recording(*wanted.current, wanted.pictures, recording.source, session);

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <memory>
 
 #include "cli/arguments.hpp"
@@ -5,7 +6,9 @@
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/io/recorded_dataset.hpp"
 #include "panonav/storage/memory_file.hpp"
 
 namespace panonav::command {
@@ -123,16 +126,74 @@ ExitCode show(const std::string& path, Session& session) {
   return ExitCode::done;
 }
 
+ExitCode show_recording(const std::string& path, Session& session) {
+  const RecordingSummary summary = describe_recording(path);
+  const auto seconds = [](std::int64_t ns) { return 1e-9 * static_cast<double>(ns); };
+  if (session.json()) {
+    ordered_json json{{"recording", path}, {"begin_s", nullptr}, {"end_s", nullptr}};
+    const auto add_span = [&](ordered_json& to, const std::optional<TimeSpan>& span) {
+      if (!span) return;
+      to["begin_s"] = seconds(span->begin_ns);
+      to["end_s"] = seconds(span->end_ns);
+    };
+    add_span(json, summary.time);
+    auto topics = ordered_json::array();
+    for (const auto& [topic, time, rate_hz, shows] : summary.topics) {
+      ordered_json each{{"name", topic.name},         {"type", topic.type},
+                        {"messages", topic.messages}, {"begin_s", nullptr},
+                        {"end_s", nullptr},           {"rate_hz", nullptr},
+                        {"first_picture", nullptr}};
+      add_span(each, time);
+      if (rate_hz) each["rate_hz"] = *rate_hz;
+      if (shows) each["first_picture"] = *shows;
+      topics.push_back(std::move(each));
+    }
+    json["topics"] = std::move(topics);
+    json["warnings"] = summary.warnings;
+    session.print(json_line(json));
+    return ExitCode::done;
+  }
+  std::uint64_t messages = 0;
+  std::size_t name_width = 0;
+  std::size_t type_width = 0;
+  for (const auto& each : summary.topics) {
+    messages += each.topic.messages;
+    name_width = std::max(name_width, each.topic.name.size());
+    type_width = std::max(type_width, each.topic.type.size());
+  }
+  session.print(session.strong(path) + ": " + std::to_string(messages) + " messages of " +
+                std::to_string(summary.topics.size()) + " topics" +
+                (summary.time
+                     ? " in " + fixed(seconds(summary.time->end_ns - summary.time->begin_ns), 1) +
+                           " s from " + fixed(seconds(summary.time->begin_ns), 3) + " s on"
+                     : ""));
+  const auto padded = [](std::string text, std::size_t width) {
+    text.resize(std::max(width, text.size()), ' ');
+    return readable_line(text);
+  };
+  for (const auto& [topic, time, rate_hz, shows] : summary.topics) {
+    session.print("  " + padded(topic.name, name_width) + "  " + padded(topic.type, type_width) +
+                  "  " + std::to_string(topic.messages) +
+                  (rate_hz ? ", " + short_number(*rate_hz, {}, 3) + " a second" : "") +
+                  (shows ? ", " + *shows : ""));
+  }
+  for (const std::string& warning : summary.warnings) session.note(path + ": " + warning);
+  return ExitCode::done;
+}
+
 Run declare_info(Arguments& arguments) {
   auto path = std::make_shared<std::string>();
-  arguments.positional("MEMORY", *path, "Memory file");
-  return [path](Session& session) { return show(*path, session); };
+  arguments.positional("FILE", *path, "Memory file, or recording (MCAP, rosbag2, ROS 1 bag)");
+  return [path](Session& session) {
+    return is_recording(*path) ? show_recording(*path, session) : show(*path, session);
+  };
 }
 
 }  // namespace
 
 Verb info_verb() {
-  return {"info", "Show what a memory holds", "", "  panonav info office.panonav", declare_info};
+  return {"info", "Show what a memory or a recording holds", "",
+          "  panonav info office.panonav\n  panonav info drive.mcap", declare_info};
 }
 
 }  // namespace panonav::command

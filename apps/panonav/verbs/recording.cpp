@@ -76,7 +76,7 @@ void note_other_kind(const Dataset& recording, Session& session) {
 
 }  // namespace
 
-void declare_pictures(Arguments& arguments, PictureArguments& pictures) {
+void declare_layout(Arguments& arguments, PictureArguments& pictures) {
   arguments.choice("--kind", pictures.kind, {"panorama", "equirectangular", "mirror"},
                    "What the pictures show, where no dataset.toml says it");
   arguments.option("--camera FILE", pictures.camera,
@@ -88,6 +88,24 @@ void declare_pictures(Arguments& arguments, PictureArguments& pictures) {
   arguments.option("--elevation-deg", pictures.elevation_deg,
                    "Lower and upper edge of a panorama, or the band to keep of other pictures");
   arguments.uncommon({"--columns-run", "--forward-column"});
+}
+
+void declare_topics(Arguments& arguments, RecordingTopics& topics) {
+  arguments.option(
+      "--image-topic NAME", topics.image,
+      "Pictures of a recording (MCAP, rosbag2, ROS 1 bag) with several topics of them");
+  arguments.option("--odometry-topic NAME", topics.odometry,
+                   "Its odometry (nav_msgs/Odometry) where there are several");
+  arguments.option("--odometry-frames", "ODOM BASE", topics.odometry_frames,
+                   "Odometry from its transforms (TF) instead; without a topic odom base_link");
+  arguments.option("--imu-topic NAME", topics.imu,
+                   "Its inertial sensor (roll and pitch) where there are several");
+  arguments.uncommon({"--image-topic", "--odometry-topic", "--odometry-frames", "--imu-topic"});
+}
+
+void declare_pictures(Arguments& arguments, PictureArguments& pictures) {
+  declare_layout(arguments, pictures);
+  declare_topics(arguments, pictures.topics);
 }
 
 std::optional<PictureSource> picture_source(const PictureArguments& pictures) {
@@ -147,11 +165,46 @@ std::optional<PictureSource> picture_source(const PictureArguments& pictures) {
   return source;
 }
 
+namespace {
+
+void refuse_topics(const std::string& input, const RecordingTopics& topics) {
+  for (const auto& [typed, flag] : {std::pair{topics.image.has_value(), "--image-topic"},
+                                    {topics.odometry.has_value(), "--odometry-topic"},
+                                    {topics.odometry_frames.has_value(), "--odometry-frames"},
+                                    {topics.imu.has_value(), "--imu-topic"}}) {
+    if (typed) throw UsageError(input + " has no topics; leave out " + flag);
+  }
+}
+
+Dataset open_topics(const std::string& input, const RecordingTopics& topics,
+                    const PictureSource& source, Session& session) {
+  if (topics.odometry && topics.odometry_frames) {
+    throw UsageError("--odometry-topic and --odometry-frames do not go together");
+  }
+  RecordedDataset recorded = read_recording(input, source, topics);
+  for (const std::string& warning : recorded.warnings) session.note(input + ": " + warning);
+  return std::move(recorded.dataset);
+}
+
+}  // namespace
+
 Dataset open_recording(const std::string& input, const PictureArguments& pictures,
                        const std::optional<PictureSource>& remembered, Session& session) {
   const auto stated = picture_source(pictures);
   std::error_code ignored;
   if (!fs::exists(input, ignored)) throw FileError(input, "there is no such file or folder");
+  if (is_recording(input)) {
+    const auto& source = stated ? stated : remembered;
+    if (!source) {
+      throw UsageError(input +
+                       " does not say how its pictures lie; say what they show with --kind");
+    }
+    if (pictures.recursive) throw UsageError(input + " is a recording; leave out --recursive");
+    Dataset recording = open_topics(input, pictures.topics, *source, session);
+    if (stated) note_other_kind(recording, session);
+    return recording;
+  }
+  refuse_topics(input, pictures.topics);
   if (fs::is_directory(input, ignored) && fs::exists(fs::path(input) / "dataset.toml", ignored)) {
     if (stated) {
       throw UsageError(input +
@@ -208,14 +261,23 @@ Dataset open_recording(const std::string& input, const PictureArguments& picture
   return recording;
 }
 
-Dataset read_run(const std::string& input, const MemoryFile& memory, Session& session) {
+Dataset read_run(const std::string& input, const RecordingTopics& topics, const MemoryFile& memory,
+                 Session& session) {
   std::error_code ignored;
-  if (fs::exists(fs::path(input) / "dataset.toml", ignored)) return read_dataset(input);
-  return open_recording(input, {}, memory, session);
+  if (fs::exists(fs::path(input) / "dataset.toml", ignored)) {
+    refuse_topics(input, topics);
+    return read_dataset(input);
+  }
+  PictureArguments pictures;
+  pictures.topics = topics;
+  return open_recording(input, pictures, memory, session);
 }
 
 std::string how_to_add(const std::string& folder, const std::string& columns,
                        const std::string& values) {
+  if (is_recording(folder)) {
+    return "; of a recording odometry is nav_msgs/Odometry or TF, poses are those of /ground_truth";
+  }
   std::error_code ignored;
   const bool described = fs::exists(fs::path(folder) / "dataset.toml", ignored);
   const Dataset recording = described ? read_dataset(folder) : read_picture_folder(folder, {});
@@ -229,8 +291,13 @@ std::string how_to_add(const std::string& folder, const std::string& columns,
          table;
 }
 
-Dataset read_described(const std::string& folder, const std::string& columns,
-                       const std::string& values) {
+Dataset read_described(const std::string& folder, const PictureArguments& pictures,
+                       const std::optional<PictureSource>& remembered, const std::string& columns,
+                       const std::string& values, Session& session) {
+  if (is_recording(folder) || picture_source(pictures)) {
+    return open_recording(folder, pictures, remembered, session);
+  }
+  refuse_topics(folder, pictures.topics);
   std::error_code ignored;
   if (fs::is_directory(folder, ignored) &&
       !fs::exists(fs::path(folder) / "dataset.toml", ignored)) {

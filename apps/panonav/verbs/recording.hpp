@@ -11,6 +11,7 @@
 #include "cli/session.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/io/dataset.hpp"
+#include "panonav/io/recorded_dataset.hpp"
 #include "panonav/pipeline/observation.hpp"
 #include "panonav/storage/memory_file.hpp"
 
@@ -24,19 +25,25 @@ struct PictureArguments {
   std::optional<double> forward_column;
   std::optional<std::pair<double, double>> elevation_deg;
   bool recursive = false;  ///< a folder of pictures: those of the folders within, too
+  RecordingTopics topics;  ///< of a recording of topics
 };
 
 /// Adds --kind, --camera, --columns-run, --forward-column and --elevation-deg.
+void declare_layout(Arguments& arguments, PictureArguments& pictures);
+/// Adds --image-topic, --odometry-topic, --odometry-frames and --imu-topic.
+void declare_topics(Arguments& arguments, RecordingTopics& topics);
+/// Both.
 void declare_pictures(Arguments& arguments, PictureArguments& pictures);
 
 /// Empty when the user said nothing. Throws UsageError on flags that do not fit together, FileError
 /// on the camera file.
 [[nodiscard]] std::optional<PictureSource> picture_source(const PictureArguments& pictures);
 
-/// A data set, a folder of pictures or one picture. `remembered` is how pictures lay that the
-/// memory was made from: it reads what comes without a description of its own. A data set describes
-/// itself, so flags beside it throw UsageError. Throws FileError. Notes what of a folder is left
-/// out and pictures that look as if they were of another kind.
+/// A data set, a folder of pictures, one picture or a recording of topics. `remembered` is how
+/// pictures lay that the memory was made from: it reads what comes without a description of its
+/// own. A data set describes itself, so flags beside it throw UsageError, as topics do of what has
+/// none. Throws FileError. Notes what of a folder or recording is left out and pictures that look
+/// as if they were of another kind.
 [[nodiscard]] Dataset open_recording(const std::string& input, const PictureArguments& pictures,
                                      const std::optional<PictureSource>& remembered,
                                      Session& session);
@@ -45,18 +52,21 @@ void declare_pictures(Arguments& arguments, PictureArguments& pictures);
 [[nodiscard]] Dataset open_recording(const std::string& input, const PictureArguments& pictures,
                                      const MemoryFile& memory, Session& session);
 
-/// The recording of a run: a data set, or a folder of pictures that lie as those of the memory.
-[[nodiscard]] Dataset read_run(const std::string& input, const MemoryFile& memory,
-                               Session& session);
+/// The recording of a run: a data set, or a folder or recording of pictures that lie as those of
+/// the memory.
+[[nodiscard]] Dataset read_run(const std::string& input, const RecordingTopics& topics,
+                               const MemoryFile& memory, Session& session);
 
 /// How to make a recording tell more, for the end of an error's line: the table of a data set gets
 /// these columns, a folder of pictures alone a dataset.toml first. `values`: of an example.
 [[nodiscard]] std::string how_to_add(const std::string& folder, const std::string& columns,
                                      const std::string& values);
-/// A data set. A folder of pictures alone throws a FileError that says how to make it one with
-/// these columns.
-[[nodiscard]] Dataset read_described(const std::string& folder, const std::string& columns,
-                                     const std::string& values);
+/// A data set, or what the user says of other pictures, as `open_recording` does. A folder of
+/// pictures alone throws a FileError that says how to make it a data set with these columns.
+[[nodiscard]] Dataset read_described(const std::string& folder, const PictureArguments& pictures,
+                                     const std::optional<PictureSource>& remembered,
+                                     const std::string& columns, const std::string& values,
+                                     Session& session);
 
 /// Poses of all entries in the data set's frame. Where it knows positions but no headings, those
 /// along the way: the tangent fitted to the positions within 0.3 m of way to either side. Empty

@@ -23,6 +23,7 @@ namespace {
 struct FollowArguments {
   std::string memory;
   std::string dataset;
+  RecordingTopics topics;
   std::optional<std::string> name;
   int every = 1;
   bool no_odometry = false;
@@ -133,7 +134,7 @@ std::vector<double> seconds_of(const Dataset& run, const FollowArguments& wanted
 
 ExitCode follow_run(const Arguments& arguments, const FollowArguments& wanted, Session& session) {
   const auto memory = MemoryFile::open(wanted.memory, Access::read_only);
-  const Dataset run = read_run(wanted.dataset, memory, session);
+  const Dataset run = read_run(wanted.dataset, wanted.topics, memory, session);
   if (odometry_poses(run).empty()) {
     arguments.refuse_unused({"--recovery-m", "--surprise-m"},
                             "as " + wanted.dataset + " has no odometry");
@@ -185,7 +186,8 @@ Run declare_route_follow(Arguments& arguments) {
   auto wanted = std::make_shared<FollowArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file with a route");
   arguments.positional("DATASET", wanted->dataset,
-                       "Data set or folder of pictures of a later drive, in its order");
+                       "Data set, folder of pictures or recording of a later drive, in its order");
+  declare_topics(arguments, wanted->topics);
   arguments.option("--name NAME", wanted->name,
                    "Name of the route; the only one where none is given");
   arguments.option("--every N", wanted->every, 1,

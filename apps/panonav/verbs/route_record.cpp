@@ -29,6 +29,7 @@ constexpr const char* position_values = "1.5,0.25,90";
 struct RecordArguments {
   std::string dataset;
   std::string memory;
+  PictureArguments pictures;
   std::string name = "route";
   std::optional<double> every_m;
   int every = 1;
@@ -90,7 +91,9 @@ std::vector<Pose2> recorded_poses(const RecordArguments& wanted, const Dataset& 
                           "'odom_x_m', 'odom_y_m' and 'odom_heading_deg'"
                         : "has neither positions nor odometry" +
                               how_to_add(wanted.dataset, position_columns, position_values) +
-                              "; or odom_x_m,odom_y_m,odom_heading_deg instead");
+                              (is_recording(wanted.dataset)
+                                   ? ""
+                                   : "; or odom_x_m,odom_y_m,odom_heading_deg instead"));
   }
   from_odometry = true;
   return poses;
@@ -153,10 +156,13 @@ ExitCode record(const Arguments& arguments, const RecordArguments& wanted, Sessi
   if (wanted.every_m && !(*wanted.every_m >= 0.0)) {
     throw UsageError("--every-m is " + to_text(*wanted.every_m) + "; allowed: 0 or more");
   }
-  const Dataset dataset = read_described(wanted.dataset, position_columns, position_values);
   RouteRecorderOptions options{.name = wanted.name, .every_m = wanted.every_m.value_or(0.1)};
   std::optional<MemoryFile> memory;
   if (fs::exists(wanted.memory)) memory = MemoryFile::open(wanted.memory, Access::read_write);
+  const Dataset dataset =
+      read_described(wanted.dataset, wanted.pictures,
+                     memory ? std::optional(memory->header().source) : std::nullopt,
+                     position_columns, position_values, session);
   choose_lines(arguments, wanted, dataset.source, memory, options);
   const auto poses = recorded_poses(wanted, dataset, options.odometry, session);
 #ifdef PANONAV_COMMAND_SIMULATES
@@ -202,8 +208,9 @@ ExitCode record(const Arguments& arguments, const RecordArguments& wanted, Sessi
 
 Run declare_route_record(Arguments& arguments) {
   auto wanted = std::make_shared<RecordArguments>();
-  arguments.positional("DATASET", wanted->dataset,
-                       "Data set with positions or odometry, in the order of the drive");
+  arguments.positional(
+      "DATASET", wanted->dataset,
+      "Data set or recording with positions or odometry, in the order of the drive");
   arguments.positional("MEMORY", wanted->memory,
                        "Memory file (NAME.panonav); made where there is none");
   arguments.option("--name NAME", wanted->name, "Name of the route; it grows if it is there");
@@ -220,6 +227,7 @@ Run declare_route_record(Arguments& arguments) {
                    "Write a picture of the route panorama into this folder: a new one, or that of "
                    "an earlier report");
 #endif
+  declare_pictures(arguments, wanted->pictures);
   arguments.options("line", wanted->line);
   return [wanted, &arguments](Session& session) { return record(arguments, *wanted, session); };
 }

@@ -44,6 +44,7 @@ constexpr double farthest_m = 1e9;
 struct TrackArguments {
   std::string memory;
   std::string dataset;
+  RecordingTopics topics;
   int every = 1;
   std::optional<double> start_x_m;
   std::optional<double> start_y_m;
@@ -220,7 +221,7 @@ void print_summary(const TrackSummary& summary, Session& session) {
 ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Session& session) {
   check(arguments, wanted);
   const auto file = MemoryFile::open(wanted.memory, Access::read_only);
-  Dataset run = read_run(wanted.dataset, file, session);
+  Dataset run = read_run(wanted.dataset, wanted.topics, file, session);
   const bool visual = odometry_poses(run).empty();
   if (!visual) check_odometry(run, wanted.dataset);
   std::vector<double> seconds;
@@ -278,8 +279,9 @@ Run declare_track(Arguments& arguments) {
   arguments.positional("MEMORY", wanted->memory, "Memory file");
   arguments.positional(
       "DATASET", wanted->dataset,
-      "Data set or folder of pictures, in the order of the run; without odometry motion is "
-      "read from the pictures");
+      "Data set, folder of pictures or recording, in the order of the run; without odometry motion "
+      "is read from the pictures");
+  declare_topics(arguments, wanted->topics);
   arguments.option("--every N", wanted->every, 1,
                    "Look at every N-th picture only and go by odometry between");
   arguments.option("--start-x-m", wanted->start_x_m,

@@ -57,7 +57,7 @@ Run declare_unwrap(Arguments& arguments) {
   auto wanted = std::make_shared<UnwrapArguments>();
   arguments.positional("IMAGE", wanted->image, "Raw mirror image, 360 degree picture or panorama");
   arguments.required_option("-o,--out", wanted->out, "PNG picture to write");
-  declare_pictures(arguments, wanted->pictures);
+  declare_layout(arguments, wanted->pictures);
   arguments.options("unwarper", wanted->unwarper);
   arguments.common({"--rows", "--columns"});
   return [wanted](Session& session) { return unwrap(*wanted, session); };

@@ -10,12 +10,12 @@
 #include <vector>
 
 #include "panonav/core/error.hpp"
-#include "panonav/core/temporary_file.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/io/camera_file.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/pipeline/internal/unfinished_folder.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/pipeline/view_list.hpp"
 
@@ -24,51 +24,6 @@ namespace panonav {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// A folder that gets its name when it is whole, and is gone if it never is.
-class UnfinishedFolder {
- public:
-  explicit UnfinishedFolder(const fs::path& wanted) : target_(behind_links(wanted)) {
-    std::error_code error;
-    fs::create_directories(target_.parent_path(), error);
-    if (error) throw FileError(wanted.string(), "cannot be made: " + error.message());
-    mark_.emplace(target_);
-    path_ = mark_->path().string() + ".d";
-    fs::remove_all(path_, error);  // of a process that was killed: the mark's name was free
-    if (!fs::create_directory(path_, error)) {
-      throw FileError(wanted.string(), "cannot be made: " + error.message());
-    }
-  }
-  ~UnfinishedFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  UnfinishedFolder(const UnfinishedFolder&) = delete;
-  UnfinishedFolder& operator=(const UnfinishedFolder&) = delete;
-
-  [[nodiscard]] const fs::path& path() const noexcept { return path_; }
-  void finish() {
-    std::error_code error;
-    fs::rename(path_, target_, error);
-    if (error) throw FileError(target_.string(), "cannot be made: " + error.message());
-  }
-
- private:
-  static fs::path behind_links(const fs::path& wanted) {
-    std::error_code error;
-    if (fs::exists(fs::symlink_status(wanted, error)) &&
-        (!fs::is_directory(wanted, error) || !fs::is_empty(wanted, error))) {
-      throw FileError(wanted.string(), "is there already and not empty; allowed: a new folder");
-    }
-    fs::path target = fs::weakly_canonical(fs::absolute(wanted), error);
-    if (error) throw FileError(wanted.string(), "cannot be made: " + error.message());
-    return target.has_filename() ? target : target.parent_path();
-  }
-
-  fs::path target_;
-  fs::path path_;
-  std::optional<TemporaryFile> mark_;  // tells living processes apart
-};
 
 /// A file within the folder that no other file or folder of the export is in the way of.
 bool names_a_file(const std::string& name) {
