@@ -31,7 +31,7 @@ Blob bytes_from(const std::vector<int>& values) {
   return bytes;
 }
 
-Blob golden(const std::string& name) {
+Blob golden_message(const std::string& name) {
   const std::string file =
       bytes_of(fs::path(__FILE__).parent_path().parent_path() / "fuzz/corpus/ros_messages" / name);
   const auto* begin = reinterpret_cast<const std::uint8_t*>(file.data());
@@ -61,7 +61,7 @@ void expect_golden(const Message& message) {
   for (const auto& [encoding, end] :
        {std::pair{MessageEncoding::ros1, "_ros1"}, std::pair{MessageEncoding::cdr, "_cdr"}}) {
     SCOPED_TRACE(name + end);
-    const Blob bytes = golden(name + end);
+    const Blob bytes = golden_message(name + end);
     ASSERT_GT(bytes.size(), 20U);
     EXPECT_EQ(ros::write_message(message, encoding), bytes);
     EXPECT_EQ(ros::write_message(ros::read_message<Message>(bytes, encoding), encoding), bytes);
@@ -115,14 +115,15 @@ TEST(RosMessages, AreTheBytesThatOthersWrite) {
 }
 
 TEST(RosMessages, BigEndianCdrIsRead) {
-  const auto big = ros::read_message<ros::Imu>(golden("Imu_big_endian"), MessageEncoding::cdr);
-  EXPECT_EQ(ros::write_message(big), golden("Imu_cdr"));
+  const auto big =
+      ros::read_message<ros::Imu>(golden_message("Imu_big_endian"), MessageEncoding::cdr);
+  EXPECT_EQ(ros::write_message(big), golden_message("Imu_cdr"));
 }
 
 TEST(RosMessages, StampsAreReadAlone) {
-  EXPECT_EQ(ros::read_stamp_ns(golden("Image_ros1"), MessageEncoding::ros1), stamp_ns);
-  EXPECT_EQ(ros::read_stamp_ns(golden("Image_cdr"), MessageEncoding::cdr), stamp_ns);
-  EXPECT_EQ(ros::read_stamp_ns(golden("Imu_big_endian"), MessageEncoding::cdr), stamp_ns);
+  EXPECT_EQ(ros::read_stamp_ns(golden_message("Image_ros1"), MessageEncoding::ros1), stamp_ns);
+  EXPECT_EQ(ros::read_stamp_ns(golden_message("Image_cdr"), MessageEncoding::cdr), stamp_ns);
+  EXPECT_EQ(ros::read_stamp_ns(golden_message("Imu_big_endian"), MessageEncoding::cdr), stamp_ns);
 }
 
 TEST(RosMessages, WrongBytesGiveOneLine) {
@@ -130,12 +131,12 @@ TEST(RosMessages, WrongBytesGiveOneLine) {
     return message_of<ContractError>(
         [&] { (void)ros::read_message<ros::Odometry>(bytes, encoding); });
   };
-  Blob bytes = golden("Odometry_cdr");
+  Blob bytes = golden_message("Odometry_cdr");
   bytes[1] = std::uint8_t{7};
   EXPECT_EQ(read(bytes),
             "nav_msgs/Odometry message: CDR representation is 7; allowed: 0 (big endian), 1 "
             "(little)");
-  bytes = golden("Odometry_cdr");
+  bytes = golden_message("Odometry_cdr");
   bytes[12] = std::uint8_t{0xFF};  // of the frame's length
   bytes[14] = std::uint8_t{0xFF};
   EXPECT_EQ(read(bytes),

@@ -1,6 +1,9 @@
 #include "panonav/pipeline/observation_source.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <ctime>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -38,6 +41,22 @@ std::optional<Observation> DatasetObservations::next() {
   Decoded& decoded = decoded_[next_++ - first_decoded_];
   if (decoded.failure) std::rethrow_exception(decoded.failure);
   return std::exchange(decoded.observation, std::nullopt);
+}
+
+std::optional<Observation> LiveObservations::next() {
+  auto seen = live_.next();
+  if (!seen) return std::nullopt;
+  Observation observation(std::move(seen->picture));
+  observation.stamp_s = seen->stamp_s;
+  const auto whole_s = static_cast<std::time_t>(std::floor(seen->stamp_s));
+  std::tm utc{};
+  gmtime_r(&whole_s, &utc);
+  std::array<char, 40> text{};
+  const std::size_t length = std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%S", &utc);
+  const auto micro = static_cast<int>(1e6 * (seen->stamp_s - std::floor(seen->stamp_s)));
+  const std::string digits = std::to_string(1'000'000 + micro);
+  observation.name = std::string(text.data(), length) + "." + digits.substr(1) + "Z";
+  return observation;
 }
 
 }  // namespace panonav

@@ -3,10 +3,13 @@
 #include <cstddef>
 #include <exception>
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "panonav/core/executor.hpp"
 #include "panonav/io/dataset.hpp"
+#include "panonav/io/live_pictures.hpp"
 #include "panonav/pipeline/observation.hpp"
 
 namespace panonav {
@@ -51,6 +54,23 @@ class DatasetObservations final : public ObservationSource {
   std::size_t next_ = 0;
   std::size_t first_decoded_ = 0;
   std::vector<Decoded> decoded_;
+};
+
+/// Those of a live source, the newest each time (`LivePictures`), named by their stamps
+/// ("2026-11-23T05:06:07.123456Z").
+class LiveObservations final : public ObservationSource {
+ public:
+  LiveObservations(const std::string& address, PictureSource pictures,
+                   const LiveOptions& options = {})
+      : pictures_(std::move(pictures)), live_(address, options) {}
+
+  [[nodiscard]] const PictureSource& pictures() const noexcept override { return pictures_; }
+  [[nodiscard]] std::optional<Observation> next() override;
+  [[nodiscard]] LivePictures& live() noexcept { return live_; }
+
+ private:
+  PictureSource pictures_;
+  LivePictures live_;
 };
 
 }  // namespace panonav

@@ -52,10 +52,12 @@ ChildProcess::ChildProcess(const std::vector<std::string>& arguments) {
 ChildProcess::~ChildProcess() {
   close(output_);
   close(errors_);
-  if (child_ > 0) {
-    kill(child_, SIGKILL);
-    wait();
-  }
+  stop();
+  wait();
+}
+
+void ChildProcess::stop() const noexcept {
+  if (child_ > 0) kill(child_, SIGKILL);
 }
 
 int ChildProcess::wait() {

@@ -19,6 +19,8 @@ class ChildProcess {
 
   [[nodiscard]] int output() const noexcept { return output_; }  ///< its standard output
   [[nodiscard]] int errors() const noexcept { return errors_; }  ///< its standard error
+  /// Ends it at once; another thread may call while one reads. Its pipes then end, too.
+  void stop() const noexcept;
   /// Waits for its end; -1 after a signal.
   int wait();
 

@@ -34,6 +34,8 @@ class DecodedVideo {
 
   /// Empty at the end. Throws FileError on pictures beyond the limits.
   [[nodiscard]] std::optional<DecodedFrame> next();
+  /// Ends the program; `next`, which another thread may be in, then gives nothing more.
+  void stop() const noexcept { child_->stop(); }
   /// What ffmpeg complained about last; empty when it did not.
   [[nodiscard]] const std::string& trouble() const noexcept { return trouble_; }
 
