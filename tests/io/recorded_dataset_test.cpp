@@ -202,6 +202,14 @@ TEST_P(RecordedTopics, TopicsAreChosenByTypeOrNamed) {
             "drive.bag: has no topic /none of nav_msgs/Odometry; it has: /filtered, /wheels");
 }
 
+TEST_P(RecordedTopics, HostileNamesStayOnOneLine) {
+  add_picture(0, "/left\n\x1b[2J");
+  add_picture(0, std::string(5000, 'x'));
+  const std::string line = error();
+  EXPECT_EQ(line.find_first_of("\n\x1b"), std::string::npos);
+  EXPECT_LE(line.size(), 600U);
+}
+
 TEST_P(RecordedTopics, WithoutStampsTheTimesOfRecordingServe) {
   for (int i = 0; i <= 10; ++i) add_odometry(i * 100 * ms);
   ros::CompressedImage message;
@@ -267,11 +275,12 @@ TEST_P(RecordedTopics, DamagedMessagesAreLeftOut) {
   const auto [dataset, warnings] = read();
   ASSERT_EQ(dataset.entries.size(), 4U);
   expect_odometry(dataset.entries[1], 150 * ms);
-  ASSERT_EQ(warnings.size(), 2U);
+  ASSERT_EQ(warnings.size(), 3U);
   EXPECT_TRUE(contains(warnings[0],
                        "2 messages cannot be read and are left out; the first: "
                        "nav_msgs/Odometry message: position is nan"));
   EXPECT_EQ(warnings[1], "stamps run back at 1 of 4 pictures");
+  EXPECT_EQ(warnings[2], "1 of 4 pictures are not of the size of the first, 8 x 4 px");
   // In the order of recording.
   EXPECT_EQ(dataset.entries[0].file, "1700000000_140000000");
   EXPECT_EQ(dataset.entries[1].file, "1700000000_150000000");

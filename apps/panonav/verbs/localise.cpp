@@ -175,9 +175,9 @@ Dataset open_queries(const LocaliseArguments& wanted, const MemoryFile& file, Se
   std::error_code ignored;
   std::optional<Dataset> queries;
   for (const std::string& input : wanted.inputs) {
-    if (std::filesystem::is_directory(input, ignored)) {
+    if (std::filesystem::is_directory(input, ignored) || is_recording(input)) {
       throw UsageError(input +
-                       " is a folder; allowed: one data set or folder, or several pictures");
+                       " is a folder or recording; allowed: one of these, or several pictures");
     }
     if (!queries && std::filesystem::exists(input, ignored)) queries = open(input);
   }

@@ -396,6 +396,10 @@ class Collector {
     }
     const std::string of_all = " of " + std::to_string(pictures_.size()) + " pictures";
     if (back > 0) warn("stamps run back at " + std::to_string(back) + of_all);
+    if (other_sizes_ > 0) {
+      warn(std::to_string(other_sizes_) + of_all + " are not of the size of the first, " +
+           std::to_string(first_size_.first) + " x " + std::to_string(first_size_.second) + " px");
+    }
     if (without_odometry > 0 && (chain_ || odometry_.size() > 0)) {
       warn(std::to_string(without_odometry) + of_all +
            " have no odometry: it begins later, ends before or pauses for more than a second");
@@ -501,13 +505,24 @@ class Collector {
     return ros::read_message<Message>(bytes, recording_.topics()[place.topic].encoding);
   }
 
+  std::int64_t picture_stamp_ns(const MessagePlace& place, MessageBytes bytes) {
+    if (recording_.topics()[place.topic].type == ros::CompressedImage::type) {
+      return read<ros::CompressedImage>(place, bytes).header.stamp_ns;
+    }
+    const auto message = read<ros::Image>(place, bytes);
+    const auto size = std::pair{message.width, message.height};
+    if (pictures_.empty()) first_size_ = size;
+    if (first_size_ != size) ++other_sizes_;
+    return message.header.stamp_ns;
+  }
+
   void take(const MessagePlace& place, MessageBytes bytes) {
     const RecordedTopic& topic = recording_.topics()[place.topic];
     switch (jobs_[place.topic]) {
       case Job::none:
         break;
       case Job::picture:
-        pictures_.push_back({place, ros::read_stamp_ns(bytes, topic.encoding)});
+        pictures_.push_back({place, picture_stamp_ns(place, bytes)});
         break;
       case Job::odometry: {
         const auto message = read<ros::Odometry>(place, bytes);
@@ -559,6 +574,8 @@ class Collector {
   bool frames_named_ = false;
   std::string frames_text_;
   bool truth_has_headings_ = true;
+  std::pair<std::uint32_t, std::uint32_t> first_size_;
+  std::size_t other_sizes_ = 0;
   std::size_t samples_ = 0;
   std::size_t unreadable_ = 0;
   std::string first_error_;

@@ -467,14 +467,6 @@ Message read_message(std::span<const std::uint8_t> bytes, MessageEncoding encodi
   return message;
 }
 
-std::int64_t read_stamp_ns(std::span<const std::uint8_t> bytes, MessageEncoding encoding) {
-  Reader reader(bytes, encoding, "std_msgs/Header");
-  std::int64_t stamp_ns = 0;
-  reader.sequence_number();
-  reader.stamp(stamp_ns);
-  return stamp_ns;
-}
-
 template <class Message>
 std::vector<std::uint8_t> write_message(const Message& message, MessageEncoding encoding) {
   Writer writer(encoding);

@@ -206,10 +206,6 @@ struct DiagnosticArray {
 template <class Message>
 [[nodiscard]] Message read_message(std::span<const std::uint8_t> bytes, MessageEncoding encoding);
 
-/// The stamp of a message that begins with a header, such as a picture, without reading the rest.
-[[nodiscard]] std::int64_t read_stamp_ns(std::span<const std::uint8_t> bytes,
-                                         MessageEncoding encoding);
-
 /// Little endian. Throws ContractError on a stamp that the encoding cannot hold (ROS 2: beyond
 /// 2038).
 template <class Message>
