@@ -1,20 +1,13 @@
-// Places far apart: how many views of a recording are found when each is left out and turned, by
-// columns, by local features, and by ORB of OpenCV with mutual matches. One thread, from the
-// panorama, which is made beforehand, to the best match.
+// Places far apart: `reproduce elsewhere` on any recordings, with two rivals more, which need
+// OpenCV: ORB with mutual matches, and ORB with a VLAD of 32 words. One thread.
 //   sparse_places_bench FOLDER...
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
-#include <functional>
-#include <limits>
-#include <vector>
+#include <filesystem>
 
-#include <ctime>
-
-#include "panonav/core/random.hpp"
-#include "panonav/localisation/localiser.hpp"
-#include "panonav/pipeline/memoriser.hpp"
-#include "panonav/pipeline/observation_source.hpp"
+#include "experiments/elsewhere/experiments.hpp"
 
 #ifdef PANONAV_BENCH_ORB
 #include <opencv2/core.hpp>
@@ -24,131 +17,143 @@
 namespace panonav {
 namespace {
 
-constexpr std::uint64_t seeds = 3;
+#ifdef PANONAV_BENCH_ORB
 
-double processor_ms() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
+/// 500 features (the default of OpenCV) of the rows that the memory keeps, as fine as recorded.
+cv::Mat described(const RivalView& view) {
+  const Image& picture = view.picture;
+  const cv::Mat grey(picture.height(), picture.width(), CV_8UC1,
+                     const_cast<std::uint8_t*>(picture.pixels().data()));
+  std::vector<cv::KeyPoint> points;
+  cv::Mat descriptors;
+  cv::ORB::create(500)->detectAndCompute(grey, cv::noArray(), points, descriptors);
+  return descriptors;
 }
 
-struct Recording {
-  explicit Recording(const char* folder) : data(read_dataset(folder)) {
-    std::vector<Observation> seen;
-    for (const DatasetEntry& entry : data.entries) seen.push_back(read_observation(entry));
-    Executor alone;
-    const auto first = std::span(seen).first(std::min(seen.size(), Memoriser::scale_views));
-    header = header_from_first(first, data.source, {}, {}, alone);
-    const ViewEncoder encoder(header, data.source);
-    for (const Observation& one : seen) views.push_back(encoder.panorama(one));
+/// The reference of the highest score, the first of equals.
+template <class Score>
+std::size_t best_of(std::size_t count, std::optional<std::size_t> left_out, const Score& score) {
+  std::optional<std::size_t> best;
+  double highest = 0.0;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i == left_out) continue;
+    const double value = score(i);
+    if (best && value <= highest) continue;
+    highest = value;
+    best = i;
   }
-  [[nodiscard]] double apart(std::size_t a, std::size_t b) const {
-    const auto& from = data.entries[a].pose;
-    const auto& to = data.entries[b].pose;
-    return from && to ? distance(from->position(), to->position())
-                      : std::abs(static_cast<double>(a) - static_cast<double>(b));
+  return best.value();
+}
+
+class MutualOrb final : public RivalRecogniser {
+ public:
+  [[nodiscard]] std::string name() const override { return "ORB, mutual matches"; }
+  void memorise(const std::vector<RivalView>& references) override {
+    for (const RivalView& view : references) references_.push_back(described(view));
   }
-  Dataset data;
-  MemoryHeader header;
-  std::vector<Panorama> views;
+  [[nodiscard]] std::size_t nearest(const RivalView& query,
+                                    std::optional<std::size_t> left_out) const override {
+    const cv::BFMatcher matcher(cv::NORM_HAMMING, true);
+    const cv::Mat asked = described(query);
+    return best_of(references_.size(), left_out, [&](std::size_t i) {
+      if (references_[i].empty() || asked.empty()) return 0.0;
+      std::vector<cv::DMatch> matches;
+      matcher.match(asked, references_[i], matches);
+      return static_cast<double>(std::ranges::count_if(
+          matches, [](const cv::DMatch& match) { return match.distance <= 64.0F; }));
+    });
+  }
+  [[nodiscard]] double bytes_per_view() const override {
+    double bytes = 0.0;
+    for (const cv::Mat& one : references_) bytes += 32.0 * one.rows;
+    return bytes / static_cast<double>(references_.size());
+  }
+
+ private:
+  std::vector<cv::Mat> references_;
 };
 
-/// `best` gives the most similar view of all but one.
-void measure(const char* name, const Recording& run, double bytes_a_view,
-             const std::function<std::size_t(const Panorama&, std::size_t left_out)>& best) {
-  std::printf("%-28s found", name);
-  double spent_ms = 0.0;
-  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
-    int found = 0;
-    for (std::size_t i = 0; i < run.views.size(); ++i) {
-      double nearest = std::numeric_limits<double>::infinity();
-      for (std::size_t j = 0; j < run.views.size(); ++j) {
-        if (j != i) nearest = std::min(nearest, run.apart(i, j));
-      }
-      Random random(seed, i);
-      const Panorama query = turn_columns(
-          run.views[i],
-          static_cast<int>(random.index(static_cast<std::uint64_t>(run.header.panorama_columns))));
-      const double start_ms = processor_ms();
-      const std::size_t match = best(query, i);
-      spent_ms += processor_ms() - start_ms;
-      found += run.apart(i, match) <= 1.5 * nearest ? 1 : 0;
+/// Residuals of the descriptors' bits against the words of a vocabulary, which is learnt from the
+/// references of the memory, summed for each word; signed roots, unit length [Jegou et al. 2010].
+class OrbVlad final : public RivalRecogniser {
+ public:
+  [[nodiscard]] std::string name() const override { return "ORB, VLAD of 32 words"; }
+  void memorise(const std::vector<RivalView>& references) override {
+    std::vector<cv::Mat> bits;
+    cv::Mat all;
+    for (const RivalView& view : references) {
+      bits.push_back(bits_of(described(view)));
+      all.push_back(bits.back());
     }
-    std::printf(" %3d", found);
+    cv::setRNGSeed(1);
+    cv::Mat labels;
+    cv::kmeans(all, words, labels, {cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 50, 1e-3}, 3,
+               cv::KMEANS_PP_CENTERS, words_);
+    for (const cv::Mat& one : bits) references_.push_back(vlad(one));
   }
-  std::printf(" of %zu; %6.2f ms a query, %6.0f bytes a view\n", run.views.size(),
-              spent_ms / static_cast<double>(seeds * run.views.size()), bytes_a_view);
-}
-
-void compare(const char* folder) {
-  const Recording run(folder);
-  std::printf("%s\n", folder);
-  const ViewEncoder encoder(run.header, run.data.source);
-  VisualMemory memory(run.header.shape, run.header.full_scale, run.header.elevations);
-  std::vector<LocalFeatures> kept;
-  double feature_bytes = 0.0;
-  for (std::size_t i = 0; i < run.views.size(); ++i) {
-    memory.append(encoder.packed(run.views[i]), {std::to_string(i), run.data.entries[i].pose, {}});
-    kept.push_back(encoder.features(run.views[i]).value());
-    feature_bytes += static_cast<double>(pack(kept.back()).size());
+  [[nodiscard]] std::size_t nearest(const RivalView& query,
+                                    std::optional<std::size_t> left_out) const override {
+    const cv::Mat asked = vlad(bits_of(described(query)));
+    return best_of(references_.size(), left_out,
+                   [&](std::size_t i) { return asked.dot(references_[i]); });
   }
-  feature_bytes /= static_cast<double>(kept.size());
-  const auto place = [&](ViewId view) {
-    return static_cast<std::size_t>(std::ranges::lower_bound(memory.views(), view) -
-                                    memory.views().begin());
-  };
-  Localiser localiser(memory);
-  const auto ours = [&](const Panorama& query, std::size_t left_out) {
-    const ViewId excluded = memory.views()[left_out];
-    std::optional<LocalFeatures> features;
-    if (localiser.ranks_by_features()) features = encoder.features(query);
-    const auto found = localiser.localise(encoder.packed(query), {{&excluded, 1}, {}},
-                                          features ? &*features : nullptr);
-    return place(found.matches.at(0).view);
-  };
-  const auto signature_bytes = static_cast<double>(2 * run.header.shape.size());
-  measure("columns", run, signature_bytes, ours);
-  localiser.rank_by_features([&](ViewId view) { return std::optional(kept[place(view)]); });
-  measure("local features", run, signature_bytes + feature_bytes, ours);
+  [[nodiscard]] double bytes_per_view() const override { return 4.0 * words * 256; }
 
+ private:
+  static constexpr int words = 32;
+
+  static cv::Mat bits_of(const cv::Mat& descriptors) {
+    cv::Mat bits(descriptors.rows, 256, CV_32F);
+    for (int i = 0; i < descriptors.rows; ++i) {
+      for (int j = 0; j < 256; ++j) {
+        bits.at<float>(i, j) =
+            static_cast<float>((descriptors.at<std::uint8_t>(i, j / 8) >> (j % 8)) & 1);
+      }
+    }
+    return bits;
+  }
+
+  [[nodiscard]] cv::Mat vlad(const cv::Mat& bits) const {
+    cv::Mat sums = cv::Mat::zeros(words, 256, CV_32F);
+    for (int i = 0; i < bits.rows; ++i) {
+      int nearest = 0;
+      for (int w = 1; w < words; ++w) {
+        if (cv::norm(bits.row(i), words_.row(w), cv::NORM_L2SQR) <
+            cv::norm(bits.row(i), words_.row(nearest), cv::NORM_L2SQR)) {
+          nearest = w;
+        }
+      }
+      sums.row(nearest) += bits.row(i) - words_.row(nearest);
+    }
+    for (float& value : cv::Mat_<float>(sums)) {
+      value = std::copysign(std::sqrt(std::abs(value)), value);
+    }
+    cv::normalize(sums, sums);
+    return sums;
+  }
+
+  cv::Mat words_;
+  std::vector<cv::Mat> references_;
+};
+
+#endif
+
+void compare(const std::filesystem::path& folder) {
+  ElsewhereReproductionOptions options;
+  options.out = std::filesystem::temp_directory_path();
+  std::vector<std::unique_ptr<RivalRecogniser>> rivals;
 #ifdef PANONAV_BENCH_ORB
   cv::setNumThreads(1);
-  const auto orb = cv::ORB::create(500);
-  const auto described = [&](const Panorama& view) {
-    const Image picture = to_picture(view);
-    const cv::Mat grey(picture.height(), picture.width(), CV_8UC1,
-                       const_cast<std::uint8_t*>(picture.pixels().data()));
-    std::vector<cv::KeyPoint> points;
-    cv::Mat descriptors;
-    orb->detectAndCompute(grey, cv::noArray(), points, descriptors);
-    return descriptors;
-  };
-  std::vector<cv::Mat> references;
-  double orb_bytes = 0.0;
-  for (const Panorama& view : run.views) {
-    references.push_back(described(view));
-    orb_bytes += 32.0 * references.back().rows;
-  }
-  const cv::BFMatcher matcher(cv::NORM_HAMMING, true);
-  measure("ORB, mutual matches", run, orb_bytes / static_cast<double>(references.size()),
-          [&](const Panorama& query, std::size_t left_out) {
-            const cv::Mat asked = described(query);
-            std::size_t best = left_out == 0 ? 1 : 0;
-            std::size_t most = 0;
-            for (std::size_t j = 0; j < references.size(); ++j) {
-              if (j == left_out || references[j].empty() || asked.empty()) continue;
-              std::vector<cv::DMatch> matches;
-              matcher.match(asked, references[j], matches);
-              const auto near = static_cast<std::size_t>(std::ranges::count_if(
-                  matches, [](const cv::DMatch& match) { return match.distance <= 64.0F; }));
-              if (near > most) {
-                most = near;
-                best = j;
-              }
-            }
-            return best;
-          });
+  rivals.push_back(std::make_unique<MutualOrb>());
+  rivals.push_back(std::make_unique<OrbVlad>());
 #endif
+  Executor alone(1);
+  Reproduction result;
+  reproduce_leave_one_out(options, folder, std::move(rivals), alone, result);
+  for (const ResultRow& row : result.rows) {
+    std::printf("%s: %s%s%s\n", row.what.c_str(), shown_figure(row).c_str(),
+                row.over.empty() ? "" : ", ", row.over.c_str());
+  }
 }
 
 }  // namespace

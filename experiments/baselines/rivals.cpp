@@ -121,11 +121,11 @@ class ColourHistogramRecogniser final : public RivalRecogniser {
   void memorise(const std::vector<RivalView>& references) override {
     require_references(references);
     histograms_.clear();
-    for (const auto& view : references) histograms_.push_back(histogram(view.colour));
+    for (const auto& view : references) histograms_.push_back(histogram(view.picture));
   }
   [[nodiscard]] std::size_t nearest(const RivalView& query,
                                     std::optional<std::size_t> left_out) const override {
-    const auto wanted = histogram(query.colour);
+    const auto wanted = histogram(query.picture);
     return argmin(histograms_.size(), left_out,
                   [&](std::size_t i) { return l1(wanted, histograms_[i]); });
   }

@@ -13,7 +13,9 @@ namespace panonav {
 /// One view as the rivals may use it.
 struct RivalView {
   Panorama panorama;
-  Image colour{1, 1, 1};  ///< the same view in RGB; one grey pixel where there is none
+  /// The same view as a picture, for rivals that use its colours or finer pixels; one grey pixel
+  /// where nobody asks for it.
+  Image picture{1, 1, 1};
 };
 
 /// A way of recognising places that [M04] argues against, as a small and honest baseline on the

@@ -1,8 +1,11 @@
 #pragma once
 
+#include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
+#include "experiments/baselines/rivals.hpp"
 #include "experiments/reproduction.hpp"
 #include "experiments/rows.hpp"
 #include "experiments/runs/place_recording.hpp"
@@ -41,9 +44,11 @@ void reproduce_tilted_homing(const ElsewhereReproductionOptions& options, Execut
 /// over that.
 void reproduce_floor(const ElsewhereReproductionOptions& options, const std::string& world,
                      double spacing_m, Executor& executor, Reproduction& result);
-/// A recording of `options.data`: each picture, turned, is asked of the memory of all others, of
-/// panonav and of its rivals.
-void reproduce_leave_one_out(const ElsewhereReproductionOptions& options, const std::string& name,
+/// A recording, a data set's folder: each picture, turned, is asked of the memory of all others, of
+/// panonav, of rivals that need no library, and of those that the caller has beside them.
+void reproduce_leave_one_out(const ElsewhereReproductionOptions& options,
+                             const std::filesystem::path& recording,
+                             std::vector<std::unique_ptr<RivalRecogniser>> rivals,
                              Executor& executor, Reproduction& result);
 
 }  // namespace panonav

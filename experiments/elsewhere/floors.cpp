@@ -1,6 +1,7 @@
 // Whole floors, arranged by the similarity of their views alone.
 
 #include <cmath>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,7 @@
 #include "experiments/runs/surroundings.hpp"
 #include "experiments/runs/worlds.hpp"
 #include "panonav/core/random.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/mapping/map_measures.hpp"
 #include "reporting/plot.hpp"
@@ -35,18 +37,28 @@ void reproduce_floor(const ElsewhereReproductionOptions& options, const std::str
   add_rate(result, id + ".placed", what + ": views in the largest connected component",
            estimate.size(), truth.size());
   const auto difference = shape_difference(estimate, placed_truth);
+  const double trustworthiness = neighbour_preservation(estimate, placed_truth, 8).trustworthiness;
   add_row(result, id + ".shape", what + ": shape difference of the largest component",
-          difference.value, "", at_most(0.05));
+          difference.value, "", at_most(0.05))
+      .reason = "the trustworthiness of its neighbourhoods is " + fixed(trustworthiness, 3);
   add_row(result, id + ".trustworthiness", what + ": trustworthiness of its neighbourhoods",
-          neighbour_preservation(estimate, placed_truth, 8).trustworthiness, "");
+          trustworthiness, "");
   const auto missions =
       random_missions(place, remembered, {.count = options.runs}, Random(options.seed, 2).next());
   const auto runs =
       run_missions(place, remembered, missions, {}, Random(options.seed, 3).next(), executor);
   std::size_t arrived = 0;
-  for (const MissionRun& run : runs) arrived += run.arrives(0.5 * spacing_m) ? 1 : 0;
+  std::size_t wrongly = 0;
+  std::map<NavigationState, std::size_t> ends;
+  for (const MissionRun& run : runs) {
+    const bool arrives = run.arrives(0.5 * spacing_m);
+    arrived += arrives ? 1 : 0;
+    wrongly += !arrives && run.end == NavigationState::arrived ? 1 : 0;
+    ++ends[run.end];
+  }
   add_rate(result, id + ".missions", what + ": missions that arrive within half the spacing",
            arrived, runs.size(), at_least(0.95));
+  result.rows.back().reason = other_ends(ends, wrongly);
   const Alignment onto =
       align(estimate, placed_truth, {.allow_scale = true, .allow_reflection = false});
   MapLayer arranged{.label = "arranged, after the best rotation and scale",

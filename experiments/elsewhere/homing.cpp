@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <map>
 #include <numbers>
 #include <optional>
 #include <string>
@@ -37,11 +38,15 @@ HomeAnswered ask_home(const Panorama& goal, const Panorama& current) {
   return {way.direction_rad.has_value(), way.direction_rad.value_or(0.0)};
 }
 
+/// How far `direction_rad`, in the frame of a robot at `from`, is from the direction of `to`.
+double off_rad(double direction_rad, const Pose2& from, const Pose2& to) {
+  const double truth = std::atan2(to.y_m - from.y_m, to.x_m - from.x_m);
+  return std::abs(angle_difference(direction_rad + from.heading_rad, truth));
+}
+
 HomeAnswered ask_home(const PlacedView& goal, const PlacedView& current) {
   HomeAnswered answer = ask_home(goal.panorama, current.panorama);
-  const double truth =
-      std::atan2(goal.pose.y_m - current.pose.y_m, goal.pose.x_m - current.pose.x_m);
-  answer.off_rad = std::abs(angle_difference(answer.off_rad + current.pose.heading_rad, truth));
+  answer.off_rad = off_rad(answer.off_rad, current.pose, goal.pose);
   return answer;
 }
 
@@ -70,6 +75,28 @@ std::vector<const PlacedView*> views_of(const PlaceRecording& place) {
   return views;
 }
 
+/// What was measured of the runs that do not come home, beside how many level robots do.
+std::string ends_elsewhere(const std::vector<HomingRun>& runs, std::size_t level_home) {
+  std::size_t others = 0;
+  std::size_t away = 0;
+  std::size_t alike = 0;
+  std::size_t wrongly = 0;
+  for (const HomingRun& run : runs) {
+    if (run.succeeds(arrived_m)) continue;
+    ++others;
+    const double first_rad = run.vectors.front().direction_rad();
+    away += off_rad(first_rad, run.path.front(), run.goal) > radians(90.0) ? 1 : 0;
+    alike += run.end_difference < run.start_difference ? 1 : 0;
+    wrongly += run.end == HomingRunEnd::arrived ? 1 : 0;
+  }
+  return "a level robot comes home in " + std::to_string(level_home) + " of these " +
+         std::to_string(runs.size()) + " runs; of the " + std::to_string(others) +
+         " that do not come home, " + std::to_string(away) +
+         " begin with a vector that points away from home, " + std::to_string(alike) +
+         " end where the view is more like that of home than at the start, and " +
+         std::to_string(wrongly) + " say that they arrived";
+}
+
 void add_answers(Reproduction& result, const std::string& id, const std::string& what,
                  std::span<const HomeAnswered> answers, std::optional<Target> target) {
   add_rate(result, id, what,
@@ -96,6 +123,7 @@ void reproduce_home_vectors(const ElsewhereReproductionOptions& options,
       Range{"0_1m", 0.1, 1.0}, {"1_3m", 1.0, 3.0}, {"3_6m", 3.0, 6.0}};
   for (const Range& range : ranges) {
     std::vector<std::pair<const PlacedView*, const PlacedView*>> asked;
+    std::vector<const RecordedGround*> ground_of;
     for (const RecordedGround& ground : grounds) {
       const auto& place = ground.variants.front();
       const auto views = views_of(place);
@@ -110,6 +138,7 @@ void reproduce_home_vectors(const ElsewhereReproductionOptions& options,
           continue;
         }
         asked.emplace_back(goal, current);
+        ground_of.push_back(&ground);
         ++found;
       }
     }
@@ -118,8 +147,13 @@ void reproduce_home_vectors(const ElsewhereReproductionOptions& options,
     });
     const auto answered =
         static_cast<std::size_t>(std::ranges::count_if(answers, &HomeAnswered::answered));
-    const auto off = static_cast<std::size_t>(std::ranges::count_if(
-        answers, [](const auto& one) { return one.answered && one.off_rad > radians(45.0); }));
+    std::size_t off = 0;
+    std::map<std::string, std::size_t> off_in;
+    for (std::size_t i = 0; i < answers.size(); ++i) {
+      if (!answers[i].answered || answers[i].off_rad <= radians(45.0)) continue;
+      ++off;
+      ++off_in[ground_of[i]->name];
+    }
     const std::string id = "elsewhere.home." + range.id;
     const std::string what = "views " + centimetres(range.low_m) + " to " +
                              centimetres(range.high_m) + " apart, the straight way free: ";
@@ -128,6 +162,10 @@ void reproduce_home_vectors(const ElsewhereReproductionOptions& options,
     if (answered > 0) {
       add_rate(result, id + ".off", what + "of these, off by more than 45 degrees", off, answered,
                at_most(0.05));
+      result.rows.back().reason = "of these " + std::to_string(off) + ":";
+      for (const auto& [name, count] : off_in) {
+        result.rows.back().reason += " " + name + " " + std::to_string(count);
+      }
     }
   }
 
@@ -181,6 +219,7 @@ void reproduce_tilted_homing(const ElsewhereReproductionOptions& options, Execut
       bool measured;
       std::optional<Target> target;
     };
+    std::size_t level_home = 0;
     for (const auto& [tilt_deg, measured, target] : {Condition{0, false, std::nullopt},
                                                      {3, true, at_least(0.95)},
                                                      {6, true, at_least(0.9)},
@@ -189,8 +228,9 @@ void reproduce_tilted_homing(const ElsewhereReproductionOptions& options, Execut
       place.camera.frame.tilt_rad = radians(tilt_deg);
       place.camera.levelled = measured;
       const auto runs = run_home(place, tasks, {}, options.seed, executor);
-      const auto home =
-          std::ranges::count_if(runs, [](const HomingRun& run) { return run.succeeds(arrived_m); });
+      const auto home = static_cast<std::size_t>(std::ranges::count_if(
+          runs, [](const HomingRun& run) { return run.succeeds(arrived_m); }));
+      if (tilt_deg == 0) level_home = home;
       std::string how = "level robot";
       if (tilt_deg > 0) {
         how = "tilt of " + std::to_string(tilt_deg) +
@@ -202,7 +242,8 @@ void reproduce_tilted_homing(const ElsewhereReproductionOptions& options, Execut
           "elsewhere.tilt." + name + "." + std::to_string(tilt_deg) + (measured ? "_measured" : ""),
           name + ", starts within " + centimetres(homing_radius_m) + ", " + how + ": home within " +
               centimetres(arrived_m),
-          static_cast<std::size_t>(home), runs.size(), target);
+          home, runs.size(), target);
+      result.rows.back().reason = ends_elsewhere(runs, level_home);
     }
   }
 }

@@ -1,14 +1,11 @@
 // Each picture of a recording, turned, asked of the memory of all others.
 
 #include <algorithm>
-#include <functional>
+#include <cmath>
 #include <limits>
-#include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
-#include "experiments/baselines/rivals.hpp"
 #include "experiments/elsewhere/experiments.hpp"
 #include "experiments/runs/make_each.hpp"
 #include "panonav/core/random.hpp"
@@ -29,6 +26,7 @@ struct Recorded {
   std::string file;
   std::optional<Point2> position;
   Panorama panorama;
+  Panorama sharp;  ///< the same rows as fine as they were recorded; of a mirror the panorama
 };
 
 /// Whether `found` is near enough to `asked`: in metres, or in a recording without positions one of
@@ -43,68 +41,78 @@ bool is_near(const std::vector<Recorded>& views, std::size_t asked, std::size_t 
   return distance(*views[found].position, *views[asked].position) <= near_factor * nearest_m;
 }
 
-/// The memory file of all pictures, as the command makes it by default.
-void memorise(const std::filesystem::path& file, const Dataset& dataset, Executor& executor) {
-  Memoriser memoriser(file, {.source = dataset.source, .thumbnails = false});
+/// The memory of all pictures, as the command makes it by default but for what is said.
+PlaceRecogniser memorise(const std::filesystem::path& file, const Dataset& dataset, bool features,
+                         Executor& executor) {
+  std::filesystem::remove(file);
+  Memoriser memoriser(file, {.source = dataset.source, .thumbnails = false, .features = features});
   std::vector<Observation> observations;
   for (const DatasetEntry& entry : dataset.entries) {
     observations.push_back(read_observation(entry));
   }
   memoriser.add(std::move(observations), executor);
   memoriser.finish(executor);
+  return PlaceRecogniser(file);
 }
+
+/// The rows of the picture that the memory keeps, as fine as they were recorded.
+Panorama sharp_view(const DatasetEntry& entry, const PictureSource& source,
+                    const Panorama& panorama) {
+  const Observation seen = read_observation(entry);
+  const auto* const picture = std::get_if<Image>(&seen.picture);
+  if (!picture || source.kind == PictureKind::mirror) return panorama;
+  return panorama_from_picture(picture->view(), source.layout);
+}
+
+/// What one way of asking finds.
+struct Found {
+  std::size_t view = 0;
+  double milliseconds = 0.0;
+};
+
+/// All answers of one way of asking.
+struct Asked {
+  std::size_t near_count = 0;
+  std::vector<double> milliseconds;
+
+  Asked(const std::vector<Recorded>& views, std::span<const Found> found) {
+    for (std::size_t n = 0; n < found.size(); ++n) {
+      near_count += is_near(views, n / turns, found[n].view) ? 1 : 0;
+      milliseconds.push_back(found[n].milliseconds);
+    }
+  }
+};
 
 }  // namespace
 
-void reproduce_leave_one_out(const ElsewhereReproductionOptions& options, const std::string& name,
+void reproduce_leave_one_out(const ElsewhereReproductionOptions& options,
+                             const std::filesystem::path& recording,
+                             std::vector<std::unique_ptr<RivalRecogniser>> rivals,
                              Executor& executor, Reproduction& result) {
-  const Dataset dataset = read_dataset(options.data / name);
+  const Dataset dataset = read_dataset(recording);
+  const std::string name = recording.filename().string();
   const std::filesystem::path file = options.out / (name + ".panonav");
+  const PlaceRecogniser by_columns = memorise(file, dataset, false, executor);
+  const PlaceRecogniser recogniser = memorise(file, dataset, true, executor);
+  const double file_bytes = static_cast<double>(std::filesystem::file_size(file));
   std::filesystem::remove(file);
-  memorise(file, dataset, executor);
-  const PlaceRecogniser recogniser(file);
   std::vector<Recorded> views;
   for (const DatasetEntry& entry : dataset.entries) {
+    Panorama panorama = recogniser.encoder().panorama(read_observation(entry));
+    Panorama sharp = sharp_view(entry, dataset.source, panorama);
     views.push_back({entry.file, entry.pose ? std::optional(entry.pose->position()) : std::nullopt,
-                     recogniser.encoder().panorama(read_observation(entry))});
+                     std::move(panorama), std::move(sharp)});
   }
-  const auto number_of = [&](const std::string& wanted) {
-    return static_cast<std::size_t>(std::ranges::find(views, wanted, &Recorded::file) -
-                                    views.begin());
+  const auto columns = static_cast<std::uint64_t>(views.front().panorama.columns());
+  const auto turn_of = [&](std::size_t n) {
+    Random random(options.seed + n % turns, n / turns);
+    return static_cast<int>(random.index(columns));
   };
-  const auto turned = [&](std::size_t i, std::size_t turn) {
-    Random random(options.seed + turn, i);
-    const auto columns = static_cast<std::uint64_t>(views[i].panorama.columns());
-    return turn_columns(views[i].panorama, static_cast<int>(random.index(columns)));
+  const auto turned = [&](std::size_t n) {
+    return turn_columns(views[n / turns].panorama, turn_of(n));
   };
 
   const std::size_t asked = views.size() * turns;
-  struct Answer {
-    Place place;
-    double milliseconds;
-  };
-  const auto answers = make_each(executor, asked, [&](std::size_t n) {
-    const Observation seen(turned(n / turns, n % turns));
-    const double start = thread_seconds();
-    Place place = recogniser.localise(seen, {&views[n / turns].file, 1});
-    return Answer{std::move(place), 1000.0 * (thread_seconds() - start)};
-  });
-  std::size_t near_count = 0;
-  std::size_t known = 0;
-  std::size_t placed = 0;
-  std::size_t inside = 0;
-  std::vector<double> milliseconds;
-  for (std::size_t n = 0; n < asked; ++n) {
-    const Place& place = answers[n].place;
-    const Recorded& truth = views[n / turns];
-    milliseconds.push_back(answers[n].milliseconds);
-    near_count += is_near(views, n / turns, number_of(place.matches.at(0).name)) ? 1 : 0;
-    known += place.known ? 1 : 0;
-    if (!place.position || !place.position->radius_m || !truth.position) continue;
-    ++placed;
-    const double off_m = distance({place.position->x_m, place.position->y_m}, *truth.position);
-    inside += off_m <= *place.position->radius_m ? 1 : 0;
-  }
   const std::string id = "elsewhere." + name;
   const std::string what = name + ", each of " + std::to_string(views.size()) +
                            " pictures, turned at random " + std::to_string(turns) +
@@ -112,54 +120,78 @@ void reproduce_leave_one_out(const ElsewhereReproductionOptions& options, const 
   const std::string near = views.front().position
                                ? "best match within 1.5 times the distance of the nearest"
                                : "best match is the picture before or after";
-  add_rate(result, id + ".near", what + near, near_count, asked,
+
+  std::vector<Place> places(asked);
+  const auto ask = [&](const PlaceRecogniser& ours) {
+    return Asked(views, make_each(executor, asked, [&](std::size_t n) {
+                   const Observation seen(turned(n));
+                   const double start = thread_seconds();
+                   places[n] = ours.localise(seen, {&views[n / turns].file, 1});
+                   const double spent = 1000.0 * (thread_seconds() - start);
+                   const auto match =
+                       std::ranges::find(views, places[n].matches.at(0).name, &Recorded::file);
+                   return Found{static_cast<std::size_t>(match - views.begin()), spent};
+                 }));
+  };
+  const Asked without_features = ask(by_columns);
+  const Asked ours = ask(recogniser);
+  add_rate(result, id + ".near", what + near, ours.near_count, asked,
            name == "ciirc_b670" ? std::optional(at_least(29.0 / 31.0)) : std::nullopt);
+  const std::size_t judged = result.rows.size() - 1;
+  std::size_t known = 0;
+  std::size_t placed = 0;
+  std::size_t inside = 0;
+  for (std::size_t n = 0; n < asked; ++n) {
+    const Place& place = places[n];
+    const Recorded& truth = views[n / turns];
+    known += place.known ? 1 : 0;
+    if (!place.position || !place.position->radius_m || !truth.position) continue;
+    ++placed;
+    const double off_m = distance({place.position->x_m, place.position->y_m}, *truth.position);
+    inside += off_m <= *place.position->radius_m ? 1 : 0;
+  }
   add_rate(result, id + ".known", what + "places known", known, asked);
   if (placed > 0) {
     add_rate(result, id + ".radius", what + "positions within the stated 95 % radius", inside,
              placed, at_least(0.9));
   }
   add_median(result, id + ".time", what + "processor time from the panorama to the answer", "ms",
-             milliseconds, at_most(5.0));
+             ours.milliseconds, at_most(5.0));
   add_row(result, id + ".bytes", what + "size of the memory file, for each view",
-          static_cast<double>(std::filesystem::file_size(file)) / static_cast<double>(views.size()),
-          "B", at_most(20'000.0));
+          file_bytes / static_cast<double>(views.size()), "B", at_most(20'000.0));
 
-  const std::vector<std::function<std::unique_ptr<RivalRecogniser>()>> makers{
-      [] { return fourier_signature_recogniser(); },
-      [] { return pixels_over_all_turns_recogniser(); },
-      [] { return patch_normalised_recogniser(); }};
+  std::string beside = "the others on the same queries: ";
+  const auto add_other = [&](const std::string& other, const Asked& found, double bytes) {
+    std::string key = other;
+    std::ranges::replace(key, ' ', '_');
+    std::erase(key, ',');
+    add_rate(result, id + "." + key + ".near", what + other + ": " + near, found.near_count, asked);
+    add_median(result, id + "." + key + ".time", what + other + ": processor time", "ms",
+               found.milliseconds);
+    add_row(result, id + "." + key + ".bytes", what + other + ": bytes a view", bytes, "B");
+    beside += (beside.back() == ' ' ? "" : ", ") + other + " " + std::to_string(found.near_count);
+  };
+  add_other("ours without local features", without_features,
+            2.0 * static_cast<double>(recogniser.encoder().header().shape.size()));
+  rivals.insert(rivals.begin(), patch_normalised_recogniser());
+  rivals.insert(rivals.begin(), pixels_over_all_turns_recogniser());
+  rivals.insert(rivals.begin(), fourier_signature_recogniser());
   std::vector<RivalView> references;
-  for (const Recorded& view : views) references.push_back({view.panorama});
-  for (const auto& make : makers) {
-    const auto rival = make();
+  for (const Recorded& view : views) references.push_back({view.panorama, to_picture(view.sharp)});
+  for (const auto& rival : rivals) {
     rival->memorise(references);
-    struct Found {
-      std::size_t view;
-      double milliseconds;
-    };
     const auto found = make_each(executor, asked, [&](std::size_t n) {
-      const RivalView query{turned(n / turns, n % turns)};
+      const Panorama& sharp = views[n / turns].sharp;
+      const auto turn = static_cast<int>(
+          std::lround(turn_of(n) * sharp.columns() / static_cast<double>(columns)));
+      const RivalView query{turned(n), to_picture(turn_columns(sharp, turn))};
       const double start = thread_seconds();
       const std::size_t view = rival->nearest(query, n / turns);
       return Found{view, 1000.0 * (thread_seconds() - start)};
     });
-    std::size_t count = 0;
-    std::vector<double> times;
-    for (std::size_t n = 0; n < asked; ++n) {
-      count += is_near(views, n / turns, found[n].view) ? 1 : 0;
-      times.push_back(found[n].milliseconds);
-    }
-    std::string key = rival->name();
-    std::ranges::replace(key, ' ', '_');
-    add_rate(result, id + "." + key + ".near", what + "rival, " + rival->name() + ": " + near,
-             count, asked);
-    add_median(result, id + "." + key + ".time",
-               what + "rival, " + rival->name() + ": processor time", "ms", times);
-    add_row(result, id + "." + key + ".bytes", what + "rival, " + rival->name() + ": bytes a view",
-            rival->bytes_per_view(), "B");
+    add_other(rival->name(), Asked(views, found), rival->bytes_per_view());
   }
-  std::filesystem::remove(file);
+  result.rows[judged].over += "; " + beside;
 }
 
 }  // namespace panonav

@@ -42,7 +42,8 @@ Reproduction reproduce_elsewhere(const ElsewhereReproductionOptions& options, Ex
   for (const char* const recording : {"ciirc_b670", "gantry_plants", "indoor_walk_360"}) {
     if (!has_data(options.data, recording)) continue;
     stages.push_back({recording, 20.0, [&, recording] {
-                        reproduce_leave_one_out(options, recording, executor, result);
+                        reproduce_leave_one_out(options, options.data / recording, {}, executor,
+                                                result);
                       }});
   }
   if (options.floors) {

@@ -54,7 +54,7 @@ class Rivals final : public Experiment {
   void add(const PlaceRecording& place, Executor& executor) override {
     const Renderer in_colour(place.scene, {.channels = 3}, executor);
     const auto references = with_colour(place, in_colour, place.references, {}, 90000U, executor);
-    for (const auto& view : references) colourfulness_.push_back(mean_colourfulness(view.colour));
+    for (const auto& view : references) colourfulness_.push_back(mean_colourfulness(view.picture));
     std::array<std::unique_ptr<RivalRecogniser>, kRivals> recognisers;
     for (std::size_t r = 0; r < kRivals; ++r) {
       recognisers[r] = kMakers[r]();

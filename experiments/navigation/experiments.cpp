@@ -68,27 +68,11 @@ struct Measures {
   }
 };
 
-// How the runs end that do not end as `wanted`: what is known of a target that is missed.
-std::string other_ends(const Measures& measured, NavigationState wanted) {
-  std::string text;
-  const auto add = [&](std::size_t count, const std::string& end) {
-    if (count == 0) return;
-    text += (text.empty() ? "of the other runs, " : ", ") + std::to_string(count) + " " + end;
-  };
-  if (wanted == NavigationState::arrived) {
-    add(measured.wrongly, "report an arrival but are farther off");
-  }
-  for (const auto& [end, count] : measured.ends) {
-    if (end != wanted) add(count, "end as " + std::string(name_of(end)));
-  }
-  return text;
-}
-
 void report(const std::string& id, const std::string& what, const Measures& measured,
             std::optional<Target> arrival, std::optional<Target> length, Reproduction& result) {
   add_rate(result, id + ".arrived", what + ": arrive within half the reference spacing",
            measured.arrived, measured.runs, arrival);
-  result.rows.back().reason = other_ends(measured, NavigationState::arrived);
+  result.rows.back().reason = other_ends(measured.ends, measured.wrongly);
   if (!measured.lengths.empty()) {
     add_median(result, id + ".length", what + ": way driven against the shortest", "",
                measured.lengths, length);
@@ -409,7 +393,7 @@ void reproduce_blocked_missions(const NavigationReproductionOptions& options, Ex
          result);
   add_rate(result, "navigation.shut.unreachable", what + " on both sides: told unreachable",
            shut.ends[NavigationState::unreachable], shut.runs, at_least(0.9));
-  result.rows.back().reason = other_ends(shut, NavigationState::unreachable);
+  result.rows.back().reason = other_ends(shut.ends, shut.wrongly, NavigationState::unreachable);
   add_rate(result, "navigation.shut.arrived", what + " on both sides: say that they arrived",
            shut.ends[NavigationState::arrived], shut.runs);
   add_median(result, "navigation.shut.steps", what + " on both sides: steps until told", "",

@@ -60,6 +60,7 @@ HomingRun run_home(const HomingPlace& place, const HomingView& home, const Pose2
   for (;;) {
     const HomingView view = take_homing_view(place, robot.pose(), noise_of_views.next());
     const PursuitDecision decision = pursuit.decide(view);
+    if (run.path.empty()) run.start_difference = decision.difference;
     run.path.push_back(robot.pose());
     run.vectors.push_back(decision.vector);
     const auto finish = [&](HomingRunEnd end) {

@@ -69,7 +69,8 @@ struct HomingRun {
   std::vector<HomeVector> vectors;  ///< at these poses
   HomingRunEnd end = HomingRunEnd::exhausted;
   double end_distance_m = 0.0;  ///< from the goal
-  /// Of the last view from home.
+  /// Of the first view and of the last one from home.
+  double start_difference = 0.0;
   double end_difference = 0.0;
   bool met_obstacle = false;  ///< at least one step was not the one wanted
 

@@ -405,6 +405,20 @@ void require_goal(const RememberedPlace& remembered, ViewId goal) {
 
 }  // namespace
 
+std::string other_ends(const std::map<NavigationState, std::size_t>& ends, std::size_t wrongly,
+                       NavigationState wanted) {
+  std::string text;
+  const auto add = [&](std::size_t count, const std::string& end) {
+    if (count == 0) return;
+    text += (text.empty() ? "of the other runs, " : ", ") + std::to_string(count) + " " + end;
+  };
+  if (wanted == NavigationState::arrived) add(wrongly, "report an arrival but are farther off");
+  for (const auto& [end, count] : ends) {
+    if (end != wanted) add(count, "end as " + std::string(name_of(end)));
+  }
+  return text;
+}
+
 MissionRun run_mission(const MissionPlace& place, const RememberedPlace& remembered,
                        Navigator& navigator, const Mission& mission, const MissionOptions& options,
                        std::uint64_t seed, const StepReport& report_step) {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -175,6 +176,12 @@ struct MissionRun {
     return end == NavigationState::arrived && end_distance_m <= radius_m;
   }
 };
+
+/// How missions end that do not end as `wanted`: what is known of a target that is missed. `ends`
+/// counts them all, `wrongly` those that report an arrival but are farther off.
+[[nodiscard]] std::string other_ends(const std::map<NavigationState, std::size_t>& ends,
+                                     std::size_t wrongly,
+                                     NavigationState wanted = NavigationState::arrived);
 
 /// Called after each step, with the true pose.
 using StepReport = std::function<void(const NavigationDecision& decision, const Pose2& pose)>;

@@ -115,6 +115,21 @@ TEST(HomingRun, AnObstacleStopsARobotThatMayNotGoPast) {
   EXPECT_GE(blocked, 3U);
 }
 
+TEST(HomingRun, KeepsHowMuchTheFirstViewDiffersFromHome) {
+  const HomingPlace& place = place_of("lab");
+  Executor executor(2);
+  for (const HomingRun& run :
+       run_home(place, random_homing_tasks(place, 6, 0.8, 23), {}, 24, executor)) {
+    if (run.end != HomingRunEnd::arrived) continue;
+    EXPECT_LE(run.end_difference, 0.08);
+    // Views of one room differ the more the farther they are apart.
+    if (distance(run.path.front().position(), run.goal.position()) > 0.3) {
+      EXPECT_GT(run.start_difference, 2.0 * run.end_difference);
+    }
+    EXPECT_LE(run.start_difference, 1.0);
+  }
+}
+
 TEST(HomingRun, SaysThatItIsNotHomeWhereHomeWasSeenInAnotherRoom) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   const HomingPlace& lab = place_of("lab");

@@ -211,5 +211,18 @@ TEST(Missions, RefuseWhatMakesNoSense) {
                ContractError);
 }
 
+TEST(Mission, OtherEndsSayHowRunsEndThatDoNotArrive) {
+  EXPECT_EQ(other_ends({{NavigationState::arrived, 5}}, 0), "");
+  EXPECT_EQ(other_ends({{NavigationState::arrived, 5},
+                        {NavigationState::lost, 1},
+                        {NavigationState::unreachable, 3}},
+                       2),
+            "of the other runs, 2 report an arrival but are farther off, 1 end as lost, 3 end as "
+            "unreachable");
+  EXPECT_EQ(other_ends({{NavigationState::arrived, 1}, {NavigationState::unreachable, 3}}, 1,
+                       NavigationState::unreachable),
+            "of the other runs, 1 end as arrived");
+}
+
 }  // namespace
 }  // namespace panonav

@@ -6,8 +6,11 @@
 #include <cmath>
 #include <vector>
 
+#include "experiments/elsewhere/experiments.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
+#include "support/landmark_pictures.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace panonav {
 namespace {
@@ -117,6 +120,60 @@ TEST(ColourHistogram, TellsColoursApartThatAreOneGrey) {
 TEST(ColourHistogram, RefusesViewsWithoutColour) {
   const auto recogniser = colour_histogram_recogniser();
   EXPECT_THROW(recogniser->memorise({{random_view(1)}}), ContractError);
+}
+
+/// Answers the reference so many places after the query's own.
+class NextOne final : public RivalRecogniser {
+ public:
+  explicit NextOne(std::size_t after) : after_(after) {}
+  [[nodiscard]] std::string name() const override { return "plus " + std::to_string(after_); }
+  void memorise(const std::vector<RivalView>& references) override { references_ = references; }
+  [[nodiscard]] std::size_t nearest(const RivalView& query,
+                                    std::optional<std::size_t> left_out) const override {
+    // Panorama and picture are turned alike, and are those of the view that is left out.
+    EXPECT_EQ(query.picture, to_picture(query.panorama));
+    std::vector<float> asked(query.panorama.values().begin(), query.panorama.values().end());
+    const auto& own = references_.at(left_out.value()).panorama.values();
+    std::vector<float> there(own.begin(), own.end());
+    std::ranges::sort(asked);
+    std::ranges::sort(there);
+    EXPECT_EQ(asked, there);
+    return (*left_out + after_) % references_.size();
+  }
+  [[nodiscard]] double bytes_per_view() const override { return 7.0; }
+
+ private:
+  std::size_t after_;
+  std::vector<RivalView> references_;
+};
+
+// One protocol for all: each picture of a line of places, turned, is asked of the others.
+TEST(LeaveOneOut, RivalsOfTheCallerAnswerTheSameQueriesInTheSameRun) {
+  const testing::TemporaryFolder folder;
+  std::vector<Pose2> line;
+  for (int i = 0; i < 10; ++i) line.push_back({0.4 * i, 0.0, 0.0});
+  testing::write_dataset(folder / "line", testing::landmark_world(3), line);
+  ElsewhereReproductionOptions options;
+  options.out = folder.path();
+  std::vector<std::unique_ptr<RivalRecogniser>> rivals;
+  rivals.push_back(std::make_unique<NextOne>(1));
+  rivals.push_back(std::make_unique<NextOne>(3));
+  Executor executor(2);
+  Reproduction result;
+  reproduce_leave_one_out(options, folder / "line", std::move(rivals), executor, result);
+  const auto row = [&](const std::string& id) {
+    const auto found = std::ranges::find(result.rows, "elsewhere.line." + id, &ResultRow::id);
+    EXPECT_NE(found, result.rows.end()) << id;
+    return found == result.rows.end() ? ResultRow{} : *found;
+  };
+  // All but the last have the next one beside them.
+  EXPECT_DOUBLE_EQ(row("plus_1.near").ours, 0.9);
+  EXPECT_DOUBLE_EQ(row("plus_3.near").ours, 0.0);
+  EXPECT_DOUBLE_EQ(row("plus_1.bytes").ours, 7.0);
+  EXPECT_GE(row("near").ours, 0.8);
+  EXPECT_TRUE(row("near").over.ends_with("plus 1 27, plus 3 0")) << row("near").over;
+  EXPECT_EQ(row("known").over, "of 30");
+  EXPECT_FALSE(std::filesystem::exists(folder / "line.panonav"));
 }
 
 }  // namespace
