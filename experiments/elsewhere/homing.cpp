@@ -162,9 +162,10 @@ void reproduce_home_vectors(const ElsewhereReproductionOptions& options,
     if (answered > 0) {
       add_rate(result, id + ".off", what + "of these, off by more than 45 degrees", off, answered,
                at_most(0.05));
-      result.rows.back().reason = "of these " + std::to_string(off) + ":";
+      std::string& reason = result.rows.back().reason;
       for (const auto& [name, count] : off_in) {
-        result.rows.back().reason += " " + name + " " + std::to_string(count);
+        reason +=
+            (reason.empty() ? "by scene or world: " : ", ") + name + " " + std::to_string(count);
       }
     }
   }

@@ -71,6 +71,32 @@ TEST_F(Arrange, LeavesTheMemoryAsItIsWhenToldSo) {
   EXPECT_EQ(file.info().links, 0U);
 }
 
+// Two places that have nothing in common: how many views are placed is told, and the ground truth
+// is compared with these alone.
+TEST_F(Arrange, TellsHowManyViewsTheLargestComponentHolds) {
+  const std::size_t own = poses.size();
+  const auto far = grid_poses(3);
+  poses.insert(poses.end(), far.begin(), far.end());
+  write_dataset(folder / "both", world, poses);
+  for (std::size_t i = own; i < poses.size(); ++i) {
+    write_picture(folder / "both" / view_name(i), landmark_world(77), poses[i]);
+  }
+  const std::string both = folder / "both.panonav";
+  run_well({"memorise", folder / "both", both});
+  const auto answer = answer_of({"arrange", both, "--json"});
+  const auto& components = answer["connected_components"];
+  ASSERT_GE(components.size(), 2U);
+  const auto largest = components[0]["views"].get<std::size_t>();
+  EXPECT_LE(largest, own);
+  const std::string out = run_panonav({"arrange", both}).out;
+  EXPECT_TRUE(contains(out, std::to_string(components.size()) + " connected components holds " +
+                                std::to_string(largest) + " of the " +
+                                std::to_string(poses.size()) + " views"))
+      << out;
+  EXPECT_TRUE(contains(out, " over " + std::to_string(largest) + " views")) << out;
+  EXPECT_TRUE(contains(out, "no way leads from one to another")) << out;
+}
+
 TEST_F(Arrange, RefusesInOneLine) {
   EXPECT_TRUE(contains(refusal({"arrange", folder / "none.panonav"}), "none.panonav"));
   EXPECT_TRUE(contains(refusal({"arrange", memory, "--odometry", folder / "run"}), "odometry"));

@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <span>
+#include <string>
 
 #include "cli/arguments.hpp"
 #include "cli/json.hpp"
@@ -143,13 +145,20 @@ void print_result(const Lattice& lattice, const VisualMemory& memory, Session& s
                 std::to_string(number_rejected(lattice)) + " of them rejected; unit: " +
                 (lattice.metric ? "metres" : "the distance to the nearest view (median)"));
   if (lattice.components.size() > 1) {
-    std::string sizes;
-    for (const auto& component : lattice.components) {
-      sizes += (sizes.empty() ? "" : ", ") + std::to_string(component.views);
+    std::string others;
+    std::size_t alone = 0;
+    for (const auto& component : std::span(lattice.components).subspan(1)) {
+      alone += component.views == 1 ? 1 : 0;
+      if (component.views == 1) continue;
+      others += (others.empty() ? "; the others hold " : ", ") + std::to_string(component.views);
     }
-    session.print(session.bad("The map has " + std::to_string(lattice.components.size()) +
-                              " connected components") +
-                  ", with these numbers of views: " + sizes + ".");
+    if (alone > 0) others += "; " + std::to_string(alone) + " views are joined to none";
+    session.print("The largest of " +
+                  session.bad(std::to_string(lattice.components.size()) + " connected components") +
+                  " holds " + std::to_string(lattice.components.front().views) + " of the " +
+                  std::to_string(lattice.nodes.size()) + " views" + others +
+                  ". How components lie to each other is unknown, and no way leads from one to "
+                  "another.");
   }
   if (!lattice.components.front().handedness_known) {
     session.print("It may as well be the mirror image: nothing tells left from right.");
@@ -157,9 +166,9 @@ void print_result(const Lattice& lattice, const VisualMemory& memory, Session& s
 #ifdef PANONAV_COMMAND_SIMULATES
   if (const auto comparison = compare_with_ground_truth(lattice, memory)) {
     session.print("beside the ground truth: Procrustes disparity (shape difference) " +
-                  session.strong(fixed(comparison->shape_difference, 4)) + ", " +
-                  fixed(comparison->rms_m, 2) + " m rms with a free scale of " +
-                  fixed(comparison->scale, 3));
+                  session.strong(fixed(comparison->shape_difference, 4)) + " over " +
+                  std::to_string(comparison->compared) + " views, " + fixed(comparison->rms_m, 2) +
+                  " m rms with a free scale of " + fixed(comparison->scale, 3));
     if (comparison->trustworthiness) {
       session.print("neighbours kept: trustworthiness " + fixed(*comparison->trustworthiness, 3) +
                     ", continuity " + fixed(*comparison->continuity, 3));
