@@ -3,13 +3,15 @@
 // that MCAP_NODE names.
 //   node mcap_core.mjs write FOLDER   makes the files mcap_*.mcap of tests/io/data
 //   node mcap_core.mjs read FILE      prints what it reads, through the index and as a stream, as JSON
+//   node mcap_core.mjs variants FOLDER   makes a file of each way to leave out optional records, with and
+//                                     without unknown fields at their ends: COUNT-NAMES.mcap
 //   node mcap_core.mjs speed FILE     GB/s of messages read through the index; and written, beside it
 import { createRequire } from "node:module";
 import fs from "node:fs";
 import path from "node:path";
 
 const require = createRequire(path.join(path.resolve(process.env.MCAP_NODE ?? "."), "x.js"));
-const { McapWriter, McapIndexedReader, McapStreamReader } = require("@mcap/core");
+const { McapWriter, McapIndexedReader, McapRecordBuilder, McapStreamReader, Opcode } = require("@mcap/core");
 const { FileHandleReadable, FileHandleWritable } = require("@mcap/nodejs");
 const lz4 = require("@foxglove/wasm-lz4");
 const lz4js = require("lz4js");
@@ -53,6 +55,77 @@ async function write(file, options, startsWithMessages) {
   }
   await writer.end();
   await handle.close();
+}
+
+// What the format leaves to the writer, as the conformance tests of the format vary it.
+const optional = ["ch", "mx", "st", "rsh", "rch", "chx", "sum", "pad"];
+function writeVariants(folder) {
+  for (let bits = 0; bits < 1 << optional.length; ++bits) {
+    const has = Object.fromEntries(optional.map((name, i) => [name, ((bits >> i) & 1) === 1]));
+    if (!has.ch && (has.mx || has.chx)) continue;
+    for (const count of [0, 1, 10]) {
+      const names = optional.filter((name) => has[name]);
+      fs.writeFileSync(path.join(folder, `${count}-${names.join("-")}.mcap`), variant(has, count));
+    }
+  }
+}
+
+function variant(has, count) {
+  const out = new McapRecordBuilder({ padRecords: has.pad });
+  out.writeMagic();
+  out.writeHeader({ profile: "", library: "" });
+  const schema = { id: 1, name: "Example", encoding: "c", data: new Uint8Array([4, 5, 6]) };
+  const channel = { id: 1, schemaId: 1, topic: "/imu", messageEncoding: "cdr", metadata: new Map([["a", "b"]]) };
+  const records = has.ch ? new McapRecordBuilder({ padRecords: has.pad }) : out;
+  const index = [];
+  if (count > 0) {
+    records.writeSchema(schema);
+    records.writeChannel(channel);
+  }
+  for (let i = 0; i < count; ++i) {
+    index.push([BigInt(i), BigInt(records.length)]);
+    records.writeMessage({ channelId: 1, sequence: i, logTime: BigInt(i), publishTime: 0n, data: new Uint8Array([i, i]) });
+  }
+  const chunkIndexes = [];
+  if (has.ch && count > 0) {
+    const chunk = {
+      messageStartTime: 0n, messageEndTime: BigInt(count - 1), uncompressedSize: BigInt(records.length),
+      uncompressedCrc: 0, compression: "", records: records.buffer,
+    };
+    const chunkStartOffset = BigInt(out.length);
+    const chunkLength = out.writeChunk(chunk);
+    const messageIndexOffsets = new Map(has.mx ? [[1, BigInt(out.length)]] : []);
+    const messageIndexLength = has.mx ? out.writeMessageIndex({ channelId: 1, records: index }) : 0n;
+    chunkIndexes.push({
+      ...chunk, chunkStartOffset, chunkLength, messageIndexOffsets, messageIndexLength,
+      compressedSize: chunk.uncompressedSize,
+    });
+  }
+  out.writeDataEnd({ dataSectionCrc: 0 });
+  const groups = [];
+  const summaryStart = BigInt(out.length);
+  const group = (groupOpcode, wanted, put) => {
+    const groupStart = BigInt(out.length);
+    if (wanted) put();
+    const groupLength = BigInt(out.length) - groupStart;
+    if (groupLength > 0n) groups.push({ groupOpcode, groupStart, groupLength });
+  };
+  group(Opcode.SCHEMA, has.rsh && count > 0, () => out.writeSchema(schema));
+  group(Opcode.CHANNEL, has.rch && count > 0, () => out.writeChannel(channel));
+  group(Opcode.STATISTICS, has.st, () => out.writeStatistics({
+    messageCount: BigInt(count), schemaCount: count > 0 ? 1 : 0, channelCount: count > 0 ? 1 : 0, attachmentCount: 0,
+    metadataCount: 0, chunkCount: chunkIndexes.length, messageStartTime: 0n, messageEndTime: BigInt(Math.max(count - 1, 0)),
+    channelMessageCounts: new Map(count > 0 ? [[1, BigInt(count)]] : []),
+  }));
+  group(Opcode.CHUNK_INDEX, has.chx, () => chunkIndexes.forEach((one) => out.writeChunkIndex(one)));
+  const summaryOffsetStart = BigInt(out.length);
+  if (has.sum) groups.forEach((one) => out.writeSummaryOffset(one));
+  out.writeFooter({
+    summaryStart: groups.length > 0 ? summaryStart : 0n, summaryOffsetStart: has.sum && groups.length > 0 ? summaryOffsetStart : 0n,
+    summaryCrc: 0,
+  });
+  out.writeMagic();
+  return out.buffer;
 }
 
 async function openIndexed(file) {
@@ -112,6 +185,8 @@ if (verb === "write") {
     useStatistics: false, useSummaryOffsets: false, repeatSchemas: false, repeatChannels: false,
     useAttachmentIndex: false, useMetadataIndex: false, useMessageIndex: false, useChunkIndex: false,
   });
+} else if (verb === "variants") {
+  writeVariants(target);
 } else if (verb === "read") {
   await read(target);
 } else {

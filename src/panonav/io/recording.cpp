@@ -260,6 +260,8 @@ std::unique_ptr<const RecordingFile> open_file(const fs::path& path,
 
 bool is_rosbag2_folder(const fs::path& path) {
   std::array<char, 4096> first{};
+  std::error_code code;
+  if (!fs::is_regular_file(path / "metadata.yaml", code)) return false;
   std::ifstream(path / "metadata.yaml", std::ios::binary).read(first.data(), first.size());
   return std::string_view(first.data(), first.size()).find("rosbag2_bagfile_information") !=
          std::string_view::npos;

@@ -147,10 +147,12 @@ class McapFile : public ChunkedFile {
       if (fields.good()) schemas_.try_emplace(number, name);
     } else if (kind == McapRecord::channel) {
       const auto number = fields.number<std::uint16_t>();
-      const auto schema = schemas_.find(fields.number<std::uint16_t>());
+      const auto schema_number = fields.number<std::uint16_t>();
+      const auto schema = schemas_.find(schema_number);
       const auto name = fields.text();
       const auto encoding = fields.text();
       if (!fields.good() || channels_.contains(number)) return;
+      if (schema_number != 0 && schema == schemas_.end()) lacks_schemas_ = true;
       channels_.emplace(number,
                         topic_of(name, schema == schemas_.end() ? "" : schema->second, encoding));
     }
@@ -228,7 +230,7 @@ class McapFile : public ChunkedFile {
         if (!content.good() || !list.good()) return is_damaged();
       }
     }
-    if (!messages || indexed != *messages || !is_complete) return false;
+    if (!messages || indexed != *messages || !is_complete || lacks_schemas_) return false;
     for (const auto& [channel, count] : counts) {
       const auto topic = channels_.find(channel);
       if (topic == channels_.end()) return false;
@@ -276,6 +278,7 @@ class McapFile : public ChunkedFile {
 
   std::unordered_map<std::uint16_t, std::uint32_t> channels_;  // their topics
   std::unordered_map<std::uint16_t, std::string> schemas_;     // their names
+  bool lacks_schemas_ = false;
 };
 
 }  // namespace
