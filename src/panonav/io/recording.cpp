@@ -196,8 +196,7 @@ class FilesRecording : public Recording {
     constexpr std::array<std::uint8_t, 4> zstd_magic{0x28, 0xB5, 0x2F, 0xFD};
     if (topics_[place.topic].encoding == MessageEncoding::cdr && message.bytes.size() >= 4 &&
         std::ranges::equal(message.bytes.first(4), zstd_magic)) {
-      auto unpacked = unpack(message.bytes, Packing::zstd,
-                             zstd_content_bytes(message.bytes, limits_.chunk_bytes));
+      auto unpacked = unpack_frame(message.bytes, limits_.chunk_bytes);
       if (!unpacked.whole) {
         throw FileError(file.path().string(), "a packed message cannot be unpacked, or not to " +
                                                   std::to_string(limits_.chunk_bytes) + " bytes");

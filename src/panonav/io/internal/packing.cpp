@@ -114,10 +114,17 @@ Unpacked unpack(std::span<const std::uint8_t> packed, Packing packing, std::size
   return result;
 }
 
-std::size_t zstd_content_bytes(std::span<const std::uint8_t> packed, std::size_t most) noexcept {
-  // What is not known is a number beyond all sizes.
-  return static_cast<std::size_t>(
-      std::min<std::uint64_t>(ZSTD_getFrameContentSize(packed.data(), packed.size()), most));
+Unpacked unpack_frame(std::span<const std::uint8_t> packed, std::size_t most) {
+  // Where the frame does not say its size, this is a number beyond all sizes.
+  const auto told = ZSTD_getFrameContentSize(packed.data(), packed.size());
+  std::size_t size = static_cast<std::size_t>(std::min<std::uint64_t>(told, most));
+  if (told == ZSTD_CONTENTSIZE_UNKNOWN) size = std::min(most, 16 * packed.size() + 4096);
+  while (true) {
+    Unpacked unpacked = unpack(packed, Packing::zstd, size);
+    const bool is_full = !unpacked.whole && unpacked.content.size == size;
+    if (!is_full || size == most || told <= most) return unpacked;
+    size = std::min(most, 16 * size);
+  }
 }
 
 void pack(std::span<const std::uint8_t> bytes, Packing packing, std::vector<std::uint8_t>& packed) {

@@ -36,9 +36,8 @@ struct Unpacked {
 [[nodiscard]] Unpacked unpack(std::span<const std::uint8_t> packed, Packing packing,
                               std::size_t most);
 
-/// What a Zstandard frame says that it unpacks to; `most` where it does not say or says more.
-[[nodiscard]] std::size_t zstd_content_bytes(std::span<const std::uint8_t> packed,
-                                             std::size_t most) noexcept;
+/// A Zstandard frame of a size that is not known, of at most `most` bytes.
+[[nodiscard]] Unpacked unpack_frame(std::span<const std::uint8_t> packed, std::size_t most);
 
 /// Replaces `packed` by one LZ4 or Zstandard frame of the bytes, at the speed of a recorder.
 void pack(std::span<const std::uint8_t> bytes, Packing packing, std::vector<std::uint8_t>& packed);
