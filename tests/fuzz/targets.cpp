@@ -16,6 +16,7 @@
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/option_file.hpp"
+#include "panonav/io/recorded_dataset.hpp"
 #include "panonav/io/recording.hpp"
 #include "panonav/io/ros_messages.hpp"
 #include "panonav/io/trajectory_file.hpp"
@@ -109,7 +110,8 @@ void read_tum(Bytes bytes) {
 void read_recording(Bytes bytes) {
   expect_value_or_line([&] {
     constexpr RecordingLimits small{.chunk_bytes = 1 << 20, .messages = 100'000};
-    const auto recording = Recording::open(file_of("recording", bytes), small);
+    const std::shared_ptr<const Recording> recording =
+        Recording::open(file_of("recording", bytes), small);
     std::vector<std::uint32_t> topics;
     for (std::uint32_t i = 0; i < recording->topics().size(); ++i) topics.push_back(i);
     std::size_t read = 0;
@@ -126,6 +128,13 @@ void read_recording(Bytes bytes) {
     for (const std::string& line : recording->warnings()) {
       expect_value_or_line([&] { throw FileError("recording", line); });
     }
+    expect_value_or_line([&] {
+      const auto recorded = panonav::read_recording(recording, "recording", {});
+      for (const std::string& line : recorded.warnings) {
+        expect_value_or_line([&] { throw FileError("recording", line); });
+      }
+      (void)read_picture(recorded.dataset.entries.front());
+    });
   });
 }
 

@@ -45,8 +45,8 @@ class Track {
     for (Sample& each : samples_) each.at_ns = by_log ? each.times.log_ns : each.times.stamp_ns;
     std::ranges::reverse(samples_);
     std::ranges::stable_sort(samples_, {}, &Sample::at_ns);
-    const auto twice = std::ranges::unique(samples_, {}, &Sample::at_ns);
-    samples_.erase(twice.begin(), twice.end());
+    const auto same = [](const Sample& a, const Sample& b) { return a.at_ns == b.at_ns; };
+    samples_.erase(std::unique(samples_.begin(), samples_.end(), same), samples_.end());
   }
   [[nodiscard]] const ros::Pose& last() const { return samples_.back().pose; }
   [[nodiscard]] std::optional<ros::Pose> at(std::int64_t ns) const {
@@ -202,8 +202,7 @@ std::vector<std::string> names_of(const Recording& recording, IsType is_type) {
     if (readable(topic, is_type)) names.push_back(topic.name);
   }
   std::ranges::sort(names);
-  const auto twice = std::ranges::unique(names);
-  names.erase(twice.begin(), twice.end());
+  names.erase(std::unique(names.begin(), names.end()), names.end());
   return names;
 }
 

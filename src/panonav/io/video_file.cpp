@@ -116,8 +116,7 @@ std::optional<VideoIndex> read_index(const std::string& file, const std::string&
     throw FileError(file, "holds no picture; allowed: a video");
   }
   std::ranges::sort(index.stamps);
-  const auto again = std::ranges::unique(index.stamps);
-  index.stamps.erase(again.begin(), again.end());
+  index.stamps.erase(std::unique(index.stamps.begin(), index.stamps.end()), index.stamps.end());
   return index;
 }
 
