@@ -61,6 +61,7 @@ TEST_F(Localise, TheLibraryGivesTheCommandsAnswerToTheBit) {
     const auto file = std::filesystem::path(asked()) / view_name(i);
     const Place place = recogniser.localise(read_image(file));
     EXPECT_EQ(place.known, told[i]["known"].get<bool>());
+    EXPECT_EQ(place.known_probability, told[i]["known_probability"].get<double>());
     ASSERT_EQ(place.matches.size(), told[i]["matches"].size());
     for (std::size_t m = 0; m < place.matches.size(); ++m) {
       EXPECT_EQ(place.matches[m].name, told[i]["matches"][m]["file"]);
@@ -83,7 +84,7 @@ TEST_F(Localise, JsonLinesHaveExactlyTheDocumentedFields) {
   for (const auto& answer : all) {
     EXPECT_EQ(keys_of(answer),
               (std::set<std::string>{"bytes_read", "components", "file", "heading_rad", "known",
-                                     "matches", "position", "turned_rad"}));
+                                     "known_probability", "matches", "position", "turned_rad"}));
     EXPECT_TRUE(answer["known"].is_boolean());
     EXPECT_TRUE(answer["components"].is_number_integer());
     EXPECT_TRUE(answer["bytes_read"].is_number_unsigned());
@@ -227,10 +228,12 @@ TEST_F(Localise, SeveralPicturesAndATable) {
   const auto rows = lines(bytes_of(table));
   ASSERT_EQ(rows.size(), 5U);
   EXPECT_EQ(rows[0],
-            "file,answer,x_m,y_m,radius_m,heading_deg,best,dissimilarity,column_difference,"
+            "file,answer,known_probability,x_m,y_m,radius_m,heading_deg,best,dissimilarity,column_"
+            "difference,"
             "turn_deg,next,next_dissimilarity,next_column_difference,error");
-  EXPECT_EQ(rows[1].find(gone + ",unreadable,,,,,,,,,,,,"), 0U) << rows[1];
-  EXPECT_EQ(rows[2].find(pictures[1] + ",known," + to_text(one["position"]["x_m"].get<double>())),
+  EXPECT_EQ(rows[1].find(gone + ",unreadable,,,,,,,,,,,,,"), 0U) << rows[1];
+  EXPECT_EQ(rows[2].find(pictures[1] + ",known," + fixed(one["known_probability"], 4) + "," +
+                         to_text(one["position"]["x_m"].get<double>())),
             0U)
       << rows[2];
   EXPECT_TRUE(contains(rows[2], "," + one["matches"][1]["file"].get<std::string>() + ","));

@@ -123,6 +123,7 @@ std::vector<std::pair<std::string, std::string>> figures_of(const LocalisedQuery
   }
   const auto& matches = place.matches;
   if (!matches.empty()) {
+    figures.emplace_back(fixed(place.known_probability, 2), "probability that the place is known");
     figures.emplace_back(
         fixed(matches[0].column_difference, 3),
         place.known ? "difference to the best match" : "difference to the most similar view");
@@ -152,14 +153,16 @@ void add_table(ReportPage& page, const std::vector<LocalisedQuery>& queries) {
     const auto dissimilarity = [&](std::size_t match) {
       return match < matches.size() ? std::to_string(matches[match].dissimilarity) : "";
     };
-    rows.push_back({query.file, answer_text(query), position ? position_text(*position) : "",
-                    heading ? degrees_text(*heading) : "", error ? fixed(*error, 2) : "",
-                    difference(0), difference(1), dissimilarity(0), dissimilarity(1)});
+    rows.push_back({query.file, answer_text(query),
+                    query.error.empty() ? fixed(query.place.known_probability, 2) : "",
+                    position ? position_text(*position) : "", heading ? degrees_text(*heading) : "",
+                    error ? fixed(*error, 2) : "", difference(0), difference(1), dissimilarity(0),
+                    dissimilarity(1)});
   }
   page.text(
       "Difference and dissimilarity (of the signatures) are to the best match and to the next.");
-  page.table({"picture", "answer", "position", "heading", "error [m]", "difference", "to the next",
-              "dissimilarity", "to the next"},
+  page.table({"picture", "answer", "probability", "position", "heading", "error [m]", "difference",
+              "to the next", "dissimilarity", "to the next"},
              rows);
 }
 
@@ -181,7 +184,6 @@ void write_localise_report(const fs::path& folder, const MemoryFile& file,
     known += queries[i].place.known ? 1 : 0;
     if (const auto error = error_m(queries[i])) errors.push_back(*error);
   }
-  const double limit = recogniser.localiser().place_model().threshold;
   ReportPage page(
       "Where was this?",
       "What the robot saw, and the view of " + file.path().filename().string() +
@@ -199,11 +201,10 @@ void write_localise_report(const fs::path& folder, const MemoryFile& file,
   page.figures(summary);
   page.text(
       "The difference compares the picture with a view column by column, both turned alike: "
-      "0 where they are the same. A picture that differs by more than " +
-      fixed(limit, 3) +
-      " from all views of this memory shows an unknown place. An answer is safe where the "
-      "best match differs clearly less than that, and where the next ones were taken beside "
-      "it.");
+      "0 where they are the same. The probability that the place is known follows from how much "
+      "less the better half of the columns differs at the best match than at the tenth best and "
+      "at mirrored views, which show places that do not exist. Below one half the place is "
+      "unknown.");
   const std::size_t shown = std::min(max_shown, readable.size());
   if (shown < readable.size()) {
     page.text("Shown are " + std::to_string(shown) + " of " + std::to_string(readable.size()) +

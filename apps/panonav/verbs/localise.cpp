@@ -54,6 +54,7 @@ ordered_json as_json(const LocalisedQuery& answer, bool areas) {
   }
   ordered_json json{{"file", answer.file},
                     {"known", found.known},
+                    {"known_probability", found.known_probability},
                     {"matches", std::move(matches)},
                     {"position", nullptr},
                     {"heading_rad", optional_number(found.heading_rad)},
@@ -83,7 +84,9 @@ ordered_json as_json(const LocalisedQuery& answer, bool areas) {
 /// One line for each picture, with the header of docs/formats.md; unknown values are empty.
 std::string as_csv(const std::vector<LocalisedQuery>& answers) {
   std::string table =
-      "file,answer,x_m,y_m,radius_m,heading_deg,best,dissimilarity,column_difference,turn_deg,next,"
+      "file,answer,known_probability,x_m,y_m,radius_m,heading_deg,best,dissimilarity,column_"
+      "difference,"
+      "turn_deg,next,"
       "next_dissimilarity,next_column_difference,error\n";
   const auto add = [&table](const std::string& field) {
     table += ',';
@@ -93,9 +96,11 @@ std::string as_csv(const std::vector<LocalisedQuery>& answers) {
     add(angle_rad ? to_text(written_degrees(*angle_rad)) : "");
   };
   for (const LocalisedQuery& answer : answers) {
-    const auto& [known, matches, position, heading_rad, components, read, areas] = answer.place;
+    const auto& [probability, known, matches, position, heading_rad, components, read, areas] =
+        answer.place;
     table += csv_field(answer.file);
     add(!answer.error.empty() ? "unreadable" : known ? "known" : "unknown");
+    add(answer.error.empty() ? fixed(probability, 4) : "");
     add(position ? to_text(position->x_m) : "");
     add(position ? to_text(position->y_m) : "");
     add(position && position->radius_m ? to_text(*position->radius_m) : "");
@@ -119,9 +124,11 @@ std::string as_text(const LocalisedQuery& answer, Session& session) {
   if (found.matches.empty()) return line + session.bad("nothing to compare with");
   const PlaceMatch& nearest = found.matches.front();
   if (!found.known) {
-    return line + session.bad("unknown place") + "  (most similar: " + nearest.name + ")";
+    return line + session.bad("unknown place") + "  (probability " +
+           fixed(found.known_probability, 2) + "; most similar: " + nearest.name + ")";
   }
-  line += session.good("near " + nearest.name);
+  line +=
+      session.good("near " + nearest.name) + "  probability " + fixed(found.known_probability, 2);
   if (found.position) {
     line +=
         "  x " + fixed(found.position->x_m, 2) + " m  y " + fixed(found.position->y_m, 2) + " m";

@@ -101,6 +101,7 @@ Localiser::Localiser(const VisualMemory& memory, std::shared_ptr<const ColumnRan
       options_(options),
       ranking_(std::move(ranking)),
       support_(*ranking_),
+      criterion_(*ranking_),
       place_model_(learn_place_model(*ranking_)),
       position_model_(learn_position_model(*ranking_)) {}
 
@@ -111,6 +112,7 @@ Localiser::Localiser(const VisualMemory& memory, const PlaceModel& place_model,
       options_(options),
       ranking_(ranking_of(memory, options)),
       support_(*ranking_, spacing_m),
+      criterion_(*ranking_),
       place_model_(place_model),
       position_model_(position_model) {
   require(position_model_.components == options_.components, "components of the position model",
@@ -141,7 +143,9 @@ Localisation Localiser::localise(const PackedSignature& query, const SearchMask&
   if (options_.reranked_views > first && min_difference() > place_model_.neighbouring) {
     ranked = nearest(options_.reranked_views);
   }
-  result.known = min_difference() <= place_model_.threshold;
+  result.evidence = criterion_.evidence(query, ranked, mask);
+  result.known_probability = place_probability(result.evidence);
+  result.known = result.known_probability >= 0.5;
   // Profiles of the references are kept over all rows.
   if (options_.reranked_views > 0 && mask.allowed_rows.empty()) {
     support_.put_best_supported_first(ColumnProfiles(query, options_.components), ranked,

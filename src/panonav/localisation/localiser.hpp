@@ -31,7 +31,10 @@ struct LocalisedMatch {
 
 /// Where the robot is, as far as it can be told from one view.
 struct Localisation {
-  /// False: this is no place of the memory (`PlaceModel`). The matches are listed all the same.
+  PlaceEvidence evidence;
+  /// That the place is one of the memory's (`place_probability`).
+  double known_probability = 0.0;
+  /// The probability is at least 0.5. The matches are listed all the same.
   bool known = false;
   /// Those of the chosen place and its neighbours first, then all others, each ascending in their
   /// score (`RankedMatch`); of the first four the one nearest to `position` is put first. Where
@@ -101,8 +104,10 @@ class Localiser {
 
   const VisualMemory* memory_;
   LocaliserOptions options_;
-  std::shared_ptr<const ColumnRanking> ranking_;  ///< shared by copies; `support_` looks at it
+  /// Shared by copies; `support_` and `criterion_` look at it.
+  std::shared_ptr<const ColumnRanking> ranking_;
   NeighbourSupport support_;
+  PlaceCriterion criterion_;
   PlaceModel place_model_;
   PositionModel position_model_;
   FeatureSource features_;  ///< empty: features do not decide

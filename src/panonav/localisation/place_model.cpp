@@ -1,10 +1,15 @@
 #include "panonav/localisation/place_model.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numeric>
+#include <utility>
 #include <vector>
 
+#include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/localisation/sample.hpp"
 
@@ -34,6 +39,22 @@ std::optional<ViewId> nearest_in_space(const VisualMemory& memory, ViewId view) 
     }
   }
   return nearest;
+}
+
+constexpr std::size_t chance_views = 64;
+constexpr std::size_t spare_views = 16;  // for excluded ones
+constexpr std::size_t examined_matches = 16;
+constexpr double decile_deviations = 1.2816;  // of a Gaussian, below its mean
+
+// Over the better half of the columns, at the turn at which all of them fit best.
+double better_half(const ColumnProfiles& query, const ColumnProfiles& reference,
+                   double heading_rad) {
+  auto columns = column_distances_near(query, reference, heading_rad);
+  const auto half = columns.begin() + columns.size() / 2;
+  std::ranges::nth_element(columns, half);
+  return std::accumulate(columns.begin(), half, 0.0,
+                         [](double sum, double column) { return sum + std::sqrt(column); }) /
+         static_cast<double>(half - columns.begin());
 }
 
 }  // namespace
@@ -97,6 +118,101 @@ PlaceModel learn_place_model(const ColumnRanking& ranking, const PlaceModelOptio
   model.threshold = std::max(0.5 * (model.neighbouring + model.mirrored), least);
   model.learnt = true;
   return model;
+}
+
+std::array<double, place_features> features_of(const PlaceEvidence& evidence) noexcept {
+  constexpr double min_difference = 0.02;
+  constexpr double large_difference = 0.5;
+  constexpr int min_views = 8;
+  constexpr int max_views = 1000;
+  constexpr int max_components = 15;
+  const double difference = std::max(evidence.difference, min_difference);
+  return {1.0,
+          std::log(difference / std::max(evidence.chance, min_difference)),
+          std::log(difference / std::max(evidence.tenth, min_difference)),
+          std::log(std::clamp(evidence.views, min_views, max_views)),
+          std::log(std::max(evidence.of_all_columns, large_difference) / large_difference),
+          std::log(std::clamp(evidence.components, 1, max_components) / double{max_components})};
+}
+
+double place_probability(const PlaceEvidence& evidence) noexcept {
+  if (evidence.views < 1 || !(evidence.chance > 0.0)) return 0.0;
+  constexpr std::array<double, place_features> learnt{2.49, -16.21, -11.09, -1.45, -7.00, 0.91};
+  const auto features = features_of(evidence);
+  const double z = std::inner_product(learnt.begin(), learnt.end(), features.begin(), 0.0);
+  return 1.0 / (1.0 + std::exp(-z));
+}
+
+PlaceCriterion::PlaceCriterion(const ColumnRanking& ranking) : ranking_(&ranking) {
+  std::vector<std::pair<std::uint64_t, ViewId>> drawn;
+  for (const ViewId view : ranking.memory().views()) {
+    drawn.emplace_back(Random(1, view.value).next(), view);
+  }
+  const std::size_t kept = std::min(drawn.size(), chance_views + spare_views);
+  std::ranges::partial_sort(drawn, drawn.begin() + static_cast<std::ptrdiff_t>(kept));
+  for (std::size_t i = 0; i < kept; ++i) {
+    sample_.push_back(drawn[i].second);
+    profiles_.push_back(profiles(drawn[i].second, {}));
+  }
+}
+
+ColumnProfiles PlaceCriterion::profiles(ViewId view,
+                                        std::span<const std::uint8_t> allowed_rows) const {
+  return ranking_->components() == 0 && allowed_rows.empty()
+             ? ranking_->profiles(view)
+             : ColumnProfiles(ranking_->memory().packed(view), 0, allowed_rows);
+}
+
+PlaceEvidence PlaceCriterion::evidence(const PackedSignature& query,
+                                       std::span<const RankedMatch> matches,
+                                       const SearchMask& mask) const {
+  const VisualMemory& memory = ranking_->memory();
+  PlaceEvidence found{.components = memory.shape().components};
+  if (matches.empty()) return found;
+  const auto is_excluded = [&](ViewId view) {
+    return std::ranges::find(mask.excluded_views, view) != mask.excluded_views.end();
+  };
+  found.views = static_cast<int>(memory.size()) -
+                static_cast<int>(std::ranges::count_if(
+                    mask.excluded_views, [&](ViewId view) { return memory.contains(view); }));
+  std::vector<const RankedMatch*> best(matches.size());
+  std::ranges::transform(matches, best.begin(), [](const RankedMatch& match) { return &match; });
+  const auto end =
+      best.begin() + static_cast<std::ptrdiff_t>(std::min(examined_matches, best.size()));
+  std::ranges::partial_sort(best.begin(), end, best.end(), {}, [](const RankedMatch* match) {
+    return std::pair(match->columns.difference, match->match.view);
+  });
+  const ColumnProfiles asked(query, 0, mask.allowed_rows);
+  std::vector<double> differences;
+  for (auto match = best.begin(); match != end; ++match) {
+    const ColumnProfiles reference = profiles((*match)->match.view, mask.allowed_rows);
+    const ColumnMatch turned = match_columns(asked, reference);
+    found.of_all_columns = std::min(found.of_all_columns, turned.difference);
+    differences.push_back(better_half(asked, reference, turned.heading_rad));
+  }
+  std::ranges::sort(differences);
+  found.difference = differences.front();
+  found.tenth = differences[std::min<std::size_t>(10, differences.size()) - 1];
+  const ColumnProfiles elsewhere(mirrored(query), 0, mask.allowed_rows);
+  std::vector<double> by_chance;
+  for (std::size_t i = 0; i < sample_.size() && by_chance.size() < chance_views; ++i) {
+    if (is_excluded(sample_[i])) continue;
+    const ColumnProfiles reference =
+        mask.allowed_rows.empty() ? profiles_[i] : profiles(sample_[i], mask.allowed_rows);
+    by_chance.push_back(
+        better_half(elsewhere, reference, match_columns(elsewhere, reference).heading_rad));
+  }
+  if (!by_chance.empty()) {
+    const double middle = mean(by_chance);
+    double variance = 0.0;
+    for (const double value : by_chance) variance += (value - middle) * (value - middle);
+    variance /= static_cast<double>(std::max<std::size_t>(1, by_chance.size() - 1));
+    found.chance = std::max(0.0, middle - decile_deviations * std::sqrt(variance));
+  }
+  // A picture without structure is like any other without structure.
+  const auto is_flat = [](std::uint8_t value) { return value == 128; };
+  if (std::ranges::all_of(asked.values(), is_flat)) found.chance = 0.0;
+  return found;
 }
 
 }  // namespace panonav

@@ -1,6 +1,10 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <optional>
+#include <span>
+#include <vector>
 
 #include "panonav/core/options.hpp"
 #include "panonav/localisation/column_ranking.hpp"
@@ -14,9 +18,10 @@ struct PlaceModelOptions {
 };
 void visit_options(PlaceModelOptions& options, OptionVisitor& visitor);
 
-/// The criterion that tells a place of the memory from an unknown one: the difference of the best
-/// match column by column (`ColumnMatch`) must not exceed `threshold`. Plain numbers, so that it
-/// can be kept beside the memory.
+/// How views of one memory differ (`ColumnMatch`), learnt from it: from when on the nearest views
+/// do not explain a query (`neighbouring`), and up to which difference a view counts as explained
+/// when nothing else is known of it (`threshold`). Plain numbers, so that it can be kept beside the
+/// memory.
 struct PlaceModel {
   /// Places that have nothing to do with each other differ by at least this in scenes of all kinds
   /// (docs/decisions.md); what a place with views unlike each other might suggest beyond is not
@@ -42,7 +47,7 @@ struct PlaceModel {
   friend bool operator==(const PlaceModel&, const PlaceModel&) = default;
 };
 
-/// Learns the criterion from the memory itself; no other scene and no label is needed.
+/// Learns from the memory itself; no other scene and no label is needed.
 ///
 /// A view mirrored left to right shows a place that does not exist, with all the brightness, edges
 /// and textures of this memory: what its best match reaches by chance, a place elsewhere reaches
@@ -57,5 +62,60 @@ struct PlaceModel {
 /// view: 0.2 s for the defaults and a memory of 1000 views.
 [[nodiscard]] PlaceModel learn_place_model(const ColumnRanking& ranking,
                                            const PlaceModelOptions& options = {});
+
+/// What one query tells of whether its place is in the memory.
+struct PlaceEvidence {
+  /// Of the best match, as `ColumnMatch::difference`, over the better half of the compared columns
+  /// alone: what stands in view or has moved changes the other half.
+  double difference = 1.0;
+  /// The smallest over all columns.
+  double of_all_columns = 1.0;
+  /// As `difference`, of the tenth best match: many views of an unknown place fit equally badly.
+  double tenth = 1.0;
+  /// As `difference`, of the mirrored query and views drawn from the memory: mean less 1.28
+  /// standard deviations, so that one of ten differs by less if they are Gaussian. What the query's
+  /// own brightness, edges and textures reach in this memory by chance.
+  double chance = 1.0;
+  int views = 0;       ///< of which the best was chosen
+  int components = 0;  ///< of the memory
+};
+
+/// What `place_probability` weighs: 1 and the logarithms of the difference's shares of chance and
+/// of the tenth best, of the number of views, of how many times the difference exceeds 0.4 and of
+/// the components' share of 15. A small difference tells nothing by itself, because scenes of
+/// little contrast differ little; a large one does. Views and components count within what was
+/// learnt from.
+inline constexpr int place_features = 6;
+[[nodiscard]] std::array<double, place_features> features_of(
+    const PlaceEvidence& evidence) noexcept;
+
+/// Probability that a place with this evidence is one of the memory's, where the prior is a third:
+/// as many queries are from the memory's place, from another that is built alike and from
+/// elsewhere. Logistic regression with coefficients that `bench/place_probability` learns on
+/// built-in scenes (docs/decisions.md). 0 where there is nothing to see.
+[[nodiscard]] double place_probability(const PlaceEvidence& evidence) noexcept;
+
+/// Tells a place of the memory from an unknown one, view by view. All components of the memory
+/// count, however many the search compares.
+class PlaceCriterion {
+ public:
+  /// Keeps the column profiles of 80 views drawn from the memory, each by its own number, so that a
+  /// view more or less leaves the others in. The ranking must outlive *this.
+  explicit PlaceCriterion(const ColumnRanking& ranking);
+
+  /// `matches`: what the search found with this mask; of these the 16 that differ least are looked
+  /// at. Chance is that of the first 64 drawn views that are not excluded. Cost: 0.15 ms.
+  [[nodiscard]] PlaceEvidence evidence(const PackedSignature& query,
+                                       std::span<const RankedMatch> matches,
+                                       const SearchMask& mask = {}) const;
+
+ private:
+  [[nodiscard]] ColumnProfiles profiles(ViewId view,
+                                        std::span<const std::uint8_t> allowed_rows) const;
+
+  const ColumnRanking* ranking_;
+  std::vector<ViewId> sample_;
+  std::vector<ColumnProfiles> profiles_;  ///< of these, over all rows
+};
 
 }  // namespace panonav

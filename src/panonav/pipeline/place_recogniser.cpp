@@ -102,7 +102,8 @@ Place PlaceRecogniser::localise(const Observation& observation,
   }
   const SearchMask mask{excluded, {}};
   const Localisation found = localiser.localise(query, mask, features ? &*features : nullptr);
-  Place place{.known = found.known,
+  Place place{.known_probability = found.known_probability,
+              .known = found.known,
               .heading_rad = found.heading_rad,
               .components = found.components,
               .bytes_read = found.bytes_read};

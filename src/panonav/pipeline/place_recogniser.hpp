@@ -37,7 +37,8 @@ struct PlacePosition {
 
 /// What one picture tells of where it was taken; see `Localisation` for what each means.
 struct Place {
-  bool known = false;               ///< false: no place of the memory
+  double known_probability = 0.0;   ///< that the place is one of the memory's
+  bool known = false;               ///< at least 0.5 probable
   std::vector<PlaceMatch> matches;  ///< the best first; listed for unknown places, too
   std::optional<PlacePosition> position;
   std::optional<double> heading_rad;
