@@ -137,7 +137,7 @@ std::array<double, place_features> features_of(const PlaceEvidence& evidence) no
 
 double place_probability(const PlaceEvidence& evidence) noexcept {
   if (evidence.views < 1 || !(evidence.chance > 0.0)) return 0.0;
-  constexpr std::array<double, place_features> learnt{2.49, -16.21, -11.09, -1.45, -7.00, 0.91};
+  constexpr std::array<double, place_features> learnt{-1.58, -16.46, -9.30, -0.60, -6.43, 0.91};
   const auto features = features_of(evidence);
   const double z = std::inner_product(learnt.begin(), learnt.end(), features.begin(), 0.0);
   return 1.0 / (1.0 + std::exp(-z));
