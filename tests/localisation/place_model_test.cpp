@@ -200,7 +200,7 @@ TEST(PlaceModel, ProbabilityFallsWithTheDifferenceAndIsNoneWhereNothingIsSeen) {
     EXPECT_LE(probability, last);
     last = probability;
   }
-  EXPECT_LT(last, 0.01);
+  EXPECT_LT(last, 0.05);
   evidence.difference = evidence.of_all_columns = 0.05;
   EXPECT_GT(place_probability(evidence), 0.99);
   evidence.chance = 0.0;
