@@ -38,7 +38,7 @@ bool FeatureTrial::tell_more() const {
 
 FeatureTrial try_features(const ColumnRanking& ranking, const NeighbourSupport& support,
                           const FeatureSource& features) {
-  constexpr int max_sampled = 40;
+  constexpr int max_sampled = 100;  // as of the other models
   constexpr double right_ratio = 1.5;
   const VisualMemory& memory = ranking.memory();
   const std::span<const ViewId> views = memory.views();

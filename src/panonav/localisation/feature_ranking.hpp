@@ -36,7 +36,7 @@ struct FeatureTrial {
 };
 
 /// Whether local features find the places of this memory better than columns do: between views that
-/// are far apart they do, between neighbours 0.3 m apart columns are right already. 40 views are
+/// are far apart they do, between neighbours 0.3 m apart columns are right already. 100 views are
 /// left out, at most, or all; the nearest view is the one at the smallest distance, or the next in
 /// the order of appending where views have no positions. Cost: 3 ms for each view left out.
 [[nodiscard]] FeatureTrial try_features(const ColumnRanking& ranking,
