@@ -303,5 +303,12 @@ TEST_P(RecordedTopics, GroundTruthGivesPoses) {
   EXPECT_NEAR(*entries[1].pose->heading_rad, pose_at(0.5).heading_rad, 1e-12);
 }
 
+TEST(RecordedTopicsLimit, MorePicturesThanAMillionAreRefused) {
+  const auto recorded = std::make_shared<RecordedMessages>(MessageEncoding::cdr);
+  for (int i = 0; i <= 1'000'000; ++i) recorded->add("/camera", i, ros::CompressedImage{});
+  EXPECT_EQ(message_of<FileError>([&] { (void)read_recording(recorded, "drive.bag", sphere); }),
+            "drive.bag: has more than 1000000 pictures; allowed: as many");
+}
+
 }  // namespace
 }  // namespace panonav::testing

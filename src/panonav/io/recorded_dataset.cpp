@@ -22,6 +22,7 @@ constexpr std::int64_t second_ns = 1'000'000'000;
 /// A robot turns and brakes within a second: what lies between is not known.
 constexpr std::int64_t max_gap_ns = second_ns;
 constexpr std::size_t max_samples = 10'000'000;
+constexpr std::size_t max_pictures = 1'000'000;  // nine hours of 30 a second
 constexpr std::string_view ground_truth = "/ground_truth";
 
 struct Times {
@@ -309,6 +310,10 @@ class Collector {
       } catch (const ContractError& error) {
         if (unreadable_++ == 0) first_error_ = error.what();
         return;
+      }
+      if (pictures_.size() > max_pictures) {
+        throw FileError(path_.string(), "has more than " + std::to_string(max_pictures) +
+                                            " pictures; allowed: as many");
       }
       if (samples_ > max_samples) {
         throw FileError(path_.string(),

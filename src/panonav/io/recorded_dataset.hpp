@@ -47,7 +47,8 @@ struct RecordedDataset {
 /// Throws FileError: no or several topics of pictures and none named, a topic that is not there or
 /// of another type, named frames that no chain of transforms connects, and what
 /// `Recording::open` throws. Cost: one pass over the messages of these topics. Memory: 400 bytes a
-/// picture and 80 a message of the other topics, of which there may be 10 million.
+/// picture and 80 a message of the other topics, of which there may be 10 million; a million
+/// pictures.
 [[nodiscard]] RecordedDataset read_recording(const std::filesystem::path& path,
                                              PictureSource source,
                                              const RecordingTopics& topics = {});
