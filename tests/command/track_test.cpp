@@ -95,10 +95,11 @@ TEST_F(Track, JsonLinesHaveExactlyTheDocumentedFields) {
   ASSERT_EQ(all.size(), truth.size());
   for (std::size_t i = 0; i < all.size(); ++i) {
     const json& image = all[i];
-    EXPECT_EQ(keys_of(image), (std::set<std::string>{
-                                  "file", "stamp_s", "state", "pose", "inside", "modes", "spread_m",
-                                  "particles", "effective_particles", "resampled", "injected",
-                                  "difference_here", "difference_anywhere", "ground_truth"}));
+    EXPECT_EQ(keys_of(image),
+              (std::set<std::string>{"file", "stamp_s", "state", "pose", "inside", "probability",
+                                     "modes", "spread_m", "particles", "effective_particles",
+                                     "resampled", "injected", "difference_here",
+                                     "difference_anywhere", "ground_truth"}));
     EXPECT_EQ(image["file"], view_name(i));
     EXPECT_EQ(image["stamp_s"], 0.5 * static_cast<double>(i));
     const std::string state = image["state"];
@@ -114,6 +115,10 @@ TEST_F(Track, JsonLinesHaveExactlyTheDocumentedFields) {
     EXPECT_GE(image["inside"].get<double>(), 0.0);
     EXPECT_LE(image["inside"].get<double>(), 1.0);
     EXPECT_EQ(image["inside"].get<double>() < 0.5, state == "lost");
+    EXPECT_EQ(image["probability"].get<double>(),
+              image["modes"].empty()
+                  ? 0.0
+                  : image["inside"].get<double>() * image["modes"][0]["weight"].get<double>());
     EXPECT_GE(image["injected"].get<int>(), 0);
     EXPECT_TRUE(image["resampled"].is_boolean());
     double weight = 0.0;

@@ -151,6 +151,7 @@ ordered_json as_json(const TrackedImage& image) {
           {"state", name_of(estimate.state)},
           {"pose", estimate.pose ? as_json(*estimate.pose) : ordered_json()},
           {"inside", estimate.inside},
+          {"probability", estimate.probability},
           {"modes", std::move(modes)},
           {"spread_m", estimate.spread_m},
           {"particles", estimate.particles},

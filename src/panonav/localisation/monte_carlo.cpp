@@ -456,6 +456,7 @@ void MonteCarloLocaliser::Implementation::describe(MonteCarloEstimate& estimate,
   estimate.modes = found.modes;
   estimate.spread_m = spread_of(particles);
   estimate.inside = inside;
+  estimate.probability = found.modes.empty() ? 0.0 : inside * found.modes.front().weight;
   estimate.state = LocalisationState::lost;
   if (inside < 0.5) return;
   if (!found.modes.empty() && !is_memorised(found.modes.front().mean.position())) return;

@@ -69,6 +69,9 @@ struct MonteCarloEstimate {
   double log_there = 0.0;
   /// Belief that the robot is in the memorised area, 0 .. 1; lost below one half.
   double inside = 0.0;
+  /// That the robot is at the heaviest mode: `inside` times the mode's weight. Of what is said with
+  /// 0.9 and more inside the memorised area, more than nine of ten are right (docs/decisions.md).
+  double probability = 0.0;
   std::uint64_t views_compared = 0;  ///< column by column
 };
 
