@@ -113,6 +113,10 @@ void Session::clear_bar() {
   bar_drawn_ = false;
 }
 
+void Session::flush() {
+  std::cout.flush();
+}
+
 void Session::finish_output() {
   std::cout.flush();
   if (!std::cout) throw FileError("standard output", "cannot be written; is the disk full?");

@@ -41,6 +41,8 @@ class Session {
   [[nodiscard]] ExitCode no_answer(std::string_view line);
   /// A command to type, on standard output, its words as a shell wants them. Silent with --quiet.
   void suggest(std::initializer_list<std::string_view> command, std::string_view lead = "Next:");
+  /// What was printed reaches its reader now.
+  void flush();
   /// Throws FileError when standard output could not be written (a full disk behind a redirection).
   void finish_output();
 

@@ -36,6 +36,7 @@ namespace panonav::command {
 [[nodiscard]] Verb show_verb();
 [[nodiscard]] Verb simulate_verb();
 [[nodiscard]] Verb track_verb();
+[[nodiscard]] Verb run_verb();
 [[nodiscard]] Verb undo_verb();
 [[nodiscard]] Verb unwrap_verb();
 [[nodiscard]] Verb verify_verb();

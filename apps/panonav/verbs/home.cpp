@@ -152,7 +152,9 @@ ExitCode home(const Arguments& arguments, const HomeArguments& wanted, Session& 
   const auto recording = open_recording(wanted.current, wanted.pictures, known, session);
   std::optional<PictureSource> goal_source = source_beside(wanted.goal);
   if (!goal_source) goal_source = recording.source;
-  const auto goals = open_recording(wanted.goal, wanted.pictures, goal_source, session);
+  PictureArguments of_goal = wanted.pictures;
+  of_goal.part = {};
+  const auto goals = open_recording(wanted.goal, of_goal, goal_source, session);
   const HomingEncoder encoder(goals.source, views);
   const Panorama picture = encoder.panorama(read_observation(goals.entries.front()));
   const Goal goal{wanted.goal, std::nullopt, encoder.view(picture), picture};

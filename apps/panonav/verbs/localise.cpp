@@ -13,6 +13,7 @@
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "reports/localise_report.hpp"
+#include "verbs/localised_query.hpp"
 #include "verbs/recording.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES
 #include "reports/report_page.hpp"
@@ -34,52 +35,6 @@ struct LocaliseArguments {
   std::optional<std::string> out;
   std::optional<std::string> report;
 };
-
-ordered_json optional_number(const std::optional<double>& value) {
-  return value ? ordered_json(*value) : ordered_json();
-}
-
-ordered_json as_json(const LocalisedQuery& answer, bool areas) {
-  if (!answer.error.empty()) return {{"file", answer.file}, {"error", answer.error}};
-  const Place& found = answer.place;
-  auto matches = ordered_json::array();
-  for (const PlaceMatch& match : found.matches) {
-    matches.push_back({{"file", match.name},
-                       {"dissimilarity", match.dissimilarity},
-                       {"column_difference", match.column_difference},
-                       {"heading_rad", optional_number(match.heading_rad)}});
-    if (match.verified_features) {
-      matches.back()["verified_features"] = *match.verified_features;
-    }
-  }
-  ordered_json json{{"file", answer.file},
-                    {"known", found.known},
-                    {"known_probability", found.known_probability},
-                    {"matches", std::move(matches)},
-                    {"position", nullptr},
-                    {"heading_rad", optional_number(found.heading_rad)},
-                    {"components", found.components},
-                    {"bytes_read", found.bytes_read},
-                    {"turned_rad", answer.turned_rad}};
-  if (found.position) {
-    json["position"] = {{"x_m", found.position->x_m},
-                        {"y_m", found.position->y_m},
-                        {"radius_m", optional_number(found.position->radius_m)}};
-  }
-  if (areas) {
-    auto levels = ordered_json::array();
-    for (const auto& level : found.areas) {
-      levels.push_back(
-          {{"components", level.components},
-           {"candidates", level.candidates.size()},
-           {"area_m2", optional_number(level.area_m2)},
-           {"radius_m", level.region ? ordered_json(level.region->radius_m) : ordered_json()},
-           {"bytes_read", level.bytes_read}});
-    }
-    json["areas"] = std::move(levels);
-  }
-  return json;
-}
 
 /// One line for each picture, with the header of docs/formats.md; unknown values are empty.
 std::string as_csv(const std::vector<LocalisedQuery>& answers) {
@@ -118,38 +73,6 @@ std::string as_csv(const std::vector<LocalisedQuery>& answers) {
   return table;
 }
 
-std::string as_text(const LocalisedQuery& answer, Session& session) {
-  const Place& found = answer.place;
-  std::string line = answer.file + "  ";
-  if (found.matches.empty()) return line + session.bad("nothing to compare with");
-  const PlaceMatch& nearest = found.matches.front();
-  if (!found.known) {
-    return line + session.bad("unknown place") + "  (probability " +
-           fixed(found.known_probability, 2) + "; most similar: " + nearest.name + ")";
-  }
-  line +=
-      session.good("near " + nearest.name) + "  probability " + fixed(found.known_probability, 2);
-  if (found.position) {
-    line +=
-        "  x " + fixed(found.position->x_m, 2) + " m  y " + fixed(found.position->y_m, 2) + " m";
-    if (found.position->radius_m) line += "  within " + fixed(*found.position->radius_m, 2) + " m";
-  }
-  if (found.heading_rad) {
-    line += "  heading " + fixed(degrees(*found.heading_rad), 1) + " degrees";
-  } else if (nearest.heading_rad) {
-    line += "  turned " + fixed(degrees(*nearest.heading_rad), 1) + " degrees from it";
-  }
-  for (const auto& level : found.areas) {
-    line += "\n    " + std::to_string(level.components) +
-            (level.components == 1 ? " component: " : " components: ") +
-            std::to_string(level.candidates.size()) +
-            (level.candidates.size() == 1 ? " view" : " views");
-    if (level.area_m2) line += ", " + fixed(*level.area_m2, 2) + " m2";
-    if (level.region) line += ", within " + fixed(level.region->radius_m, 2) + " m";
-  }
-  return line;
-}
-
 /// Turns the robot as it is asked for; gives by how much.
 double turn(Observation& observation, const PlaceRecogniser& recogniser,
             const LocaliseArguments& wanted, std::size_t index) {
@@ -179,6 +102,10 @@ Dataset open_queries(const LocaliseArguments& wanted, const MemoryFile& file, Se
     return open_recording(input, wanted.pictures, file, session);
   };
   if (wanted.inputs.size() == 1) return open(wanted.inputs.front());
+  const PartArguments& part = wanted.pictures.part;
+  if (part.from_s || part.to_s || part.every) {
+    throw UsageError("--from, --to and --every go with one recording, not with several pictures");
+  }
   std::error_code ignored;
   std::optional<Dataset> queries;
   for (const std::string& input : wanted.inputs) {
@@ -291,8 +218,10 @@ ExitCode localise(const Arguments& arguments, const LocaliseArguments& wanted, S
 Run declare_localise(Arguments& arguments) {
   auto wanted = std::make_shared<LocaliseArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file");
-  arguments.positionals("INPUT", wanted->inputs,
-                        "Data set, folder of pictures, or one or more pictures");
+  arguments.positionals(
+      "INPUT", wanted->inputs,
+      "Data set, folder of pictures, video, recording of topics, - for JPEG pictures "
+      "on standard input, or one or more pictures");
   declare_pictures(arguments, wanted->pictures);
   arguments.option("-o,--out FILE", wanted->out, "Write a CSV table, one line for each picture");
 #ifdef PANONAV_COMMAND_SIMULATES

@@ -246,8 +246,9 @@ ExitCode map(const Arguments& arguments, const MapArguments& wanted, Session& se
 
 Run declare_map(Arguments& arguments) {
   auto wanted = std::make_shared<MapArguments>();
-  arguments.positional("DATASET", wanted->dataset,
-                       "Data set or folder of pictures, in the order in which they were taken");
+  arguments.positional(
+      "DATASET", wanted->dataset,
+      "Data set, folder of pictures, video or recording, in the order in which they were taken");
   arguments.positional("MEMORY", wanted->memory,
                        "Memory file (NAME.panonav); views that it does not know are appended");
   declare_pictures(arguments, wanted->pictures);

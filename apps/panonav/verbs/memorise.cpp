@@ -147,7 +147,10 @@ ExitCode memorise(const Arguments& arguments, const MemoriseArguments& wanted, S
 
 Run declare_memorise(Arguments& arguments) {
   auto wanted = std::make_shared<MemoriseArguments>();
-  arguments.positional("INPUT", wanted->input, "Data set, folder of pictures, or one picture");
+  arguments.positional(
+      "INPUT", wanted->input,
+      "Data set, folder of pictures, one picture, video, recording of topics (MCAP, "
+      "rosbag2, ROS 1 bag), or - for JPEG pictures on standard input");
   arguments.positional("MEMORY", wanted->memory,
                        "Memory file (NAME.panonav); grows if it is there");
   declare_pictures(arguments, wanted->pictures);

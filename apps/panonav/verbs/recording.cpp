@@ -1,5 +1,8 @@
 #include "verbs/recording.hpp"
 
+#include <unistd.h>
+
+#include <charconv>
 #include <cmath>
 #include <filesystem>
 
@@ -9,6 +12,9 @@
 #include "panonav/geometry/positions.hpp"
 #include "panonav/io/camera_file.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/io/jpeg_stream.hpp"
+#include "panonav/io/live_pictures.hpp"
+#include "panonav/io/video_file.hpp"
 #include "panonav/motion/headed_path.hpp"
 
 namespace panonav::command {
@@ -103,9 +109,54 @@ void declare_topics(Arguments& arguments, RecordingTopics& topics) {
   arguments.uncommon({"--image-topic", "--odometry-topic", "--odometry-frames", "--imu-topic"});
 }
 
+void declare_part(Arguments& arguments, PartArguments& part, bool every) {
+  arguments.option("--from SECONDS", part.from_s,
+                   "Begin this long after the first picture of a recording with stamps");
+  arguments.option("--to SECONDS", part.to_s, "End this long after its first picture");
+  if (every) {
+    arguments.option("--every N|TIME", part.every,
+                     "Take every N-th picture only, or one in this time, such as 0.5s");
+  }
+  arguments.uncommon({"--from", "--to"});
+}
+
 void declare_pictures(Arguments& arguments, PictureArguments& pictures) {
   declare_layout(arguments, pictures);
   declare_topics(arguments, pictures.topics);
+  declare_part(arguments, pictures.part, true);
+}
+
+PictureSelection selection_of(const PartArguments& part) {
+  PictureSelection selection{.from_s = part.from_s, .to_s = part.to_s};
+  for (const auto& [flag, value] : {std::pair{"--from", part.from_s}, {"--to", part.to_s}}) {
+    if (value && *value < 0.0) {
+      throw UsageError(std::string(flag) + " is " + to_text(*value) + "; allowed: 0 or more");
+    }
+  }
+  if (part.from_s && part.to_s && *part.from_s > *part.to_s) {
+    throw UsageError("--from is " + to_text(*part.from_s) + "; allowed: at most --to, which is " +
+                     to_text(*part.to_s));
+  }
+  if (!part.every) return selection;
+  std::string text = *part.every;
+  const bool is_time = text.ends_with('s');
+  if (is_time) text.pop_back();
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool number = error == std::errc() && end == text.data() + text.size();
+  constexpr double most = 1e9;
+  const bool fits = number && value > 0.0 && value <= most &&
+                    (is_time || (value >= 1.0 && value == std::floor(value)));
+  if (!fits) {
+    throw UsageError("--every is " + readable_line(*part.every) +
+                     "; allowed: a whole number from 1 on, or seconds such as 0.5s");
+  }
+  if (is_time) {
+    selection.every_s = value;
+  } else {
+    selection.every = static_cast<int>(value);
+  }
+  return selection;
 }
 
 std::optional<PictureSource> picture_source(const PictureArguments& pictures) {
@@ -188,10 +239,24 @@ Dataset open_topics(const std::string& input, const RecordingTopics& topics,
 
 }  // namespace
 
-Dataset open_recording(const std::string& input, const PictureArguments& pictures,
-                       const std::optional<PictureSource>& remembered, Session& session) {
+namespace {
+
+/// All pictures; of a video those that are selected, as the others need not be decoded then.
+Dataset open_whole(const std::string& input, const PictureArguments& pictures,
+                   const PictureSelection& selection,
+                   const std::optional<PictureSource>& remembered, Session& session) {
   const auto stated = picture_source(pictures);
   std::error_code ignored;
+  if (input == "-") {
+    const auto& source = stated ? stated : remembered;
+    if (!source) throw UsageError("say what the pictures on standard input show with --kind");
+    if (pictures.recursive) throw UsageError("--recursive goes with a folder");
+    refuse_topics("standard input", pictures.topics);
+    return read_jpeg_stream(STDIN_FILENO, "standard input", *source);
+  }
+  if (is_live(input)) {
+    throw UsageError(input + " is a live source; panonav run takes pictures of it");
+  }
   if (!fs::exists(input, ignored)) throw FileError(input, "there is no such file or folder");
   if (is_recording(input)) {
     const auto& source = stated ? stated : remembered;
@@ -205,6 +270,16 @@ Dataset open_recording(const std::string& input, const PictureArguments& picture
     return recording;
   }
   refuse_topics(input, pictures.topics);
+  if (is_video(input) && fs::is_regular_file(input, ignored)) {
+    const auto& source = stated ? stated : remembered;
+    if (!source) {
+      throw UsageError(input + " is a video; say what its pictures show with --kind");
+    }
+    if (pictures.recursive) throw UsageError(input + " is a video; leave out --recursive");
+    Dataset recording = read_video(input, *source, selection);
+    if (stated) note_other_kind(recording, session);
+    return recording;
+  }
   if (fs::is_directory(input, ignored) && fs::exists(fs::path(input) / "dataset.toml", ignored)) {
     if (stated) {
       throw UsageError(input +
@@ -229,11 +304,30 @@ Dataset open_recording(const std::string& input, const PictureArguments& picture
   if (pictures.recursive && !is_folder) {
     throw UsageError(input + " is one picture; --recursive goes with a folder");
   }
+  if (!is_folder && (pictures.part.from_s || pictures.part.to_s || pictures.part.every)) {
+    throw UsageError(input + " is one picture; --from, --to and --every go with a recording");
+  }
   Dataset recording = is_folder
                           ? read_picture_folder(input, *source, {.recursive = pictures.recursive})
                           : single_picture(input, *source);
   note_left_out(recording, session);
   if (stated) note_other_kind(recording, session);
+  return recording;
+}
+
+void select_part(Dataset& recording, const PictureSelection& selection, const std::string& input) {
+  if (selection.by_time() || selection.every > 1) {
+    if (!is_video(input)) select_pictures(recording, selection);
+  }
+}
+
+}  // namespace
+
+Dataset open_recording(const std::string& input, const PictureArguments& pictures,
+                       const std::optional<PictureSource>& remembered, Session& session) {
+  const PictureSelection selection = selection_of(pictures.part);
+  Dataset recording = open_whole(input, pictures, selection, remembered, session);
+  select_part(recording, selection, input);
   return recording;
 }
 
@@ -261,15 +355,18 @@ Dataset open_recording(const std::string& input, const PictureArguments& picture
   return recording;
 }
 
-Dataset read_run(const std::string& input, const RecordingTopics& topics, const MemoryFile& memory,
-                 Session& session) {
+Dataset read_run(const std::string& input, const RecordingTopics& topics, const PartArguments& part,
+                 const MemoryFile& memory, Session& session) {
   std::error_code ignored;
   if (fs::exists(fs::path(input) / "dataset.toml", ignored)) {
     refuse_topics(input, topics);
-    return read_dataset(input);
+    Dataset run = read_dataset(input);
+    select_part(run, selection_of(part), input);
+    return run;
   }
   PictureArguments pictures;
   pictures.topics = topics;
+  pictures.part = part;
   return open_recording(input, pictures, memory, session);
 }
 
@@ -294,7 +391,7 @@ std::string how_to_add(const std::string& folder, const std::string& columns,
 Dataset read_described(const std::string& folder, const PictureArguments& pictures,
                        const std::optional<PictureSource>& remembered, const std::string& columns,
                        const std::string& values, Session& session) {
-  if (is_recording(folder) || picture_source(pictures)) {
+  if (is_recording(folder) || is_video(folder) || picture_source(pictures)) {
     return open_recording(folder, pictures, remembered, session);
   }
   refuse_topics(folder, pictures.topics);
@@ -304,7 +401,9 @@ Dataset read_described(const std::string& folder, const PictureArguments& pictur
     throw FileError(folder, "has no dataset.toml, so nothing tells where its pictures were taken" +
                                 how_to_add(folder, columns, values));
   }
-  return read_dataset(folder);
+  Dataset recording = read_dataset(folder);
+  select_part(recording, selection_of(pictures.part), folder);
+  return recording;
 }
 
 std::vector<Pose2> dataset_poses(const Dataset& dataset) {

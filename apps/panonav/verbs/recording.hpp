@@ -17,6 +17,13 @@
 
 namespace panonav::command {
 
+/// Which pictures of a recording a user wants.
+struct PartArguments {
+  std::optional<double> from_s;
+  std::optional<double> to_s;
+  std::optional<std::string> every;  ///< "5": each fifth picture; "0.5s": one in half a second
+};
+
 /// What a user says of pictures that come without a dataset.toml.
 struct PictureArguments {
   std::optional<std::string> kind;
@@ -26,21 +33,27 @@ struct PictureArguments {
   std::optional<std::pair<double, double>> elevation_deg;
   bool recursive = false;  ///< a folder of pictures: those of the folders within, too
   RecordingTopics topics;  ///< of a recording of topics
+  PartArguments part;
 };
 
 /// Adds --kind, --camera, --columns-run, --forward-column and --elevation-deg.
 void declare_layout(Arguments& arguments, PictureArguments& pictures);
 /// Adds --image-topic, --odometry-topic, --odometry-frames and --imu-topic.
 void declare_topics(Arguments& arguments, RecordingTopics& topics);
-/// Both.
+/// Adds --from and --to, and unless the verb has one of its own, --every.
+void declare_part(Arguments& arguments, PartArguments& part, bool every);
+/// All three.
 void declare_pictures(Arguments& arguments, PictureArguments& pictures);
 
 /// Empty when the user said nothing. Throws UsageError on flags that do not fit together, FileError
 /// on the camera file.
 [[nodiscard]] std::optional<PictureSource> picture_source(const PictureArguments& pictures);
 
-/// A data set, a folder of pictures, one picture or a recording of topics. `remembered` is how
-/// pictures lay that the memory was made from: it reads what comes without a description of its
+/// The part that is wanted. Throws UsageError on values out of range.
+[[nodiscard]] PictureSelection selection_of(const PartArguments& part);
+
+/// A data set, a folder of pictures, one picture, a video or a recording of topics. `remembered` is
+/// how pictures lay that the memory was made from: it reads what comes without a description of its
 /// own. A data set describes itself, so flags beside it throw UsageError, as topics do of what has
 /// none. Throws FileError. Notes what of a folder or recording is left out and pictures that look
 /// as if they were of another kind.
@@ -55,7 +68,8 @@ void declare_pictures(Arguments& arguments, PictureArguments& pictures);
 /// The recording of a run: a data set, or a folder or recording of pictures that lie as those of
 /// the memory.
 [[nodiscard]] Dataset read_run(const std::string& input, const RecordingTopics& topics,
-                               const MemoryFile& memory, Session& session);
+                               const PartArguments& part, const MemoryFile& memory,
+                               Session& session);
 
 /// How to make a recording tell more, for the end of an error's line: the table of a data set gets
 /// these columns, a folder of pictures alone a dataset.toml first. `values`: of an example.

@@ -24,6 +24,7 @@ struct FollowArguments {
   std::string memory;
   std::string dataset;
   RecordingTopics topics;
+  PartArguments part;
   std::optional<std::string> name;
   int every = 1;
   bool no_odometry = false;
@@ -134,7 +135,7 @@ std::vector<double> seconds_of(const Dataset& run, const FollowArguments& wanted
 
 ExitCode follow_run(const Arguments& arguments, const FollowArguments& wanted, Session& session) {
   const auto memory = MemoryFile::open(wanted.memory, Access::read_only);
-  const Dataset run = read_run(wanted.dataset, wanted.topics, memory, session);
+  const Dataset run = read_run(wanted.dataset, wanted.topics, wanted.part, memory, session);
   if (odometry_poses(run).empty()) {
     arguments.refuse_unused({"--recovery-m", "--surprise-m"},
                             "as " + wanted.dataset + " has no odometry");
@@ -188,6 +189,7 @@ Run declare_route_follow(Arguments& arguments) {
   arguments.positional("DATASET", wanted->dataset,
                        "Data set, folder of pictures or recording of a later drive, in its order");
   declare_topics(arguments, wanted->topics);
+  declare_part(arguments, wanted->part, false);
   arguments.option("--name NAME", wanted->name,
                    "Name of the route; the only one where none is given");
   arguments.option("--every N", wanted->every, 1,

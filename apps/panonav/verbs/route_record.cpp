@@ -32,7 +32,6 @@ struct RecordArguments {
   PictureArguments pictures;
   std::string name = "route";
   std::optional<double> every_m;
-  int every = 1;
   std::optional<std::string> horizon_rows;
   bool odometry = false;
   std::optional<std::string> report;
@@ -56,12 +55,11 @@ std::pair<int, int> rows_from_text(const std::string& text) {
                    "'; allowed: FIRST-LAST, rows from 0 at the top, such as 17-20");
 }
 
-/// The entries that become lines: every N-th, and of these the ones far enough from the last.
-std::vector<std::size_t> chosen_entries(const std::vector<Pose2>& poses, int every,
-                                        double every_m) {
+/// The entries that become lines: those far enough from the last.
+std::vector<std::size_t> chosen_entries(const std::vector<Pose2>& poses, double every_m) {
   std::vector<std::size_t> chosen;
   std::optional<Pose2> last;
-  for (std::size_t i = 0; i < poses.size(); i += static_cast<std::size_t>(every)) {
+  for (std::size_t i = 0; i < poses.size(); ++i) {
     if (!RouteRecorder::is_due(last, poses[i], every_m)) continue;
     chosen.push_back(i);
     last = poses[i];
@@ -102,7 +100,7 @@ std::vector<Pose2> recorded_poses(const RecordArguments& wanted, const Dataset& 
 RecordedRoute record_lines(const RecordArguments& wanted, const Dataset& dataset,
                            const std::vector<Pose2>& poses, bool from_odometry,
                            RouteRecorder& recorder, Session& session) {
-  auto chosen = chosen_entries(poses, wanted.every, wanted.every_m.value_or(0.1));
+  auto chosen = chosen_entries(poses, wanted.every_m.value_or(0.1));
   std::vector<Pose2> drive;
   for (const std::size_t entry : chosen) drive.push_back(poses[entry]);
   const std::size_t recorded = recorder.skip_recorded(drive);
@@ -216,7 +214,6 @@ Run declare_route_record(Arguments& arguments) {
   arguments.option("--name NAME", wanted->name, "Name of the route; it grows if it is there");
   arguments.option("--every-m METRES", wanted->every_m,
                    "Way between lines, in metres (default 0.1)");
-  arguments.option("--every N", wanted->every, 1, "Take every N-th picture only");
   arguments.option("--horizon-rows FIRST-LAST", wanted->horizon_rows,
                    "Rows that show the horizon, from 0 at the top, of panoramas whose "
                    "elevations are not known; all without it");

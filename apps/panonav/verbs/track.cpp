@@ -45,6 +45,7 @@ struct TrackArguments {
   std::string memory;
   std::string dataset;
   RecordingTopics topics;
+  PartArguments part;
   int every = 1;
   std::optional<double> start_x_m;
   std::optional<double> start_y_m;
@@ -121,10 +122,6 @@ void start(Tracker& tracker, const TrackArguments& wanted) {
   }
 }
 
-ordered_json optional_number(const std::optional<double>& value) {
-  return value ? ordered_json(*value) : ordered_json();
-}
-
 ordered_json as_json(const Pose2& pose) {
   return {{"x_m", pose.x_m}, {"y_m", pose.y_m}, {"heading_rad", pose.heading_rad}};
 }
@@ -144,10 +141,10 @@ ordered_json as_json(const TrackedImage& image) {
   if (image.truth) {
     truth = {{"x_m", image.truth->x_m},
              {"y_m", image.truth->y_m},
-             {"heading_rad", optional_number(image.truth->heading_rad)}};
+             {"heading_rad", or_null(image.truth->heading_rad)}};
   }
   return {{"file", image.file},
-          {"stamp_s", optional_number(image.stamp_s)},
+          {"stamp_s", or_null(image.stamp_s)},
           {"state", name_of(estimate.state)},
           {"pose", estimate.pose ? as_json(*estimate.pose) : ordered_json()},
           {"inside", estimate.inside},
@@ -158,8 +155,8 @@ ordered_json as_json(const TrackedImage& image) {
           {"effective_particles", estimate.effective_particles},
           {"resampled", estimate.resampled},
           {"injected", estimate.injected},
-          {"difference_here", optional_number(estimate.difference_here)},
-          {"difference_anywhere", optional_number(estimate.difference_anywhere)},
+          {"difference_here", or_null(estimate.difference_here)},
+          {"difference_anywhere", or_null(estimate.difference_anywhere)},
           {"ground_truth", std::move(truth)}};
 }
 
@@ -222,7 +219,7 @@ void print_summary(const TrackSummary& summary, Session& session) {
 ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Session& session) {
   check(arguments, wanted);
   const auto file = MemoryFile::open(wanted.memory, Access::read_only);
-  Dataset run = read_run(wanted.dataset, wanted.topics, file, session);
+  Dataset run = read_run(wanted.dataset, wanted.topics, wanted.part, file, session);
   const bool visual = odometry_poses(run).empty();
   if (!visual) check_odometry(run, wanted.dataset);
   std::vector<double> seconds;
@@ -283,6 +280,7 @@ Run declare_track(Arguments& arguments) {
       "Data set, folder of pictures or recording, in the order of the run; without odometry motion "
       "is read from the pictures");
   declare_topics(arguments, wanted->topics);
+  declare_part(arguments, wanted->part, false);
   arguments.option("--every N", wanted->every, 1,
                    "Look at every N-th picture only and go by odometry between");
   arguments.option("--start-x-m", wanted->start_x_m,

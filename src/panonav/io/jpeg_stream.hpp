@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "panonav/io/dataset.hpp"
+
 namespace panonav {
 
 /// Cuts a stream of JPEG pictures that follow each other ("MJPEG") into pictures. Their segments
@@ -28,5 +30,11 @@ class JpegStream {
   std::vector<std::uint8_t> buffer_;  // from the beginning of a picture on
   std::size_t walked_ = 0;            // into it; 0: the beginning is still looked for
 };
+
+/// All pictures of such a stream as a data set: it is read to its end into a temporary file, which
+/// goes with the data set, so memory does not grow. Names are "000001.jpg" and so on. Throws
+/// FileError on `name` when no picture comes, or the temporary folder (TMPDIR) is full.
+[[nodiscard]] Dataset read_jpeg_stream(int descriptor, const std::string& name,
+                                       PictureSource source);
 
 }  // namespace panonav

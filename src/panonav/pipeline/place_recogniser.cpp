@@ -79,14 +79,14 @@ PlaceRecogniser::PlaceRecogniser(const std::filesystem::path& memory,
                                  const PlaceRecogniserOptions& options)
     : PlaceRecogniser(MemoryFile::open(memory, Access::read_only), options) {}
 PlaceRecogniser::PlaceRecogniser(const MemoryFile& file, const PlaceRecogniserOptions& options)
-    : implementation_(std::make_unique<const Implementation>(file, options)) {}
+    : implementation_(std::make_unique<Implementation>(file, options)) {}
 PlaceRecogniser::~PlaceRecogniser() = default;
 PlaceRecogniser::PlaceRecogniser(PlaceRecogniser&&) noexcept = default;
 PlaceRecogniser& PlaceRecogniser::operator=(PlaceRecogniser&&) noexcept = default;
 
 Place PlaceRecogniser::localise(const Observation& observation,
                                 std::span<const std::string> excluded_names) const {
-  const auto& [memory, encoder, localiser, accuracy, areas] = *implementation_;
+  const auto& [memory, encoder, localiser, accuracy, areas] = std::as_const(*implementation_);
   std::optional<LocalFeatures> features;
   PackedSignature query;
   if (localiser.ranks_by_features()) {
@@ -119,6 +119,10 @@ Place PlaceRecogniser::localise(const Observation& observation,
   }
   if (accuracy) place.areas = localise_hierarchically(memory, *areas, query, *accuracy, mask);
   return place;
+}
+
+void PlaceRecogniser::append(const ReferenceInfo& info, const PackedSignature& signature) {
+  implementation_->memory.append(signature, info);
 }
 
 const VisualMemory& PlaceRecogniser::memory() const noexcept {

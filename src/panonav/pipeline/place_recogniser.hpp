@@ -80,13 +80,18 @@ class PlaceRecogniser {
   [[nodiscard]] Place localise(const Observation& observation,
                                std::span<const std::string> excluded_names = {}) const;
 
+  /// A view that can be found from now on; it takes part in what is learnt of all views only in a
+  /// new PlaceRecogniser. The file is not touched. Not while another thread asks. Throws
+  /// ContractError as `VisualMemory::append`.
+  void append(const ReferenceInfo& info, const PackedSignature& signature);
+
   [[nodiscard]] const VisualMemory& memory() const noexcept;
   [[nodiscard]] const ViewEncoder& encoder() const noexcept;
   [[nodiscard]] const Localiser& localiser() const noexcept;
 
  private:
   struct Implementation;
-  std::unique_ptr<const Implementation> implementation_;
+  std::unique_ptr<Implementation> implementation_;
 };
 
 }  // namespace panonav

@@ -1,0 +1,82 @@
+#include "verbs/localised_query.hpp"
+
+#include "panonav/core/text.hpp"
+#include "panonav/geometry/angles.hpp"
+
+namespace panonav::command {
+
+ordered_json as_json(const LocalisedQuery& answer, bool areas) {
+  if (!answer.error.empty()) return {{"file", answer.file}, {"error", answer.error}};
+  const Place& found = answer.place;
+  auto matches = ordered_json::array();
+  for (const PlaceMatch& match : found.matches) {
+    matches.push_back({{"file", match.name},
+                       {"dissimilarity", match.dissimilarity},
+                       {"column_difference", match.column_difference},
+                       {"heading_rad", or_null(match.heading_rad)}});
+    if (match.verified_features) {
+      matches.back()["verified_features"] = *match.verified_features;
+    }
+  }
+  ordered_json json{{"file", answer.file},
+                    {"known", found.known},
+                    {"known_probability", found.known_probability},
+                    {"matches", std::move(matches)},
+                    {"position", nullptr},
+                    {"heading_rad", or_null(found.heading_rad)},
+                    {"components", found.components},
+                    {"bytes_read", found.bytes_read},
+                    {"turned_rad", answer.turned_rad}};
+  if (found.position) {
+    json["position"] = {{"x_m", found.position->x_m},
+                        {"y_m", found.position->y_m},
+                        {"radius_m", or_null(found.position->radius_m)}};
+  }
+  if (areas) {
+    auto levels = ordered_json::array();
+    for (const auto& level : found.areas) {
+      levels.push_back(
+          {{"components", level.components},
+           {"candidates", level.candidates.size()},
+           {"area_m2", or_null(level.area_m2)},
+           {"radius_m", level.region ? ordered_json(level.region->radius_m) : ordered_json()},
+           {"bytes_read", level.bytes_read}});
+    }
+    json["areas"] = std::move(levels);
+  }
+  return json;
+}
+
+std::string as_text(const LocalisedQuery& answer, Session& session) {
+  const Place& found = answer.place;
+  std::string line = answer.file + "  ";
+  if (found.matches.empty()) return line + session.bad("nothing to compare with");
+  const PlaceMatch& nearest = found.matches.front();
+  if (!found.known) {
+    return line + session.bad("unknown place") + "  (probability " +
+           fixed(found.known_probability, 2) + "; most similar: " + nearest.name + ")";
+  }
+  line +=
+      session.good("near " + nearest.name) + "  probability " + fixed(found.known_probability, 2);
+  if (found.position) {
+    line +=
+        "  x " + fixed(found.position->x_m, 2) + " m  y " + fixed(found.position->y_m, 2) + " m";
+    if (found.position->radius_m) line += "  within " + fixed(*found.position->radius_m, 2) + " m";
+  }
+  if (found.heading_rad) {
+    line += "  heading " + fixed(degrees(*found.heading_rad), 1) + " degrees";
+  } else if (nearest.heading_rad) {
+    line += "  turned " + fixed(degrees(*nearest.heading_rad), 1) + " degrees from it";
+  }
+  for (const auto& level : found.areas) {
+    line += "\n    " + std::to_string(level.components) +
+            (level.components == 1 ? " component: " : " components: ") +
+            std::to_string(level.candidates.size()) +
+            (level.candidates.size() == 1 ? " view" : " views");
+    if (level.area_m2) line += ", " + fixed(*level.area_m2, 2) + " m2";
+    if (level.region) line += ", within " + fixed(level.region->radius_m, 2) + " m";
+  }
+  return line;
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "panonav/pipeline/memoriser.hpp"
+#include "panonav/pipeline/place_recogniser.hpp"
+
+namespace panonav {
+
+struct LiveMemoryOptions {
+  /// Add the views of places that the memory does not know; without it the file is only read.
+  bool learn = false;
+  /// Between two views that are added: until the memory has learnt from a view, those after it look
+  /// as new as it did. Of observations with stamps.
+  double min_interval_s = 0.5;
+  /// Learn from the views that were added before the next observation is answered, so that the same
+  /// observations give the same bits; otherwise this happens beside the answers.
+  bool in_step = false;
+  MemoriserOptions memoriser;  ///< of views that are added; its source serves for both
+  LocaliserOptions localiser;
+};
+
+/// Memorises and localises in one go, for robots that come to new places:
+///   panonav::LiveMemory memory("walk.panonav", {.learn = true, .memoriser = {.source = source}});
+///   while (auto seen = source.next()) use(memory.answer(*seen));
+///   memory.finish();
+/// A view that was added is found from the next observation on. What is learnt of all views (models
+/// of places and positions) is learnt anew whenever a quarter of them is new.
+class LiveMemory {
+ public:
+  /// Throws as `Memoriser` and `PlaceRecogniser`; FileError when there is no file and nothing is to
+  /// be learnt.
+  explicit LiveMemory(std::filesystem::path memory, const LiveMemoryOptions& options = {});
+  ~LiveMemory();
+  LiveMemory(LiveMemory&&) noexcept;
+  LiveMemory& operator=(LiveMemory&&) noexcept;
+
+  struct Answer {
+    /// Empty as long as there is no memory to ask: a new one begins with
+    /// `Memoriser::scale_views` views.
+    std::optional<Place> place;
+    /// The place was new, and `learn` adds the observation as a view.
+    bool is_new = false;
+  };
+  /// Does not write: what is to be added waits for `learn`. Throws as `PlaceRecogniser::localise`.
+  [[nodiscard]] Answer answer(const Observation& observation);
+  /// Adds the observation that was answered last where its place was new. With an own name; a view
+  /// is on the disk when this returns, but for the first ones of a new file. Throws as
+  /// `Memoriser::add`.
+  void learn(Observation observation);
+
+  /// Views that can be found now, and those that were added.
+  [[nodiscard]] std::size_t views() const noexcept;
+  [[nodiscard]] std::size_t learnt() const noexcept;
+  /// Writes what still waits for a new file's full scale, and keeps what is learnt in the file.
+  /// Nothing where nothing was added.
+  void finish();
+
+ private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace panonav

@@ -1,0 +1,249 @@
+// Videos, streams and cameras as input, and `run`, which memorises and localises in one go.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "panonav/core/text.hpp"
+#include "panonav/io/atomic_file.hpp"
+#include "panonav/storage/memory_file.hpp"
+#include "support/command_runner.hpp"
+#include "support/landmark_pictures.hpp"
+#include "support/text.hpp"
+
+namespace panonav::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+constexpr std::size_t count = 36;
+
+/// What a shell says on standard output; expects exit code 0.
+std::string said_by_shell(const std::string& command, const fs::path& folder) {
+  const fs::path out = folder / "shell_output";
+  EXPECT_EQ(std::system((command + " > " + shell_quoted(out.string())).c_str()), 0) << command;
+  std::ostringstream text;
+  text << std::ifstream(out).rdbuf();
+  return text.str();
+}
+
+std::vector<json> objects(const std::string& text) {
+  std::vector<json> values;
+  for (const std::string& line : lines(text)) values.push_back(json::parse(line));
+  return values;
+}
+
+/// A walk of 36 pictures, as PNG and JPEG files, as a video without loss and as a JPEG stream.
+class Walk : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    poses_ = grid_poses(6);
+    write_dataset(folder / "walk", landmark_world(5), poses_);
+    const std::string pictures = "ffmpeg -nostdin -v error -framerate 10 -i " +
+                                 shell_quoted((folder / "walk/view_%03d.png").string()) +
+                                 " -pix_fmt ";
+    fs::create_directories(folder / "jpegs");
+    const auto make = [&](const std::string& words, const std::string& to) {
+      const std::string command = pictures + words + " " + shell_quoted((folder / to).string());
+      ASSERT_EQ(std::system(command.c_str()), 0) << command;
+    };
+    make("rgb24 -c:v libx264rgb -qp 0", "walk.mp4");
+    make("yuvj444p -q:v 2 -start_number 1", "jpegs/%06d.jpg");
+    std::string stream;
+    for (std::size_t i = 1; i <= count; ++i) stream += jpeg(i);
+    write_file(folder / "walk.mjpeg", std::string_view(stream));
+  }
+
+  [[nodiscard]] std::string jpeg(std::size_t number) const {
+    const std::string digits = std::to_string(number);
+    std::ifstream file(folder / "jpegs" / (std::string(6 - digits.size(), '0') + digits + ".jpg"),
+                       std::ios::binary);
+    std::ostringstream bytes;
+    bytes << file.rdbuf();
+    return bytes.str();
+  }
+  [[nodiscard]] std::string path(const std::string& name) const { return folder / name; }
+  [[nodiscard]] static VisualMemory views(const std::string& memory) {
+    return MemoryFile::open(memory, Access::read_only).load();
+  }
+
+  const std::vector<std::string> panoramas_{"--kind", "panorama", "--elevation-deg", "-20", "20"};
+  TemporaryFolder folder;
+  std::vector<Pose2> poses_;
+};
+
+void expect_same_signatures(const VisualMemory& a, const VisualMemory& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a.packed(a.views()[i]), b.packed(b.views()[i])) << i;
+  }
+}
+
+TEST_F(Walk, AVideoGivesTheMemoryAndTheAnswersOfItsPictures) {
+  run_well({"memorise", path("walk"), path("a.panonav")});
+  run_well(with({"memorise", path("walk.mp4"), path("b.panonav")}, panoramas_));
+  expect_same_signatures(views(path("a.panonav")), views(path("b.panonav")));
+  const auto by_folder = answers_of({"localise", path("a.panonav"), path("walk"), "--json"});
+  const auto by_video = answers_of({"localise", path("a.panonav"), path("walk.mp4"), "--json"});
+  ASSERT_EQ(by_folder.size(), by_video.size());
+  for (std::size_t i = 0; i < by_folder.size(); ++i) {
+    EXPECT_EQ(by_folder[i].at("matches"), by_video[i].at("matches"));
+    EXPECT_EQ(by_folder[i].at("position"), by_video[i].at("position"));
+  }
+  // The same again knows every view.
+  const json again =
+      answer_of(with({"memorise", path("walk.mp4"), path("b.panonav"), "--json"}, {}));
+  EXPECT_EQ(again.at("known_before"), count);
+}
+
+TEST_F(Walk, PartsOfAVideoAreTaken) {
+  const auto names = [&](const std::vector<std::string>& part) {
+    std::vector<std::string> found;
+    run_well({"memorise", path("walk"), path("a.panonav")});
+    for (const auto& answer :
+         answers_of(with({"localise", path("a.panonav"), path("walk.mp4"), "--json"}, part))) {
+      found.push_back(answer.at("matches").at(0).at("file"));
+    }
+    return found;
+  };
+  using Names = std::vector<std::string>;
+  EXPECT_EQ(names({"--every", "1s"}),
+            (Names{view_name(0), view_name(10), view_name(20), view_name(30)}));
+  EXPECT_EQ(names({"--from", "0.5", "--to", "0.7"}),
+            (Names{view_name(5), view_name(6), view_name(7)}));
+  EXPECT_EQ(names({"--every", "20"}), (Names{view_name(0), view_name(20)}));
+  const std::vector<std::string> ask{"localise", path("a.panonav"), path("walk.mp4")};
+  EXPECT_NE(refusal(with(ask, {"--every", "0"})).find("--every is 0"), std::string::npos);
+  EXPECT_NE(refusal(with(ask, {"--every", "-1s"})).find("--every is -1s"), std::string::npos);
+  EXPECT_NE(refusal(with(ask, {"--from", "60"})).find("no picture in the time"), std::string::npos);
+  EXPECT_NE(refusal({"localise", path("a.panonav"), path("walk"), "--to", "1"}).find("stamp_s"),
+            std::string::npos);
+  EXPECT_NE(refusal({"localise", path("a.panonav"), path("walk/view_000.png"), "--every", "2"})
+                .find("one picture"),
+            std::string::npos);
+  EXPECT_NE(refusal({"memorise", path("walk.mp4"), path("c.panonav")}).find("--kind"),
+            std::string::npos);
+}
+
+TEST_F(Walk, StandardInputGivesTheMemoryOfItsPictures) {
+  run_well(with({"memorise", path("jpegs"), path("a.panonav")}, panoramas_));
+  const std::string command =
+      shell_quoted(PANONAV_COMMAND) + " memorise - " + shell_quoted(path("b.panonav")) +
+      " --json --kind panorama --elevation-deg -20 20 < " + shell_quoted(path("walk.mjpeg"));
+  EXPECT_EQ(json::parse(said_by_shell(command, folder.path())).at("appended"), count);
+  expect_same_signatures(views(path("a.panonav")), views(path("b.panonav")));
+}
+
+TEST_F(Walk, RunLearnsANewPlaceOnceAndKnowsItThen) {
+  const std::string memory = path("new.panonav");
+  const auto first = answers_of({"run", path("walk"), "--memory", memory, "--learn", "--json"});
+  ASSERT_EQ(first.size(), count);
+  std::size_t learnt = 0;
+  for (const auto& answer : first) learnt += answer.at("learnt").get<bool>() ? 1 : 0;
+  EXPECT_GE(learnt, 32U);  // as many begin a memory
+  EXPECT_EQ(views(memory).size(), learnt);
+  const auto second = answers_of({"run", path("walk"), "--memory", memory, "--learn", "--json"});
+  std::size_t known = 0;
+  for (const auto& answer : second) {
+    EXPECT_FALSE(answer.at("learnt"));
+    known += answer.at("known").get<bool>() ? 1 : 0;
+  }
+  EXPECT_GE(known, count - 2);
+  EXPECT_EQ(views(memory).size(), learnt);
+  // Another world is new.
+  write_dataset(folder / "other", landmark_world(77), poses_);
+  for (std::size_t i = 0; i < count; ++i) {
+    fs::rename(folder / "other" / view_name(i), folder / "other" / ("o" + view_name(i)));
+  }
+  fs::remove(folder / "other/dataset.toml");
+  const auto third = answers_of({"run", path("other"), "--memory", memory, "--learn", "--json"});
+  EXPECT_TRUE(third.front().at("learnt"));
+  EXPECT_GT(views(memory).size(), learnt + 5);
+  // The same observations give the same answers.
+  fs::copy_file(memory, path("copy.panonav"));
+  EXPECT_EQ(run_panonav({"run", path("walk"), "--memory", memory, "--json"}).out,
+            run_panonav({"run", path("walk"), "--memory", path("copy.panonav"), "--json"}).out);
+}
+
+TEST_F(Walk, RunRefusesWhatHasNoEffect) {
+  EXPECT_NE(refusal({"run", path("walk"), "--memory", path("none.panonav")}).find("--learn"),
+            std::string::npos);
+  run_well({"memorise", path("walk"), path("a.panonav")});
+  const std::vector<std::string> ask{"run", path("walk"), "--memory", path("a.panonav")};
+  EXPECT_NE(refusal(with(ask, {"--learn-interval-s", "1"})).find("without --learn"),
+            std::string::npos);
+  EXPECT_NE(
+      refusal(with(ask, {"--camera-width", "96", "--camera-height", "12"})).find("no live source"),
+      std::string::npos);
+  EXPECT_NE(refusal({"run", "/dev/video99", "--memory", path("a.panonav")}).find("/dev/video99"),
+            std::string::npos);
+  EXPECT_NE(refusal({"memorise", "/dev/video99", path("b.panonav"), "--kind", "panorama"})
+                .find("panonav run"),
+            std::string::npos);
+}
+
+#ifdef PANONAV_V4L2_SHIM
+TEST_F(Walk, RunFollowsACameraThatIsUnpluggedAndComesBack) {
+  std::string pictures;
+  for (std::size_t i = 1; i <= count; ++i) {
+    const std::string bytes = jpeg(i);
+    const auto length = static_cast<std::uint32_t>(bytes.size());
+    pictures.append(reinterpret_cast<const char*>(&length), sizeof(length));
+    pictures += bytes;
+  }
+  write_file(folder / "pictures", std::string_view(pictures));
+  run_well({"memorise", path("walk"), path("a.panonav")});
+  const std::string command =
+      "V4L2_SHIM_RATE=20 V4L2_SHIM_UNPLUG=10 V4L2_SHIM_PICTURES=" + shell_quoted(path("pictures")) +
+      " ASAN_OPTIONS=verify_asan_link_order=0:detect_leaks=0 LD_PRELOAD=" +
+      shell_quoted(PANONAV_V4L2_SHIM) + " timeout -s INT 20 " + shell_quoted(PANONAV_COMMAND) +
+      " run /dev/video7 --memory " + shell_quoted(path("a.panonav")) + " --json --count 30 2> " +
+      shell_quoted(path("notes"));
+  const auto answers = objects(said_by_shell(command, folder.path()));
+  ASSERT_EQ(answers.size(), 30U);
+  std::size_t right = 0;
+  double before_s = 0.0;
+  for (std::size_t i = 0; i < answers.size(); ++i) {
+    EXPECT_GT(answers[i].at("stamp_s"), before_s);
+    before_s = answers[i].at("stamp_s");
+    right += answers[i].at("known").get<bool>() ? 1 : 0;
+  }
+  EXPECT_GE(right, 27U);
+  std::ostringstream notes;
+  notes << std::ifstream(path("notes")).rdbuf();
+  EXPECT_NE(notes.str().find("1 interruptions of the source"), std::string::npos) << notes.str();
+}
+
+TEST_F(Walk, AnInterruptedRunHasStoredWhatItLearnt) {
+  std::string pictures;
+  for (std::size_t i = 1; i <= count; ++i) {
+    const std::string bytes = jpeg(i);
+    const auto length = static_cast<std::uint32_t>(bytes.size());
+    pictures.append(reinterpret_cast<const char*>(&length), sizeof(length));
+    pictures += bytes;
+  }
+  write_file(folder / "pictures", std::string_view(pictures));
+  const std::string command =
+      "V4L2_SHIM_RATE=50 V4L2_SHIM_PICTURES=" + shell_quoted(path("pictures")) +
+      " ASAN_OPTIONS=verify_asan_link_order=0:detect_leaks=0 LD_PRELOAD=" +
+      shell_quoted(PANONAV_V4L2_SHIM) + " timeout --preserve-status -s INT 3 " +
+      shell_quoted(PANONAV_COMMAND) + " run /dev/video7 --memory " +
+      shell_quoted(path("new.panonav")) +
+      " --learn --learn-interval-s 0.2 --json --kind panorama --elevation-deg -20 20";
+  const auto answers = objects(said_by_shell(command, folder.path()));
+  std::size_t learnt = 0;
+  for (const auto& answer : answers) learnt += answer.at("learnt").get<bool>() ? 1 : 0;
+  EXPECT_GE(learnt, 5U);
+  EXPECT_EQ(views(path("new.panonav")).size(), learnt);
+  run_well({"verify", path("new.panonav")});
+}
+#endif
+
+}  // namespace
+}  // namespace panonav::testing
