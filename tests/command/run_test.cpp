@@ -102,6 +102,14 @@ TEST_F(Walk, AVideoGivesTheMemoryAndTheAnswersOfItsPictures) {
   EXPECT_EQ(again.at("known_before"), count);
 }
 
+TEST_F(Walk, InfoSaysWhatIsInAVideo) {
+  const json info = answer_of({"info", path("walk.mp4"), "--json"});
+  EXPECT_EQ(info.at("pictures"), count);
+  EXPECT_EQ(info.at("width"), 96);
+  EXPECT_EQ(info.at("height"), 12);
+  EXPECT_NEAR(info.at("end_s").get<double>(), 3.5, 1e-3);
+}
+
 TEST_F(Walk, PartsOfAVideoAreTaken) {
   const auto names = [&](const std::vector<std::string>& part) {
     std::vector<std::string> found;
@@ -189,6 +197,19 @@ TEST_F(Walk, RunRefusesWhatHasNoEffect) {
 }
 
 #ifdef PANONAV_V4L2_SHIM
+TEST_F(Walk, InfoListsWhatACameraOffers) {
+  const json info =
+      json::parse(said_by_shell("ASAN_OPTIONS=verify_asan_link_order=0:detect_leaks=0 LD_PRELOAD=" +
+                                    shell_quoted(PANONAV_V4L2_SHIM) + " " +
+                                    shell_quoted(PANONAV_COMMAND) + " info /dev/video7 --json",
+                                folder.path()));
+  ASSERT_EQ(info.at("formats").size(), 2U);
+  EXPECT_EQ(info.at("formats")[0].at("pixels"), "H264");
+  EXPECT_FALSE(info.at("formats")[0].at("usable"));
+  EXPECT_EQ(info.at("formats")[1].at("pixels"), "MJPG");
+  EXPECT_EQ(info.at("formats")[1].at("sizes")[0].at("width"), 96);
+}
+
 TEST_F(Walk, RunFollowsACameraThatIsUnpluggedAndComesBack) {
   std::string pictures;
   for (std::size_t i = 1; i <= count; ++i) {

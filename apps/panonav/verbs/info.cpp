@@ -8,7 +8,9 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/io/live_pictures.hpp"
 #include "panonav/io/recorded_dataset.hpp"
+#include "panonav/io/video_file.hpp"
 #include "panonav/storage/memory_file.hpp"
 
 namespace panonav::command {
@@ -181,10 +183,51 @@ ExitCode show_recording(const std::string& path, Session& session) {
   return ExitCode::done;
 }
 
+ExitCode show_camera(const std::string& path, Session& session) {
+  const auto formats = camera_formats(path);
+  auto listed = ordered_json::array();
+  for (const CameraFormat& format : formats) {
+    auto sizes = ordered_json::array();
+    std::string line = format.pixels + (format.usable ? "" : "  (not used)");
+    for (const auto& [width, height] : format.sizes) {
+      sizes.push_back({{"width", width}, {"height", height}});
+      line += "  " + std::to_string(width) + " x " + std::to_string(height);
+    }
+    listed.push_back({{"pixels", format.pixels}, {"usable", format.usable}, {"sizes", sizes}});
+    if (!session.json()) session.print(line);
+  }
+  if (session.json()) session.print(json_line({{"camera", path}, {"formats", listed}}));
+  return ExitCode::done;
+}
+
+ExitCode show_video(const std::string& path, Session& session) {
+  const Dataset video = read_video(path, {});
+  const ImageSize size = read_picture(video.entries.front()).size();
+  const double begin_s = *video.entries.front().stamp_s;
+  const double end_s = *video.entries.back().stamp_s;
+  if (session.json()) {
+    session.print(json_line({{"video", path},
+                             {"pictures", video.entries.size()},
+                             {"begin_s", begin_s},
+                             {"end_s", end_s},
+                             {"width", size.width},
+                             {"height", size.height}}));
+    return ExitCode::done;
+  }
+  session.print(session.strong(std::to_string(video.entries.size()) + " pictures") + " of " +
+                std::to_string(size.width) + " x " + std::to_string(size.height) + " px, from " +
+                short_number(begin_s) + " s to " + short_number(end_s) + " s");
+  return ExitCode::done;
+}
+
 Run declare_info(Arguments& arguments) {
   auto path = std::make_shared<std::string>();
-  arguments.positional("FILE", *path, "Memory file, or recording (MCAP, rosbag2, ROS 1 bag)");
+  arguments.positional(
+      "FILE", *path,
+      "Memory file, recording (MCAP, rosbag2, ROS 1 bag), video, or camera (/dev/video0)");
   return [path](Session& session) {
+    if (path->starts_with("/dev/video")) return show_camera(*path, session);
+    if (is_video(*path)) return show_video(*path, session);
     return is_recording(*path) ? show_recording(*path, session) : show(*path, session);
   };
 }
@@ -192,7 +235,7 @@ Run declare_info(Arguments& arguments) {
 }  // namespace
 
 Verb info_verb() {
-  return {"info", "Show what a memory or a recording holds", "",
+  return {"info", "Show what a memory or a recording holds, or a camera offers", "",
           "  panonav info office.panonav\n  panonav info drive.mcap", declare_info};
 }
 
