@@ -199,7 +199,8 @@ TEST_F(Walk, RunRefusesWhatHasNoEffect) {
 #ifdef PANONAV_V4L2_SHIM
 TEST_F(Walk, InfoListsWhatACameraOffers) {
   const json info =
-      json::parse(said_by_shell("ASAN_OPTIONS=verify_asan_link_order=0:detect_leaks=0 LD_PRELOAD=" +
+      json::parse(said_by_shell("V4L2_SHIM_PICTURES=/dev/null "
+                                "ASAN_OPTIONS=verify_asan_link_order=0:detect_leaks=0 LD_PRELOAD=" +
                                     shell_quoted(PANONAV_V4L2_SHIM) + " " +
                                     shell_quoted(PANONAV_COMMAND) + " info /dev/video7 --json",
                                 folder.path()));

@@ -101,7 +101,7 @@ std::optional<std::vector<std::uint8_t>> JpegStream::next() {
   constexpr std::array<std::uint8_t, 3> beginning{marker, start_of_image, marker};
   while (true) {
     if (walked_ == 0) {
-      auto found = std::ranges::search(buffer_, beginning).begin();
+      auto found = std::search(buffer_.begin(), buffer_.end(), beginning.begin(), beginning.end());
       // The last two bytes may begin the next picture.
       if (found == buffer_.end()) found -= std::min<std::ptrdiff_t>(2, found - buffer_.begin());
       buffer_.erase(buffer_.begin(), found);
