@@ -189,6 +189,9 @@ TEST_F(Walk, RunRefusesWhatHasNoEffect) {
   EXPECT_NE(
       refusal(with(ask, {"--camera-width", "96", "--camera-height", "12"})).find("no live source"),
       std::string::npos);
+  EXPECT_NE(refusal({"run", "/dev/video99", "--memory", path("a.panonav"), "--every", "2"})
+                .find("live source"),
+            std::string::npos);
   EXPECT_NE(refusal({"run", "/dev/video99", "--memory", path("a.panonav")}).find("/dev/video99"),
             std::string::npos);
   EXPECT_NE(refusal({"memorise", "/dev/video99", path("b.panonav"), "--kind", "panorama"})

@@ -118,6 +118,7 @@ void declare_part(Arguments& arguments, PartArguments& part, bool every) {
                      "Take every N-th picture only, or one in this time, such as 0.5s");
   }
   arguments.uncommon({"--from", "--to"});
+  if (every) arguments.uncommon({"--every"});
 }
 
 void declare_pictures(Arguments& arguments, PictureArguments& pictures) {

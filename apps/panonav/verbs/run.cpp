@@ -43,7 +43,6 @@ struct RunArguments {
   std::optional<int> count;
   SignatureOptions signature;
   PreprocessingOptions preprocessing;
-  LocaliserOptions localiser;
 };
 
 volatile std::sig_atomic_t signal_pipe = -1;  // what a handler may use is static
@@ -207,7 +206,11 @@ ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& se
     throw UsageError("--camera-width and --camera-height go together");
   }
   const bool live = is_live(wanted.source);
-  if (!live) {
+  if (live) {
+    arguments.refuse_unused({"--from", "--to", "--every", "--image-topic", "--odometry-topic",
+                             "--odometry-frames", "--imu-topic"},
+                            "where " + wanted.source + " is a live source");
+  } else {
     arguments.refuse_unused({"--camera-width", "--camera-height"},
                             "where " + wanted.source + " is no live source");
   }
@@ -215,7 +218,7 @@ ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& se
     const auto memory = MemoryFile::open(wanted.memory, Access::read_only);
     require_kept_options(arguments, wanted.signature, wanted.preprocessing, memory);
   } else if (!wanted.learn) {
-    throw FileError(wanted.memory, "is not there; --learn makes it");
+    throw FileError(wanted.memory, "no such file; --learn makes it");
   }
   std::unique_ptr<ObservationSource> source;
   LivePictures* pictures = nullptr;
@@ -239,7 +242,7 @@ ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& se
                             .memoriser = {.source = source->pictures(),
                                           .signature = wanted.signature,
                                           .preprocessing = wanted.preprocessing},
-                            .localiser = wanted.localiser};
+                            .localiser = {}};
   if (wanted.learn_interval_s) options.min_interval_s = *wanted.learn_interval_s;
   LiveMemory memory(wanted.memory, options);
 
@@ -297,8 +300,7 @@ Run declare_run(Arguments& arguments) {
   declare_pictures(arguments, wanted->pictures);
   arguments.options("signature", wanted->signature);
   arguments.options("preprocessing", wanted->preprocessing);
-  arguments.options("localiser", wanted->localiser);
-  arguments.common({"--top"});
+  arguments.uncommon({"--camera-width", "--camera-height"});
   arguments.used_only(
       {"--learn-interval-s"}, [wanted] { return wanted->learn; }, "without --learn");
   return [wanted, &arguments](Session& session) { return run(arguments, *wanted, session); };
