@@ -30,12 +30,13 @@ constexpr double arrived_m = 0.1;
 struct HomeAnswered {
   bool answered = false;
   double off_rad = 0.0;
+  double probability = 0.0;
 };
 
 HomeAnswered ask_home(const Panorama& goal, const Panorama& current) {
   const HomingGuide guide(Observation(goal), PictureSource{});
   const WayHome way = guide.home(Observation(current));
-  return {way.direction_rad.has_value(), way.direction_rad.value_or(0.0)};
+  return {way.direction_rad.has_value(), way.direction_rad.value_or(0.0), way.probability};
 }
 
 /// How far `direction_rad`, in the frame of a robot at `from`, is from the direction of `to`.
@@ -121,6 +122,8 @@ void reproduce_home_vectors(const ElsewhereReproductionOptions& options,
   };
   const std::array<Range, 3> ranges{
       Range{"0_1m", 0.1, 1.0}, {"1_3m", 1.0, 3.0}, {"3_6m", 3.0, 6.0}};
+  std::size_t sure = 0;  // of all ranges
+  std::size_t surely_right = 0;
   for (const Range& range : ranges) {
     std::vector<std::pair<const PlacedView*, const PlacedView*>> asked;
     std::vector<const RecordedGround*> ground_of;
@@ -150,6 +153,10 @@ void reproduce_home_vectors(const ElsewhereReproductionOptions& options,
     std::size_t off = 0;
     std::map<std::string, std::size_t> off_in;
     for (std::size_t i = 0; i < answers.size(); ++i) {
+      if (answers[i].answered && answers[i].probability >= 0.9) {
+        ++sure;
+        surely_right += answers[i].off_rad <= radians(45.0) ? 1 : 0;
+      }
       if (!answers[i].answered || answers[i].off_rad <= radians(45.0)) continue;
       ++off;
       ++off_in[ground_of[i]->name];
@@ -168,6 +175,14 @@ void reproduce_home_vectors(const ElsewhereReproductionOptions& options,
             (reason.empty() ? "by scene or world: " : ", ") + name + " " + std::to_string(count);
       }
     }
+  }
+
+  if (sure > 0) {
+    add_rate(
+        result, "elsewhere.home.probability",
+        "views 10 cm to 600 cm apart: of home vectors with a probability of 0.9 and more, within "
+        "45 degrees",
+        surely_right, sure, at_least(0.9));
   }
 
   std::vector<std::pair<const PlacedView*, const PlacedView*>> foreign;

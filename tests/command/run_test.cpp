@@ -6,11 +6,16 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <sstream>
 
 #include "panonav/core/text.hpp"
 #include "panonav/io/atomic_file.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav/io/recording.hpp"
+#include "panonav/io/ros_messages.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "support/command_runner.hpp"
 #include "support/landmark_pictures.hpp"
@@ -177,6 +182,114 @@ TEST_F(Walk, RunLearnsANewPlaceOnceAndKnowsItThen) {
   fs::copy_file(memory, path("copy.panonav"));
   EXPECT_EQ(run_panonav({"run", path("walk"), "--memory", memory, "--json"}).out,
             run_panonav({"run", path("walk"), "--memory", path("copy.panonav"), "--json"}).out);
+}
+
+/// Messages of each topic.
+std::map<std::string, std::uint64_t> topics_of(const std::string& file) {
+  std::map<std::string, std::uint64_t> counts;
+  const auto recording = Recording::open(file);
+  EXPECT_TRUE(recording->warnings().empty());
+  for (const auto& topic : recording->topics()) counts[topic.name] = topic.messages;
+  return counts;
+}
+
+template <class Message, class Use>
+void for_each_message(const std::string& file, const std::string& topic, const Use& use) {
+  const auto recording = Recording::open(file);
+  for (std::uint32_t i = 0; i < recording->topics().size(); ++i) {
+    if (recording->topics()[i].name != topic) continue;
+    EXPECT_EQ(recording->topics()[i].type, Message::type);
+    recording->for_each(std::array{i}, {},
+                        [&](const MessagePlace&, std::span<const std::uint8_t> bytes) {
+                          use(ros::read_message<Message>(bytes, MessageEncoding::cdr));
+                        });
+  }
+}
+
+TEST_F(Walk, ARecordHoldsWhatWasSeenAndAnswered) {
+  run_well({"memorise", path("walk"), path("a.panonav")});
+  const auto answers = answers_of(
+      {"run", path("walk"), "--memory", path("a.panonav"), "--json", "--record", path("run.mcap")});
+  const auto topics = topics_of(path("run.mcap"));
+  for (const char* topic : {"/camera/image/compressed", "/panorama/compressed",
+                            "/best_match/compressed", "/tf", "/diagnostics", "/ground_truth"}) {
+    EXPECT_EQ(topics.at(topic), count) << topic;
+  }
+  EXPECT_EQ(topics.at("/references"), 1U);
+  EXPECT_EQ(topics.at("/visited"), 1U);
+  std::size_t known = 0;
+  for (const auto& answer : answers) known += answer.at("known").get<bool>() ? 1 : 0;
+  EXPECT_EQ(topics.at("/pose"), known);
+  // The pictures are those of the walk.
+  std::size_t number = 0;
+  for_each_message<ros::CompressedImage>(
+      path("run.mcap"), "/camera/image/compressed", [&](const ros::CompressedImage& picture) {
+        EXPECT_EQ(ros::picture_of(picture, "picture"),
+                  read_image(folder / "walk" / view_name(number)));
+        ++number;
+      });
+  for_each_message<ros::PointCloud2>(path("run.mcap"), "/references",
+                                     [](const ros::PointCloud2& cloud) {
+                                       EXPECT_EQ(cloud.width, count);
+                                       EXPECT_EQ(cloud.data.size(), 16 * count);
+                                     });
+  // Each pose is that of its answer, and TF says the same, below the root that viewers want.
+  std::vector<Pose2> poses;
+  for_each_message<ros::PoseWithCovarianceStamped>(path("run.mcap"), "/pose",
+                                                   [&](const ros::PoseWithCovarianceStamped& pose) {
+                                                     EXPECT_EQ(pose.header.frame_id, "map");
+                                                     poses.push_back(ros::planar(pose.pose.pose));
+                                                   });
+  std::size_t at = 0;
+  for (const auto& answer : answers) {
+    if (!answer.at("known").get<bool>()) continue;
+    EXPECT_EQ(poses.at(at).x_m, answer.at("position").at("x_m"));
+    EXPECT_NEAR(poses.at(at).heading_rad, answer.at("heading_rad").get<double>(), 1e-9);
+    ++at;
+  }
+  for_each_message<ros::TFMessage>(path("run.mcap"), "/tf", [](const ros::TFMessage& tf) {
+    ASSERT_GE(tf.transforms.size(), 1U);
+    EXPECT_EQ(tf.transforms[0].header.frame_id, "tf#/");
+    EXPECT_EQ(tf.transforms[0].child_frame_id, "map");
+  });
+}
+
+TEST_F(Walk, ATrackIsRecordedWithItsParticlesAndItsPath) {
+  run_well({"memorise", path("walk"), path("a.panonav")});
+  (void)run_panonav({"track", path("a.panonav"), path("walk"), "--record", path("track.mcap")});
+  const auto topics = topics_of(path("track.mcap"));
+  for (const char* topic : {"/camera/image/compressed", "/best_match/compressed", "/particles",
+                            "/particles/poses", "/diagnostics"}) {
+    EXPECT_EQ(topics.at(topic), count) << topic;
+  }
+  for_each_message<ros::PointCloud2>(path("track.mcap"), "/particles",
+                                     [](const ros::PointCloud2& cloud) {
+                                       EXPECT_GE(cloud.width, 1U);
+                                       EXPECT_LE(cloud.width, 500U);
+                                       EXPECT_EQ(cloud.data.size(), 16 * cloud.width);
+                                     });
+  std::size_t poses = 0;
+  if (topics.contains("/path")) {
+    for_each_message<ros::Path>(path("track.mcap"), "/path", [&](const ros::Path& line) {
+      EXPECT_EQ(line.poses.size(), ++poses);  // it grows by one each time
+    });
+    EXPECT_EQ(poses, topics.at("/pose"));
+  }
+}
+
+TEST_F(Walk, ARecordThatCannotBeWrittenDoesNotEndTheRun) {
+  run_well({"memorise", path("walk"), path("a.panonav")});
+  EXPECT_NE(refusal({"run", path("walk"), "--memory", path("a.panonav"), "--record",
+                     path("none/run.mcap")})
+                .find("none/run.mcap"),
+            std::string::npos);
+  const std::vector<std::string> ask{"run",    path("walk"), "--memory", path("a.panonav"),
+                                     "--json", "--record"};
+  EXPECT_NE(refusal(with(ask, {"/dev/full"})).find("/dev/full"), std::string::npos);
+  const auto full = run_panonav(with(ask, {path("full.mcap")}), {.file_size_limit_bytes = 60'000});
+  EXPECT_EQ(full.exit_code, 0);
+  EXPECT_EQ(lines(full.out).size(), count);
+  EXPECT_NE(full.err.find("full.mcap"), std::string::npos) << full.err;
 }
 
 TEST_F(Walk, RunRefusesWhatHasNoEffect) {

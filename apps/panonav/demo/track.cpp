@@ -7,6 +7,7 @@
 
 #include "experiments/runs/surroundings.hpp"
 #include "panonav/core/statistics.hpp"
+#include "panonav/geometry/positions.hpp"
 #include "reports/track_animation.hpp"
 #include "reports/track_pictures.hpp"
 #include "reports/track_report.hpp"
@@ -108,7 +109,8 @@ DemoTrack show_track(const DemoOptions& options, const DemoRecordings& recording
                          .source = run.source});
   const VisualMemory& memory = tracker.memory();
   const std::size_t particles_kept = particles_shown(run.entries.size());
-  const std::vector<Point2> at_first = even_sample(tracker.localiser().particles(), particles_kept);
+  const std::vector<Point2> at_first =
+      positions_of(even_sample(tracker.localiser().particles(), particles_kept));
   std::vector<TrackedImage> images;
   track(tracker, run, {.particles_kept = particles_kept}, session.executor(),
         [&](TrackedImage&& image) { images.push_back(std::move(image)); });

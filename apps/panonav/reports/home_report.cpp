@@ -90,7 +90,8 @@ void write_home_report(const fs::path& folder, const Goal& goal,
         {{first.direction_rad ? in_words(*first.direction_rad) : "none", "direction home"},
          {fixed(first.distance_r, 2) + " R", "distance, R that of the things around"},
          {fixed(degrees(first.turn_rad), 0) + " degrees", "turn of the robot since, left positive"},
-         {fixed(first.confidence, 2), "confidence, 0 to 1"}});
+         {fixed(first.probability, 2),
+          "probability that the direction is right within 45 degrees"}});
   }
   page.section(goal.panorama ? "Both views" : "What the robot sees");
   page.text(
@@ -125,10 +126,10 @@ void write_home_report(const fs::path& folder, const Goal& goal,
     rows.push_back({answer.file, way.direction_rad ? in_words(*way.direction_rad) : "none",
                     if_known(way.distance_r, 3), if_known(degrees(way.turn_rad), 1),
                     fixed(way.vector.correlation, 3), fixed(way.vector.residual, 3),
-                    if_known(way.confidence, 3)});
+                    fixed(way.probability, 3)});
   }
   page.table({"view", "direction home", "distance [R]", "turned [degrees]", "correlation",
-              "residual", "confidence"},
+              "residual", "probability"},
              rows);
   page.write(folder);
 }

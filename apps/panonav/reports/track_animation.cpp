@@ -29,7 +29,7 @@ ordered_json pose_json(const Pose2& pose) {
 ordered_json image_json(const TrackedImage& image) {
   const MonteCarloEstimate& estimate = image.estimate;
   auto particles = ordered_json::array();
-  for (const Point2& point : image.particles) {
+  for (const Pose2& point : image.particles) {
     particles.push_back(rounded(point.x_m));
     particles.push_back(rounded(point.y_m));
   }

@@ -4,6 +4,8 @@
 #include <string>
 #include <utility>
 
+#include "panonav/geometry/positions.hpp"
+
 namespace panonav::command {
 
 namespace {
@@ -100,8 +102,9 @@ void draw_track_snapshots(const VisualMemory& memory, const std::vector<TrackedI
   }
   for (const std::size_t number : shown) {
     const TrackedImage& image = images[number];
-    const MapLayer particles{
-        .label = "particles", .colour = PlotColour::vermilion, .dots = image.particles};
+    const MapLayer particles{.label = "particles",
+                             .colour = PlotColour::vermilion,
+                             .dots = positions_of(image.particles)};
     MapLayer estimate{.label = is_localised(image) ? "estimate" : "likeliest place",
                       .colour = is_localised(image) ? PlotColour::blue : PlotColour::orange};
     if (image.estimate.pose) estimate.squares.push_back(image.estimate.pose->position());

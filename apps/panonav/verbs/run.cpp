@@ -22,6 +22,7 @@
 #include "panonav/core/text.hpp"
 #include "panonav/pipeline/live_memory.hpp"
 #include "panonav/pipeline/observation_source.hpp"
+#include "panonav/pipeline/run_recorder.hpp"
 #include "verbs/localised_query.hpp"
 #include "verbs/memorising.hpp"
 #include "verbs/recording.hpp"
@@ -41,6 +42,7 @@ struct RunArguments {
   std::optional<int> camera_width;
   std::optional<int> camera_height;
   std::optional<int> count;
+  std::optional<std::string> record;
   SignatureOptions signature;
   PreprocessingOptions preprocessing;
 };
@@ -181,8 +183,71 @@ std::string line_of(const Observation& seen, const LiveMemory::Answer& answer, S
   return json_line(json);
 }
 
+/// Records what is seen and answered, in a live run as far as the disk keeps up.
+class Recording {
+ public:
+  Recording(const std::string& file, std::string memory, bool wait, Session& session)
+      : recorder_(file, {.wait = wait}), path_(std::move(memory)), session_(session) {}
+
+  void add(const Observation& seen, const LiveMemory::Answer& answer, const LiveMemory& memory) {
+    if (failed_) return;
+    try {
+      write(seen, answer, memory);
+    } catch (const FileError& error) {
+      failed_ = true;  // the robot goes on
+      session_.note("the recording ends here: " + readable_line(error.what()));
+    }
+  }
+  void close() {
+    try {
+      if (!failed_) recorder_.close();
+    } catch (const FileError& error) {
+      session_.note("the recording is cut short: " + readable_line(error.what()));
+    }
+  }
+  [[nodiscard]] std::size_t left_out() const { return recorder_.left_out(); }
+
+ private:
+  void write(const Observation& seen, const LiveMemory::Answer& answer, const LiveMemory& memory) {
+    RunMoment moment;
+    moment.stamp_s = seen.stamp_s.value_or(static_cast<double>(moments_));
+    ++moments_;
+    if (const auto* const picture = std::get_if<Image>(&seen.picture)) moment.picture = *picture;
+    moment.truth = seen.pose;
+    const PlaceRecogniser* const recogniser = memory.recogniser();
+    if (recogniser != nullptr) moment.panorama = recogniser->encoder().panorama(seen);
+    if (answer.place) {
+      describe(moment, *answer.place);
+      if (!answer.place->matches.empty()) {
+        moment.best_match = thumbnail(answer.place->matches.front().view);
+      }
+      // Rarely: the cloud is that of all views.
+      if (memory.views() > references_ + references_ / 8) {
+        references_ = memory.views();
+        recorder_.add_references(recogniser->memory(), moment.stamp_s);
+      }
+    } else {
+      moment.state = "no memory yet";
+    }
+    recorder_.add(std::move(moment));
+  }
+  std::vector<std::uint8_t> thumbnail(ViewId view) {
+    if (!file_) file_ = MemoryFile::open(path_, Access::read_only);
+    return file_->thumbnail(view).value_or(std::vector<std::uint8_t>{});
+  }
+
+  RunRecorder recorder_;
+  std::string path_;
+  Session& session_;
+  std::optional<MemoryFile> file_;
+  std::size_t moments_ = 0;
+  std::size_t references_ = 0;
+  bool failed_ = false;
+};
+
 void tell(const RunCounts& counts, const LiveMemory& memory, const LivePictures* live,
-          std::size_t lines_left_out, const RunArguments& wanted, Session& session) {
+          std::size_t lines_left_out, std::size_t moments_left_out, const RunArguments& wanted,
+          Session& session) {
   const LivePictures::Counts source = live != nullptr ? live->counts() : LivePictures::Counts{};
   std::string line = std::to_string(counts.pictures) + " pictures, " +
                      std::to_string(counts.known) + " of places of " + wanted.memory;
@@ -194,6 +259,7 @@ void tell(const RunCounts& counts, const LiveMemory& memory, const LivePictures*
   add(source.dropped, "came too fast and were dropped");
   add(source.interruptions, "interruptions of the source");
   add(lines_left_out, "lines were not printed for a slow reader");
+  add(moments_left_out, "moments were not recorded on a slow disk");
   if (!counts.delays_ms.empty()) {
     line += "; from arrival to answer " + fixed(quantile(counts.delays_ms, 0.5), 1) +
             " ms median, " + fixed(quantile(counts.delays_ms, 0.99), 1) + " ms in 99 %";
@@ -249,6 +315,8 @@ ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& se
   RunCounts counts;
   std::atomic<bool> stopped = false;
   LinePrinter printer(session, !live);
+  std::optional<Recording> recording;
+  if (wanted.record) recording.emplace(*wanted.record, wanted.memory, !live, session);
   {
     const StopSignals signals([&] {
       stopped = true;
@@ -274,12 +342,15 @@ ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& se
       if (live) counts.delays_ms.push_back(1e3 * (now_s() - *seen->stamp_s));
       if (answer.place && answer.place->known) ++counts.known;
       printer.print(line_of(*seen, answer, session));
+      if (recording) recording->add(*seen, answer, memory);
       if (answer.is_new) memory.learn(std::move(*seen));
     }
   }
   memory.finish();  // a reader of the lines may never go on
+  if (recording) recording->close();
   printer.finish();
-  tell(counts, memory, pictures, printer.left_out(), wanted, session);
+  tell(counts, memory, pictures, printer.left_out(), recording ? recording->left_out() : 0, wanted,
+       session);
   return counts.pictures > 0 ? ExitCode::done : ExitCode::no_answer;
 }
 
@@ -293,6 +364,8 @@ Run declare_run(Arguments& arguments) {
   arguments.option("--learn-interval-s", wanted->learn_interval_s,
                    "Time between two views that are added, at least; default 0.5");
   arguments.option("--count N", wanted->count, 1, "End after this many pictures");
+  arguments.option("--record FILE", wanted->record,
+                   "Write what is seen and answered as MCAP, for Rerun, Foxglove and Lichtblick");
   arguments.option("--camera-width", wanted->camera_width, 1,
                    "Wanted width of a camera's pictures");
   arguments.option("--camera-height", wanted->camera_height, 1,

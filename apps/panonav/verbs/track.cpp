@@ -52,6 +52,7 @@ struct TrackArguments {
   std::optional<double> start_heading_deg;
   std::optional<std::string> tum;
   std::optional<std::string> report;
+  std::optional<std::string> record;
   StartOptions start;
   MonteCarloOptions filter;
   OdometryNoise odometry;
@@ -243,15 +244,24 @@ ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Ses
   }
 #endif
 
+  std::optional<RunRecorder> recorder;
+  if (wanted.record) {
+    recorder.emplace(*wanted.record, RunRecorderOptions{.wait = true});
+    recorder->add_references(tracker.memory(), run.entries.front().stamp_s.value_or(0.0));
+    settings.recorded = &file;
+  }
   std::vector<TrackedImage> images;
   Progress progress(session, "tracking", (run.entries.size() - 1) / settings.every + 1);
   track(tracker, run, settings, session.executor(), [&](TrackedImage&& image) {
     progress.clear();
     session.print(session.json() ? json_line(as_json(image)) : as_text(image, session));
+    if (image.moment) recorder->add(std::move(*image.moment));
+    image.moment.reset();
     images.push_back(std::move(image));
     progress.advance();
   });
   progress.clear();
+  if (recorder) recorder->close();
 
   if (wanted.tum) {
     std::vector<StampedPose> trajectory;
@@ -291,6 +301,8 @@ Run declare_track(Arguments& arguments) {
   arguments.option("--tum FILE", wanted->tum,
                    "Write the trajectory of localised images to this file: TUM text, or CSV for a "
                    "name that ends in .csv");
+  arguments.option("--record FILE", wanted->record,
+                   "Write the run as MCAP, for Rerun, Foxglove and Lichtblick");
 #ifdef PANONAV_COMMAND_SIMULATES
   arguments.option("--report FOLDER", wanted->report,
                    "Write pictures and an animation of particles, estimate and truth into this "

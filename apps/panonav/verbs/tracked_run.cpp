@@ -105,10 +105,10 @@ std::string add_visual_odometry(Dataset& run, const Tracker& tracker, Executor& 
          " m, as in the memory";
 }
 
-std::vector<Point2> even_sample(const Particles& particles, std::size_t count) {
-  std::vector<Point2> sample;
+std::vector<Pose2> even_sample(const Particles& particles, std::size_t count) {
+  std::vector<Pose2> sample;
   if (particles.size() <= count) {
-    for (std::size_t i = 0; i < particles.size(); ++i) sample.push_back(particles.position(i));
+    for (std::size_t i = 0; i < particles.size(); ++i) sample.push_back(particles.pose(i));
     return sample;
   }
   double total = 0.0;
@@ -118,7 +118,7 @@ std::vector<Point2> even_sample(const Particles& particles, std::size_t count) {
     passed += particles.weight[i];
     while (sample.size() < count && (static_cast<double>(sample.size()) + 0.5) * total <
                                         passed * static_cast<double>(count)) {
-      sample.push_back(particles.position(i));
+      sample.push_back(particles.pose(i));
     }
   }
   return sample;
@@ -133,8 +133,20 @@ void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, 
   for (std::size_t begin = 0; begin < looked_at; begin += batch) {
     const std::size_t count = std::min(batch, looked_at - begin);
     std::vector<std::optional<PackedSignature>> signatures(count);
+    std::vector<std::optional<RunMoment>> moments(count);
     for_each_entry(executor, count, [&](std::size_t i) {
-      signatures[i] = tracker.encoder().packed(read_observation(entries[(begin + i) * every]));
+      const std::size_t index = (begin + i) * every;
+      Observation seen = read_observation(entries[index]);
+      if (settings.recorded == nullptr) {
+        signatures[i] = tracker.encoder().packed(seen);
+        return;
+      }
+      RunMoment& moment = moments[i].emplace();
+      moment.stamp_s = seen.stamp_s.value_or(static_cast<double>(index));
+      moment.truth = seen.pose;
+      moment.panorama = tracker.encoder().panorama(seen);
+      signatures[i] = tracker.encoder().packed(*moment.panorama);
+      moment.picture = std::move(std::get<Image>(seen.picture));
     });
     for (std::size_t i = 0; i < count; ++i) {
       const std::size_t index = (begin + i) * every;
@@ -145,6 +157,14 @@ void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, 
       TrackedImage image{
           index, entry.file, entry.stamp_s, entry.pose, tracker.observe(*signatures[i]), {}};
       image.particles = even_sample(tracker.localiser().particles(), settings.particles_kept);
+      if (moments[i]) {
+        describe(*moments[i], image.estimate);
+        moments[i]->particles = even_sample(tracker.localiser().particles(), 500);
+        const auto found = tracker.memory().search(*signatures[i], {.top = 1});
+        moments[i]->best_match = settings.recorded->thumbnail(found.matches.front().view)
+                                     .value_or(std::vector<std::uint8_t>{});
+        image.moment = std::move(moments[i]);
+      }
       report(std::move(image));
     }
   }

@@ -10,7 +10,9 @@
 #include "panonav/io/dataset.hpp"
 #include "panonav/localisation/monte_carlo.hpp"
 #include "panonav/memory/visual_memory.hpp"
+#include "panonav/pipeline/run_recorder.hpp"
 #include "panonav/pipeline/tracker.hpp"
+#include "panonav/storage/memory_file.hpp"
 
 namespace panonav::command {
 
@@ -21,7 +23,8 @@ struct TrackedImage {
   std::optional<double> stamp_s;
   std::optional<ReferencePose> truth;
   MonteCarloEstimate estimate;
-  std::vector<Point2> particles;  ///< an even sample of them, as many as were asked for
+  std::vector<Pose2> particles;     ///< an even sample of them, as many as were asked for
+  std::optional<RunMoment> moment;  ///< what was seen, where a record is wanted
 };
 
 /// What is true of all runs: whether and how far off the answer was.
@@ -43,6 +46,8 @@ struct TrackSummary {
 struct TrackSettings {
   int every = 1;                   ///< pictures between those that are looked at, plus one
   std::size_t particles_kept = 0;  ///< of each image, for pictures
+  /// The memory's file, for the thumbnails of best matches: moments are filled. Null: they are not.
+  const MemoryFile* recorded = nullptr;
 };
 
 /// Runs the filter over a recording whose entries all have odometry: it moves with every entry and
@@ -61,7 +66,7 @@ void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, 
 [[nodiscard]] std::string add_visual_odometry(Dataset& run, const Tracker& tracker,
                                               Executor& executor);
 
-/// `count` positions drawn evenly by weight; all of them where there are fewer. No randomness.
-[[nodiscard]] std::vector<Point2> even_sample(const Particles& particles, std::size_t count);
+/// `count` particles drawn evenly by weight; all of them where there are fewer. No randomness.
+[[nodiscard]] std::vector<Pose2> even_sample(const Particles& particles, std::size_t count);
 
 }  // namespace panonav::command

@@ -127,13 +127,14 @@ WayHome HomingGuide::home(const Observation& observation) const {
                           std::to_string(goal_.rows()) + ", as in " + goal_name_);
     }
     const HomeVector found = home_vector(goal_, view, options_);
-    const bool known = chance_match(goal_, view, options_).beyond_chance();
+    const ChanceMatch match = chance_match(goal_, view, options_);
+    const bool known = match.beyond_chance();
     return WayHome{
         known,
         known && points_home(found) ? std::optional(found.direction_rad()) : std::nullopt,
         found.length(),
         wrap_angle(-found.heading_rad),
-        known ? found.confidence : 0.0,
+        match.direction_probability(),
         found};
   });
 }

@@ -61,16 +61,17 @@ class HomingEncoder {
 /// What an observation tells of the way home.
 struct WayHome {
   /// Whether the observation and the goal have more in common than chance gives (`chance_match`);
-  /// noise and other places do not. If not, nothing is said: no direction, no confidence, and
-  /// distance and turn mean nothing.
+  /// noise and other places do not. If not, nothing is said: no direction, and distance and turn
+  /// mean nothing.
   bool known = false;
   /// In the frame of the robot as it stands now, counter-clockwise from straight ahead. Empty where
   /// nothing is known, and at home itself (`points_home`).
   std::optional<double> direction_rad;
   double distance_r = 0.0;  ///< in units of R, the typical distance of the things around
   double turn_rad = 0.0;    ///< by which the robot has turned since it was home
-  double confidence = 0.0;  ///< 0 .. 1
-  HomeVector vector;        ///< all that was found, known or not
+  /// That the direction is right within 45 degrees (`ChanceMatch::direction_probability`).
+  double probability = 0.0;
+  HomeVector vector;  ///< all that was found, known or not
 };
 
 /// Tells the way back to a goal from one observation: a view of a memory, or an observation made

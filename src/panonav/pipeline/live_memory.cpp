@@ -91,6 +91,10 @@ void LiveMemory::learn(Observation observation) {
   ++self.learnt;
 }
 
+const PlaceRecogniser* LiveMemory::recogniser() const noexcept {
+  return implementation_->recogniser.get();
+}
+
 std::size_t LiveMemory::views() const noexcept {
   return implementation_->recogniser ? implementation_->recogniser->memory().size() : 0;
 }

@@ -52,6 +52,8 @@ class LiveMemory {
   /// `Memoriser::add`.
   void learn(Observation observation);
 
+  /// What answers now; null as long as there is no memory to ask. Valid until the next `answer`.
+  [[nodiscard]] const PlaceRecogniser* recogniser() const noexcept;
   /// Views that can be found now, and those that were added.
   [[nodiscard]] std::size_t views() const noexcept;
   [[nodiscard]] std::size_t learnt() const noexcept;

@@ -1,9 +1,6 @@
 #include "panonav/pipeline/recording_conversion.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,6 +10,7 @@
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/mcap_writer.hpp"
 #include "panonav/io/ros_messages.hpp"
+#include "panonav/pipeline/internal/topic_writer.hpp"
 #include "panonav/pipeline/internal/unfinished_folder.hpp"
 
 namespace panonav {
@@ -34,40 +32,6 @@ RecordingConversion common_to_all(const Dataset& dataset) {
   return done;
 }
 
-/// Messages of one type on one topic of an MCAP file.
-template <class Message>
-class Topic {
- public:
-  Topic(McapWriter& writer, std::string topic) : writer_(&writer), name_(std::move(topic)) {}
-  void write(std::int64_t log_ns, std::int64_t stamp_ns, const Message& message) {
-    if (!channel_) {
-      const std::string_view type = Message::type;
-      channel_ = writer_->add_channel(
-          name_, "cdr",
-          writer_->add_schema(ros::ros2_type_name(type), "ros2msg", ros::ros2_schema(type)));
-    }
-    writer_->write(*channel_, log_ns, stamp_ns, ros::write_message(message));
-  }
-
- private:
-  McapWriter* writer_;
-  std::string name_;
-  std::optional<std::uint16_t> channel_;
-};
-
-/// The stamp comes back as it was: the whole seconds are exact, and of the rest what a double
-/// cannot hold is dropped, 1700000003.3 is no 1700000003.299999952.
-std::int64_t nanoseconds(double stamp_s) {
-  require(stamp_s >= 0.0 && stamp_s < 0x1p31, "stamp_s", stamp_s, "0 <= stamp_s < 2147483648");
-  constexpr double second_ns = 1e9;
-  const double whole = std::floor(stamp_s);
-  const double rest_us = std::round((stamp_s - whole) * 1e6);
-  const double rest_ns = std::round((stamp_s - whole) * second_ns);
-  const bool is_whole_us = whole + rest_us / 1e6 == stamp_s;
-  return std::llround(whole) * std::int64_t{1'000'000'000} +
-         std::llround(is_whole_us ? 1e3 * rest_us : rest_ns);
-}
-
 }  // namespace
 
 RecordingConversion convert_to_recording(const Dataset& dataset, const fs::path& file,
@@ -76,11 +40,11 @@ RecordingConversion convert_to_recording(const Dataset& dataset, const fs::path&
   TemporaryFile unfinished(file);
   // JPEG and PNG are packed already.
   McapWriter writer(unfinished.path(), {.compression = McapCompression::none});
-  Topic<ros::CompressedImage> pictures(writer, "/camera/image/compressed");
-  Topic<ros::Odometry> odometry(writer, "/odom");
-  Topic<ros::Imu> imu(writer, "/imu");
-  Topic<ros::PoseStamped> poses(writer, "/ground_truth");
-  Topic<ros::PointStamped> positions(writer, "/ground_truth");
+  TopicWriter<ros::CompressedImage> pictures(writer, "/camera/image/compressed");
+  TopicWriter<ros::Odometry> odometry(writer, "/odom");
+  TopicWriter<ros::Imu> imu(writer, "/imu");
+  TopicWriter<ros::PoseStamped> poses(writer, "/ground_truth");
+  TopicWriter<ros::PointStamped> positions(writer, "/ground_truth");
   std::int64_t log_ns = 0;
   for (std::size_t i = 0; i < dataset.entries.size(); ++i) {
     const DatasetEntry& entry = dataset.entries[i];

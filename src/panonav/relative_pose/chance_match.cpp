@@ -120,6 +120,13 @@ bool ChanceMatch::beyond_chance() const noexcept {
   return deviation > 1e-6 && match - chance > rare * deviation;
 }
 
+double ChanceMatch::direction_probability() const noexcept {
+  if (deviation <= 1e-6) return 0.0;
+  constexpr double most = 10.0;  // deviations; beyond them nothing was learnt
+  const double deviations = std::min((match - chance) / deviation, most);
+  return 1.0 / (1.0 + std::exp(2.301 - 1.074 * deviations));
+}
+
 ChanceMatch chance_match(const HomingView& home, const HomingView& current,
                          const FourierHomingOptions& options) {
   const HomingView goal = banded(home);

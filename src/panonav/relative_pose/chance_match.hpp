@@ -17,6 +17,11 @@ struct ChanceMatch {
   /// common. False for views without structure, and where all noise matches alike, as with one
   /// frequency.
   [[nodiscard]] bool beyond_chance() const noexcept;
+  /// How probable it is that the home vector points home within 45 degrees, 0 .. 1, by how many
+  /// deviations the match exceeds chance. Learnt once from views of built-in scenes, as many from
+  /// up to 0.3 m, 1 m, 3 m, 6 m and from other scenes (docs/decisions.md). Places that repeat
+  /// themselves look the same from several metres: there it says too much.
+  [[nodiscard]] double direction_probability() const noexcept;
 };
 
 /// Matches `home` with `current` and with 40 views of noise made of it: each frequency of its

@@ -1,0 +1,347 @@
+#include "panonav/pipeline/run_recorder.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <condition_variable>
+#include <deque>
+#include <exception>
+#include <functional>
+#include <mutex>
+#include <numbers>
+#include <span>
+#include <thread>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/positions.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav/pipeline/internal/topic_writer.hpp"
+
+namespace panonav {
+
+namespace {
+
+/// x, y, z and one more value of each point, as float32.
+struct Cloud {
+  std::vector<float> values;
+
+  void add(const Point2& point, double value) {
+    for (const double one : {point.x_m, point.y_m, 0.0, value}) {
+      values.push_back(static_cast<float>(one));
+    }
+  }
+  [[nodiscard]] ros::PointCloud2 message(std::int64_t stamp_ns, const std::string& fourth) const {
+    static_assert(std::endian::native == std::endian::little);
+    constexpr std::uint32_t step = 16;
+    ros::PointCloud2 cloud;
+    cloud.header = {stamp_ns, "map"};
+    cloud.width = static_cast<std::uint32_t>(values.size() / 4);
+    cloud.fields = {{"x", 0, 7, 1}, {"y", 4, 7, 1}, {"z", 8, 7, 1}, {fourth, 12, 7, 1}};
+    cloud.point_step = step;
+    cloud.row_step = step * cloud.width;
+    cloud.data = std::span(reinterpret_cast<const std::uint8_t*>(values.data()),
+                           values.size() * sizeof(float));
+    return cloud;
+  }
+};
+
+/// Free where a camera has stood, with as much around it; nothing is known of the rest. Empty where
+/// the references are too far apart for a grid.
+std::optional<ros::OccupancyGrid> visited_grid(const std::vector<Point2>& positions,
+                                               std::int64_t stamp_ns) {
+  constexpr double cell_m = 0.1;
+  constexpr int around = 2;  // cells
+  constexpr double max_cells = 4e6;
+  const auto [low_x, high_x] = std::ranges::minmax(positions, {}, &Point2::x_m);
+  const auto [low_y, high_y] = std::ranges::minmax(positions, {}, &Point2::y_m);
+  const double columns = std::ceil((high_x.x_m - low_x.x_m) / cell_m) + 2 * around + 1;
+  const double rows = std::ceil((high_y.y_m - low_y.y_m) / cell_m) + 2 * around + 1;
+  if (!(columns * rows <= max_cells)) return std::nullopt;
+  ros::OccupancyGrid grid;
+  grid.header = {stamp_ns, "map"};
+  grid.map_load_time_ns = stamp_ns;
+  grid.resolution = static_cast<float>(cell_m);
+  grid.width = static_cast<std::uint32_t>(columns);
+  grid.height = static_cast<std::uint32_t>(rows);
+  const Point2 corner{low_x.x_m - (around + 0.5) * cell_m, low_y.y_m - (around + 0.5) * cell_m};
+  grid.origin.position = {corner.x_m, corner.y_m, 0.0};
+  grid.cells.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), -1);
+  for (const Point2& position : positions) {
+    const int column = static_cast<int>((position.x_m - corner.x_m) / cell_m);
+    const int row = static_cast<int>((position.y_m - corner.y_m) / cell_m);
+    for (int r = row - around; r <= row + around; ++r) {
+      for (int c = column - around; c <= column + around; ++c) {
+        if (r < 0 || c < 0 || r >= static_cast<int>(rows) || c >= static_cast<int>(columns)) {
+          continue;
+        }
+        grid.cells[static_cast<std::size_t>(r) * grid.width + static_cast<std::size_t>(c)] = 0;
+      }
+    }
+  }
+  return grid;
+}
+
+/// Rows and columns of x, y and heading within those of x, y, z and the three turns.
+ros::Covariance6 in_space(const std::array<double, 9>& planar) {
+  constexpr std::array<std::size_t, 3> at{0, 1, 5};
+  ros::Covariance6 covariance{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) covariance[6 * at[i] + at[j]] = planar[3 * i + j];
+  }
+  return covariance;
+}
+
+}  // namespace
+
+void describe(RunMoment& moment, const MonteCarloEstimate& estimate) {
+  moment.pose = estimate.pose;
+  if (estimate.pose && !estimate.modes.empty()) {
+    moment.covariance = estimate.modes.front().covariance;
+  }
+  moment.sure = estimate.state == LocalisationState::localised;
+  moment.state = moment.sure                                      ? "localised"
+                 : estimate.state == LocalisationState::ambiguous ? "ambiguous"
+                                                                  : "lost";
+  moment.values = {{"probability", fixed(estimate.probability, 4)},
+                   {"inside", fixed(estimate.inside, 4)},
+                   {"modes", std::to_string(estimate.modes.size())},
+                   {"particles", std::to_string(estimate.particles)}};
+}
+
+void describe(RunMoment& moment, const Place& place) {
+  moment.sure = place.known;
+  moment.state = place.known ? "known place" : "unknown place";
+  moment.values = {{"known_probability", fixed(place.known_probability, 4)}};
+  if (!place.matches.empty()) moment.values.emplace_back("best_match", place.matches.front().name);
+  if (!place.known || !place.position || !place.heading_rad) return;
+  moment.pose = Pose2{place.position->x_m, place.position->y_m, *place.heading_rad};
+  if (place.position->radius_m) {
+    // 95 % of a circular normal distribution lie within 2.4477 standard deviations.
+    const double deviation_m = *place.position->radius_m / 2.4477;
+    const double variance = deviation_m * deviation_m;
+    // Of the heading nothing is stated: the variance of a turn that may be any.
+    constexpr double any_turn = std::numbers::pi * std::numbers::pi / 3.0;
+    moment.covariance = {variance, 0, 0, 0, variance, 0, 0, 0, any_turn};
+  }
+}
+
+struct RunRecorder::Implementation {
+  Implementation(const std::filesystem::path& file, const RunRecorderOptions& wanted)
+      : options(wanted),
+        writer(file, {.compression = McapCompression::lz4}),
+        pictures(writer, "/camera/image/compressed"),
+        panoramas(writer, "/panorama/compressed"),
+        best_matches(writer, "/best_match/compressed"),
+        transforms(writer, "/tf"),
+        references(writer, "/references"),
+        particles(writer, "/particles"),
+        path_points(writer, "/path/points"),
+        particle_poses(writer, "/particles/poses"),
+        path(writer, "/path"),
+        grid(writer, "/visited"),
+        poses(writer, "/pose"),
+        diagnostics(writer, "/diagnostics"),
+        truths(writer, "/ground_truth"),
+        thread([this] { work(); }) {}
+
+  void write_picture(TopicWriter<ros::CompressedImage>& topic, std::int64_t ns,
+                     const std::string& frame, std::span<const std::uint8_t> bytes) {
+    topic.write(log_ns, ns, {{ns, frame}, "png", bytes});
+  }
+
+  void write(const RunMoment& moment) {
+    const std::int64_t ns = nanoseconds(moment.stamp_s);
+    log_ns = std::max(log_ns, ns);  // the clock may have been set back
+    if (moment.picture) {
+      write_picture(pictures, ns, "camera", encode_png(moment.picture->view()));
+    }
+    if (moment.panorama) {
+      const Image picture = to_picture(*moment.panorama);
+      write_picture(panoramas, ns, "camera", encode_png(picture.view()));
+    }
+    if (!moment.best_match.empty()) write_picture(best_matches, ns, "camera", moment.best_match);
+    ros::TFMessage tf;
+    // Without it Rerun shows the topics that are given in "map" nowhere.
+    tf.transforms.push_back({{ns, "tf#/"}, "map", {}});
+    if (moment.pose) {
+      tf.transforms.push_back({{ns, "map"}, "base_link", ros::pose_of(*moment.pose)});
+    }
+    transforms.write(log_ns, ns, tf);
+    if (moment.pose) {
+      ros::PoseWithCovarianceStamped pose{{ns, "map"}, {ros::pose_of(*moment.pose), {}}};
+      if (moment.covariance) pose.pose.covariance = in_space(*moment.covariance);
+      poses.write(log_ns, ns, pose);
+      write_path(ns, *moment.pose);
+    }
+    if (!moment.particles.empty()) {
+      Cloud cloud;
+      ros::PoseArray array{{ns, "map"}, {}};
+      for (const Pose2& pose : moment.particles) {
+        cloud.add(pose.position(), pose.heading_rad);
+        array.poses.push_back(ros::pose_of(pose));
+      }
+      particles.write(log_ns, ns, cloud.message(ns, "heading"));
+      particle_poses.write(log_ns, ns, array);
+    }
+    if (moment.truth) {
+      truths.write(log_ns, ns,
+                   {{ns, "map"},
+                    ros::pose_of({moment.truth->x_m, moment.truth->y_m,
+                                  moment.truth->heading_rad.value_or(0.0)})});
+    }
+    ros::DiagnosticStatus status{.level = static_cast<std::uint8_t>(moment.sure ? 0 : 1),
+                                 .name = "panonav: localisation",
+                                 .message = moment.state,
+                                 .hardware_id = {},
+                                 .values = {}};
+    for (const auto& [key, value] : moment.values) status.values.push_back({key, value});
+    diagnostics.write(log_ns, ns, {{ns, ""}, {status}});
+  }
+
+  /// So that a long run does not write a path of all its poses each time, every second one of them
+  /// is dropped when there are many.
+  void write_path(std::int64_t ns, const Pose2& pose) {
+    constexpr std::size_t max_poses = 1024;
+    if (moments_on_path++ % path_every == 0) {
+      taken.push_back({ns, pose});
+      if (taken.size() == max_poses) {
+        for (std::size_t i = 0; 2 * i < taken.size(); ++i) taken[i] = taken[2 * i];
+        taken.resize(max_poses / 2);
+        path_every *= 2;
+      }
+    }
+    Cloud cloud;
+    ros::Path message{{ns, "map"}, {}};
+    for (const auto& [stamp_ns, at] : taken) {
+      cloud.add(at.position(), at.heading_rad);
+      message.poses.push_back({{stamp_ns, "map"}, ros::pose_of(at)});
+    }
+    path_points.write(log_ns, ns, cloud.message(ns, "heading"));
+    path.write(log_ns, ns, message);
+  }
+
+  void write_references(const std::vector<Point2>& positions, double stamp_s) {
+    if (positions.empty()) return;
+    const std::int64_t ns = nanoseconds(stamp_s);
+    log_ns = std::max(log_ns, ns);
+    Cloud cloud;
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+      cloud.add(positions[i], static_cast<double>(i));
+    }
+    references.write(log_ns, ns, cloud.message(ns, "number"));
+    if (const auto visited = visited_grid(positions, ns)) grid.write(log_ns, ns, *visited);
+  }
+
+  using Job = std::function<void()>;
+
+  void add(Job job) {
+    std::unique_lock lock(mutex);
+    if (failure) std::rethrow_exception(failure);
+    if (closed) throw ContractError("recording", "closed", "open, to be written to");
+    if (options.wait) {
+      taken_away.wait(lock, [this] { return waiting.size() < options.max_waiting; });
+    } else if (waiting.size() >= options.max_waiting) {
+      ++left_out;
+      return;
+    }
+    waiting.push_back(std::move(job));
+    came.notify_one();
+  }
+
+  void work() {
+    std::unique_lock lock(mutex);
+    while (true) {
+      came.wait(lock, [this] { return closed || !waiting.empty(); });
+      if (waiting.empty()) return;
+      const Job job = std::move(waiting.front());
+      waiting.pop_front();
+      lock.unlock();
+      std::exception_ptr thrown;
+      try {
+        if (!failed) job();
+      } catch (const Error&) {
+        thrown = std::current_exception();
+        failed = true;
+      }
+      lock.lock();
+      if (thrown && !failure) failure = thrown;
+      taken_away.notify_one();
+    }
+  }
+
+  void close() {
+    {
+      const std::lock_guard lock(mutex);
+      if (closed) return;
+      closed = true;
+      came.notify_one();
+    }
+    thread.join();
+    if (failure) std::rethrow_exception(failure);
+    writer.close();
+  }
+
+  RunRecorderOptions options;
+  McapWriter writer;  // the thread's, from here
+  TopicWriter<ros::CompressedImage> pictures, panoramas, best_matches;
+  TopicWriter<ros::TFMessage> transforms;
+  TopicWriter<ros::PointCloud2> references, particles, path_points;
+  TopicWriter<ros::PoseArray> particle_poses;
+  TopicWriter<ros::Path> path;
+  TopicWriter<ros::OccupancyGrid> grid;
+  TopicWriter<ros::PoseWithCovarianceStamped> poses;
+  TopicWriter<ros::DiagnosticArray> diagnostics;
+  TopicWriter<ros::PoseStamped> truths;
+  std::vector<std::pair<std::int64_t, Pose2>> taken;
+  std::size_t moments_on_path = 0;
+  std::size_t path_every = 1;
+  std::int64_t log_ns = 0;
+  bool failed = false;  // to here
+  std::mutex mutex;
+  std::condition_variable came;
+  std::condition_variable taken_away;
+  std::deque<Job> waiting;
+  std::exception_ptr failure;
+  std::size_t left_out = 0;
+  bool closed = false;
+  std::thread thread;
+};
+
+RunRecorder::RunRecorder(const std::filesystem::path& file, const RunRecorderOptions& options)
+    : implementation_(std::make_unique<Implementation>(file, options)) {}
+
+RunRecorder::~RunRecorder() {
+  try {
+    implementation_->close();
+  } catch (const Error&) {  // NOLINT(bugprone-empty-catch): `close` would have said it
+  }
+}
+
+void RunRecorder::add_references(const VisualMemory& memory, double stamp_s) {
+  std::vector<Point2> positions;
+  for (const ViewId view : memory.views()) {
+    if (const auto& pose = memory.info(view).pose) positions.push_back(pose->position());
+  }
+  auto& self = *implementation_;
+  self.add([&self, positions = std::move(positions), stamp_s] {
+    self.write_references(positions, stamp_s);
+  });
+}
+
+void RunRecorder::add(RunMoment moment) {
+  auto& self = *implementation_;
+  self.add([&self, moment = std::move(moment)] { self.write(moment); });
+}
+
+void RunRecorder::close() {
+  implementation_->close();
+}
+
+std::size_t RunRecorder::left_out() const {
+  const std::lock_guard lock(implementation_->mutex);
+  return implementation_->left_out;
+}
+
+}  // namespace panonav
