@@ -168,6 +168,7 @@ struct RunRecorder::Implementation {
     if (moment.pose) {
       tf.transforms.push_back({{ns, "map"}, "base_link", ros::pose_of(*moment.pose)});
     }
+    tf.transforms.push_back({{ns, "base_link"}, "camera", {}});
     transforms.write(log_ns, ns, tf);
     if (moment.pose) {
       ros::PoseWithCovarianceStamped pose{{ns, "map"}, {ros::pose_of(*moment.pose), {}}};
