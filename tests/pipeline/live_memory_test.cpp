@@ -1,0 +1,98 @@
+#include "panonav/pipeline/live_memory.hpp"
+
+#include <gtest/gtest.h>
+
+#include "panonav/core/error.hpp"
+#include "panonav/io/recording.hpp"
+#include "panonav/pipeline/run_recorder.hpp"
+#include "support/landmark_pictures.hpp"
+#include "support/temporary_folder.hpp"
+
+namespace panonav::testing {
+namespace {
+
+PictureSource panoramas() {
+  PictureSource source;
+  source.layout.elevations = ElevationBand{radians(-20.0), radians(20.0)};
+  return source;
+}
+
+Observation seen_at(const ToyWorld& world, const Pose2& pose, std::size_t number) {
+  Observation seen(world.picture(pose, 96, 12));
+  seen.name = "view " + std::to_string(number);
+  seen.stamp_s = 0.5 * static_cast<double>(number);
+  seen.pose = ReferencePose{pose.x_m, pose.y_m, pose.heading_rad};
+  return seen;
+}
+
+/// Answers of a walk over the grid, `learn` on, and what a recorder of it left out.
+std::vector<bool> walk(const std::filesystem::path& memory, bool in_step, std::size_t& left_out,
+                       const std::filesystem::path& record) {
+  LiveMemory live(memory, {.learn = true,
+                           .min_interval_s = 0.5,
+                           .in_step = in_step,
+                           .memoriser = {.source = panoramas()}});
+  RunRecorder recorder(record, {.wait = in_step, .max_waiting = 8});
+  const ToyWorld world = landmark_world(5);
+  std::vector<bool> known;
+  std::size_t number = 0;
+  for (int round = 0; round < 2; ++round) {
+    for (const Pose2& pose : grid_poses(6)) {
+      Observation seen = seen_at(world, pose, number++);
+      const auto answer = live.answer(seen);
+      known.push_back(answer.place && answer.place->known);
+      RunMoment moment{.stamp_s = *seen.stamp_s, .truth = seen.pose};
+      if (answer.place) describe(moment, *answer.place);
+      recorder.add(std::move(moment));
+      if (answer.is_new) live.learn(std::move(seen));
+    }
+  }
+  recorder.close();
+  left_out = recorder.left_out();
+  live.finish();
+  return known;
+}
+
+TEST(LiveMemory, LearnsWhatIsNewAndKnowsItWhenItComesBack) {
+  const TemporaryFolder folder;
+  std::size_t left_out = 0;
+  const auto known = walk(folder / "a.panonav", true, left_out, folder / "a.mcap");
+  EXPECT_EQ(left_out, 0U);
+  EXPECT_EQ(std::count(known.begin(), known.begin() + 32, true), 0);  // as many begin a memory
+  EXPECT_GE(std::count(known.begin() + 36, known.end(), true), 34);
+  const auto file = MemoryFile::open(folder / "a.panonav", Access::read_only);
+  EXPECT_GE(file.info().views, 32U);
+  EXPECT_LE(file.info().views, 40U);
+  // In step, the same observations give the same answers.
+  EXPECT_EQ(walk(folder / "b.panonav", true, left_out, folder / "b.mcap"), known);
+}
+
+TEST(LiveMemory, BesideTheAnswersItLearnsTheSameViewsAndLosesNoMoment) {
+  const TemporaryFolder folder;
+  std::size_t left_out = 0;
+  const auto known = walk(folder / "a.panonav", false, left_out, folder / "a.mcap");
+  EXPECT_GE(MemoryFile::open(folder / "a.panonav", Access::read_only).info().views, 32U);
+  const auto recording = Recording::open(folder / "a.mcap");
+  for (const auto& topic : recording->topics()) {
+    if (topic.name == "/diagnostics") {
+      EXPECT_EQ(topic.messages + left_out, known.size());
+    }
+  }
+}
+
+TEST(LiveMemory, WithoutLearningThereMustBeAMemory) {
+  const TemporaryFolder folder;
+  EXPECT_THROW(LiveMemory(folder / "none.panonav"), FileError);
+}
+
+TEST(RunRecorder, WhatCannotBeWrittenIsSaidOnceAndNothingMoreIsTaken) {
+  EXPECT_THROW(RunRecorder("/dev/full"), FileError);
+  const TemporaryFolder folder;
+  RunRecorder recorder(folder / "a.mcap");
+  recorder.close();
+  recorder.close();
+  EXPECT_THROW(recorder.add({}), ContractError);
+}
+
+}  // namespace
+}  // namespace panonav::testing
