@@ -73,6 +73,17 @@ class Walk : public ::testing::Test {
     bytes << file.rdbuf();
     return bytes.str();
   }
+  /// The walk as what the camera of v4l2_shim.cpp sees.
+  void write_camera_pictures() const {
+    std::string pictures;
+    for (std::size_t i = 1; i <= count; ++i) {
+      const std::string bytes = jpeg(i);
+      const auto length = static_cast<std::uint32_t>(bytes.size());
+      pictures.append(reinterpret_cast<const char*>(&length), sizeof(length));
+      pictures += bytes;
+    }
+    write_file(folder / "pictures", std::string_view(pictures));
+  }
   [[nodiscard]] std::string path(const std::string& name) const { return folder / name; }
   [[nodiscard]] static VisualMemory views(const std::string& memory) {
     return MemoryFile::open(memory, Access::read_only).load();
@@ -254,6 +265,24 @@ TEST_F(Walk, ARecordHoldsWhatWasSeenAndAnswered) {
   });
 }
 
+TEST_F(Walk, TheBestMatchOfARecordIsThatOfTheNamedViewAlsoWhereItWasJustLearnt) {
+  run_well({"memorise", path("walk"), path("a.panonav")});
+  run_well({"forget", path("a.panonav"), view_name(count - 1)});  // ids are not used twice
+  write_dataset(folder / "other", landmark_world(77), poses_);
+  for (std::size_t i = 0; i < count; ++i) {
+    fs::rename(folder / "other" / view_name(i), folder / "other" / ("o" + view_name(i)));
+  }
+  fs::remove(folder / "other/dataset.toml");
+  const auto answers = answers_of({"run", path("other"), "--memory", path("a.panonav"), "--learn",
+                                   "--json", "--record", path("run.mcap")});
+  std::size_t of_learnt = 0;
+  for (const auto& answer : answers) {
+    of_learnt += answer.at("matches").at(0).at("file").get<std::string>().starts_with("o") ? 1 : 0;
+  }
+  EXPECT_GE(of_learnt, 5U);
+  EXPECT_EQ(topics_of(path("run.mcap")).at("/best_match/compressed"), count);
+}
+
 TEST_F(Walk, ATrackIsRecordedWithItsParticlesAndItsPath) {
   run_well({"memorise", path("walk"), path("a.panonav")});
   (void)run_panonav({"track", path("a.panonav"), path("walk"), "--record", path("track.mcap")});
@@ -328,14 +357,7 @@ TEST_F(Walk, InfoListsWhatACameraOffers) {
 }
 
 TEST_F(Walk, RunFollowsACameraThatIsUnpluggedAndComesBack) {
-  std::string pictures;
-  for (std::size_t i = 1; i <= count; ++i) {
-    const std::string bytes = jpeg(i);
-    const auto length = static_cast<std::uint32_t>(bytes.size());
-    pictures.append(reinterpret_cast<const char*>(&length), sizeof(length));
-    pictures += bytes;
-  }
-  write_file(folder / "pictures", std::string_view(pictures));
+  write_camera_pictures();
   run_well({"memorise", path("walk"), path("a.panonav")});
   const std::string command =
       "V4L2_SHIM_RATE=20 V4L2_SHIM_UNPLUG=10 V4L2_SHIM_PICTURES=" + shell_quoted(path("pictures")) +
@@ -359,14 +381,7 @@ TEST_F(Walk, RunFollowsACameraThatIsUnpluggedAndComesBack) {
 }
 
 TEST_F(Walk, AnInterruptedRunHasStoredWhatItLearnt) {
-  std::string pictures;
-  for (std::size_t i = 1; i <= count; ++i) {
-    const std::string bytes = jpeg(i);
-    const auto length = static_cast<std::uint32_t>(bytes.size());
-    pictures.append(reinterpret_cast<const char*>(&length), sizeof(length));
-    pictures += bytes;
-  }
-  write_file(folder / "pictures", std::string_view(pictures));
+  write_camera_pictures();
   const std::string command =
       "V4L2_SHIM_RATE=50 V4L2_SHIM_PICTURES=" + shell_quoted(path("pictures")) +
       " ASAN_OPTIONS=verify_asan_link_order=0:detect_leaks=0 LD_PRELOAD=" +

@@ -93,7 +93,7 @@ class StopSignals {
 };
 
 /// Prints lines on a thread of its own. A reader that is slow does not hold up the robot: beyond
-/// `most` waiting lines the oldest are left out and counted.
+/// `max_waiting` lines the oldest are left out and counted.
 class LinePrinter {
  public:
   LinePrinter(Session& session, bool wait)
@@ -104,8 +104,8 @@ class LinePrinter {
 
   void print(std::string line) {
     std::unique_lock lock(mutex_);
-    if (wait_) printed_.wait(lock, [this] { return lines_.size() < most; });
-    if (lines_.size() == most) {
+    if (wait_) printed_.wait(lock, [this] { return lines_.size() < max_waiting; });
+    if (lines_.size() == max_waiting) {
       lines_.pop_front();
       ++left_out_;
     }
@@ -139,7 +139,7 @@ class LinePrinter {
     }
   }
 
-  static constexpr std::size_t most = 256;
+  static constexpr std::size_t max_waiting = 256;
   Session& session_;
   bool wait_;
   std::mutex mutex_;
@@ -152,12 +152,11 @@ class LinePrinter {
 };
 
 /// How the pictures lie that a new memory is made from, or as those of the memory.
-PictureSource source_of(const RunArguments& wanted) {
+PictureSource source_of(const RunArguments& wanted,
+                        const std::optional<PictureSource>& remembered) {
   if (auto stated = picture_source(wanted.pictures)) return *stated;
-  if (!fs::exists(wanted.memory)) {
-    throw UsageError(wanted.memory + " is a new memory; say what the pictures show with --kind");
-  }
-  return MemoryFile::open(wanted.memory, Access::read_only).header().source;
+  if (remembered) return *remembered;
+  throw UsageError(wanted.memory + " is a new memory; say what the pictures show with --kind");
 }
 
 struct RunCounts {
@@ -219,7 +218,7 @@ class Recording {
     if (answer.place) {
       describe(moment, *answer.place);
       if (!answer.place->matches.empty()) {
-        moment.best_match = thumbnail(answer.place->matches.front().view);
+        moment.best_match = thumbnail(answer.place->matches.front().name);
       }
       // Rarely: the cloud is that of all views.
       if (memory.views() > references_ + references_ / 8) {
@@ -231,9 +230,12 @@ class Recording {
     }
     recorder_.add(std::move(moment));
   }
-  std::vector<std::uint8_t> thumbnail(ViewId view) {
+  /// By name: views that were just learnt have other ids in the file.
+  std::vector<std::uint8_t> thumbnail(const std::string& name) {
     if (!file_) file_ = MemoryFile::open(path_, Access::read_only);
-    return file_->thumbnail(view).value_or(std::vector<std::uint8_t>{});
+    const auto view = file_->find(name);
+    const auto picture = view ? file_->thumbnail(*view) : std::nullopt;
+    return picture.value_or(std::vector<std::uint8_t>{});
   }
 
   RunRecorder recorder_;
@@ -280,8 +282,10 @@ ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& se
     arguments.refuse_unused({"--camera-width", "--camera-height"},
                             "where " + wanted.source + " is no live source");
   }
+  std::optional<PictureSource> remembered;
   if (fs::exists(wanted.memory)) {
     const auto memory = MemoryFile::open(wanted.memory, Access::read_only);
+    remembered = memory.header().source;
     require_kept_options(arguments, wanted.signature, wanted.preprocessing, memory);
   } else if (!wanted.learn) {
     throw FileError(wanted.memory, "no such file; --learn makes it");
@@ -292,14 +296,10 @@ ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& se
     LiveOptions options;
     if (wanted.camera_width) options.size = ImageSize{*wanted.camera_width, *wanted.camera_height};
     auto observations =
-        std::make_unique<LiveObservations>(wanted.source, source_of(wanted), options);
+        std::make_unique<LiveObservations>(wanted.source, source_of(wanted, remembered), options);
     pictures = &observations->live();
     source = std::move(observations);
   } else {
-    std::optional<PictureSource> remembered;
-    if (fs::exists(wanted.memory)) {
-      remembered = MemoryFile::open(wanted.memory, Access::read_only).header().source;
-    }
     source = std::make_unique<DatasetObservations>(
         open_recording(wanted.source, wanted.pictures, remembered, session), session.executor());
   }

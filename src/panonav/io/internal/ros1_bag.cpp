@@ -61,8 +61,8 @@ class BagFile : public ChunkedFile {
  public:
   BagFile(const std::filesystem::path& path, const RecordingLimits& limits)
       : ChunkedFile(path, limits) {
-    constexpr std::uint64_t most_head = 4096;
-    const auto first = peek(bag_magic.size(), most_head);
+    constexpr std::uint64_t max_head = 4096;
+    const auto first = peek(bag_magic.size(), max_head);
     const BagFields head(Fields(first).prefixed());
     if (head.kind() != BagRecord::bag_header) fail("is damaged: it does not begin with its head");
     if (!head.text("encryptor").empty()) {
@@ -230,11 +230,11 @@ class BagFile : public ChunkedFile {
   }
 
   void scan(std::uint64_t index_at) {
-    constexpr std::uint32_t most_header = 1U << 20U;
+    constexpr std::uint32_t max_header = 1U << 20U;
     std::uint64_t at = bag_magic.size();
     while (at != index_at) {
       const auto length = Fields(peek(at, 4)).number<std::uint32_t>();
-      if (length > most_header) break;
+      if (length > max_header) break;
       Fields fields(peek(at, 4 + length + 4));
       const BagFields header(fields.prefixed());
       const std::uint64_t data_bytes = fields.number<std::uint32_t>();

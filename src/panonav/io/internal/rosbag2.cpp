@@ -57,9 +57,9 @@ class DatabaseFile : public RecordingFile {
         &steps_left_);
     sqlite3_db_config(handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
     sqlite3_db_config(handle, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
-    constexpr std::size_t most_blob = 1U << 30U;
+    constexpr std::size_t max_blob = 1U << 30U;
     sqlite3_limit(handle, SQLITE_LIMIT_LENGTH,
-                  static_cast<int>(std::min(limits.chunk_bytes, most_blob)));
+                  static_cast<int>(std::min(limits.chunk_bytes, max_blob)));
     constexpr std::int64_t at_least = 10'000'000, for_each_byte = 12;
     std::error_code unknown;
     const auto bytes = fs::file_size(path, unknown);
@@ -224,9 +224,9 @@ std::unique_ptr<const RecordingFile> open_rosbag2_database(const fs::path& path,
 }
 
 std::vector<fs::path> read_rosbag2_folder(const fs::path& folder) {
-  constexpr std::size_t most_bytes = 4U << 20U;
+  constexpr std::size_t max_bytes = 4U << 20U;
   const fs::path path = folder / "metadata.yaml";
-  const auto bytes = read_file(path, most_bytes);
+  const auto bytes = read_file(path, max_bytes);
   std::vector<fs::path> files;
   try {
     const YAML::Node root = YAML::Load(std::string(bytes.begin(), bytes.end()));
