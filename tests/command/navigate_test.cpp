@@ -78,13 +78,17 @@ TEST_F(Navigate, ArrivesAndReportsEachStep) {
   const auto told = objects(result.out);
   ASSERT_GT(told.size(), 5U);
   int on_route = 0;
+  std::size_t sure = 0;
   for (std::size_t i = 0; i + 1 < told.size(); ++i) {
     EXPECT_EQ(told[i]["step"], i + 1);
     EXPECT_EQ(told[i]["state"], i + 2 < told.size() ? "moving" : "arrived");
     EXPECT_TRUE(told[i]["nearest"].is_string());
+    EXPECT_LE(told[i]["probability"], 1.0);
+    sure += told[i]["probability"] >= 0.9 ? 1U : 0U;
     on_route += told[i]["on_route"].get<bool>() ? 1 : 0;
   }
   EXPECT_GT(on_route, 0);
+  EXPECT_GE(sure, told.size() * 3 / 4);
   const json& summary = told.back();
   EXPECT_EQ(summary["end"], "arrived");
   EXPECT_EQ(summary["edges_from"], "lattice");
@@ -103,6 +107,21 @@ TEST_F(Navigate, ArrivesAndReportsEachStep) {
   std::string start(8, '\0');
   picture.read(start.data(), 8);
   EXPECT_EQ(start, "\x89PNG\r\n\x1a\n");
+}
+
+TEST_F(Navigate, IsLostInAnotherBuilding) {
+  const std::vector<std::string> elsewhere{"navigate", memory,   "--goal", "1",
+                                           "--scene",  "garden", "--seed", "2"};
+  const auto result = run_panonav(with(elsewhere, {"--json"}));
+  EXPECT_EQ(result.exit_code, 1) << result.err;
+  const auto told = objects(result.out);
+  EXPECT_EQ(told.back()["end"], "lost");
+  EXPECT_LE(told.size(), 25U);
+  for (std::size_t i = 0; i + 1 < told.size(); ++i) EXPECT_LT(told[i]["probability"], 0.5);
+  const auto text = run_panonav(elsewhere);
+  EXPECT_NE(text.out.find("sure of its place, with a probability of 0.5 or more, in 0 of "),
+            std::string::npos)
+      << text.out;
 }
 
 TEST_F(Navigate, SameSeedSameRunOnAnyNumberOfThreads) {

@@ -225,5 +225,40 @@ TEST(PlaceModel, ProbabilityFallsWithTheDifferenceAndIsNoneWhereNothingIsSeen) {
   EXPECT_FALSE(found.matches.empty());
 }
 
+// A navigator asks so, which holds a part of the memory only.
+TEST(PlaceModel, EvidenceForOneViewIsThatOfTheBestMatchWhereItIsTheOne) {
+  const RememberedRoom place(11, {}, 0.4);
+  const VisualMemory& memory = place.memory;
+  const ColumnRanking ranking(memory);
+  const PlaceCriterion whole(ranking);
+  const PlaceCriterion in_parts{MemoryViewSource(memory)};
+  Random random(5);
+  for (int i = 0; i < 10; ++i) {
+    const Point2 at = place.grid[random.index(place.grid.size())];
+    const PackedSignature query =
+        pack(compute_signature(place.room.see({at.x_m + 0.1, at.y_m, 0.4}, 16, 96)),
+             memory.full_scale());
+    const auto matches = ranking.rank(query, memory.search(query, {.top = 16}).matches);
+    const PlaceEvidence best = whole.evidence(query, matches);
+    std::vector<PackedSignature> views;
+    for (const RankedMatch& match : matches) views.push_back(memory.packed(match.match.view));
+    int found = 0;
+    for (std::size_t first = 0; first < views.size(); ++first) {
+      std::swap(views.front(), views[first]);
+      const PlaceEvidence one = in_parts.evidence_for_first(query, views);
+      EXPECT_EQ(one.tenth, best.tenth);
+      EXPECT_EQ(one.chance, best.chance);
+      EXPECT_EQ(one.views, best.views);
+      EXPECT_EQ(one.components, best.components);
+      EXPECT_GE(one.difference, best.difference);
+      EXPECT_LE(place_probability(one), place_probability(best));
+      found += one.difference == best.difference;
+    }
+    EXPECT_EQ(found, 1);
+  }
+  EXPECT_EQ(place_probability(in_parts.evidence_for_first(memory.packed(memory.views()[0]), {})),
+            0.0);
+}
+
 }  // namespace
 }  // namespace panonav::testing

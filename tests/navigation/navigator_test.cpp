@@ -310,6 +310,51 @@ TEST(Navigator, IsLostInAnotherPlace) {
   }
 }
 
+// The limit of the difference alone lets foreign views through; the robot drove on for 30 steps.
+TEST(Navigator, SaysHowProbableItsPlaceIsAndStopsWhereNoneIs) {
+  const ToyWorld world = two_rooms(1, true);
+  const RememberedWorld remembered(world, high, spacing_m, 1);
+  const MemoryViewSource source(remembered.memory);
+  const NavigatorOptions options;
+  Navigator navigator(source, phase_planner(remembered.memory), options);
+  int sure = 0;
+  int right = 0;
+  Random random(4);
+  for (int i = 0; i < 100; ++i) {
+    navigator.set_goal(remembered.memory.views()[random.index(remembered.memory.size())]);
+    navigator.forget_place();
+    const Pose2 pose = free_pose(world, random);
+    const auto decision = navigator.observe(two_rooms_signature(world, pose, random));
+    if (decision.probability < 0.9) continue;
+    ++sure;
+    right += distance(remembered.pose_of(*decision.nearest).position(), pose.position()) <=
+             1.5 * spacing_m;
+  }
+  EXPECT_GE(sure, 80);
+  EXPECT_GE(right, sure * 9 / 10);
+
+  const auto stops = [&](const auto& view) {
+    navigator.set_goal(remembered.memory.views().front());
+    navigator.forget_place();
+    NavigationDecision decision;
+    do {
+      decision = navigator.observe(view());
+      EXPECT_LT(decision.probability, 0.5) << describe(decision);
+    } while (decision.state == NavigationState::moving);
+    EXPECT_EQ(decision.state, NavigationState::lost) << describe(decision);
+    EXPECT_LE(decision.step, 2 * options.lost_patience);
+  };
+  for (std::uint64_t seed = 2; seed <= 4; ++seed) {
+    const ToyWorld elsewhere = two_rooms(seed, true);
+    stops([&] { return two_rooms_signature(elsewhere, free_pose(elsewhere, random), random); });
+  }
+  stops([&] {
+    Panorama noise(12, 64, ElevationBand{radians(-25.0), radians(35.0)});
+    for (float& value : noise.values()) value = static_cast<float>(random.uniform());
+    return compute_signature(preprocess(noise, {}));
+  });
+}
+
 TEST(Navigator, GoesNowhereWithoutAWay) {
   const ToyWorld world = two_rooms(1, false);
   RememberedWorld remembered(world, high, spacing_m, 1);

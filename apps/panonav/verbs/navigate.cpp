@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
@@ -74,6 +75,7 @@ ordered_json as_json(const NavigationDecision& decision, const Pose2& pose,
           {"homing", decision.homing},
           {"on_route", decision.on_route},
           {"nearest", file_or_null(decision.nearest, robot)},
+          {"probability", decision.probability},
           {"next", file_or_null(decision.next, robot)},
           {"area", decision.area},
           {"image_difference", decision.difference},
@@ -114,7 +116,10 @@ std::string in_words(NavigationEvent event) {
 
 std::string as_text(const NavigationDecision& decision, const RobotNavigator& robot) {
   std::string line = "look " + std::to_string(decision.step) + "  ";
-  if (decision.nearest) line += "at " + robot.info(*decision.nearest).name + "  ";
+  if (decision.nearest) {
+    line += "at " + robot.info(*decision.nearest).name + " (probability " +
+            fixed(decision.probability, 2) + ")  ";
+  }
   for (std::size_t i = 0; i < decision.events.size(); ++i) {
     line += (i > 0 ? ", " : "") + in_words(decision.events[i]);
     if (decision.events[i] == NavigationEvent::entered_area) {
@@ -179,6 +184,11 @@ void print_summary(const MissionRun& run, Session& session) {
     way += "; the shortest way is " + fixed(run.shortest_m, 2) + " m long";
   }
   session.print(way);
+  const auto sure = std::ranges::count_if(run.decisions, [](const NavigationDecision& decision) {
+    return decision.probability >= 0.5;
+  });
+  session.print("sure of its place, with a probability of 0.5 or more, in " + std::to_string(sure) +
+                " of " + std::to_string(run.decisions.size()) + " steps");
   if (run.kidnapped_at) {
     session.print("kidnapped after step " + std::to_string(*run.kidnapped_at + 1));
   }

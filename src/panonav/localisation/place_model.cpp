@@ -57,6 +57,23 @@ double better_half(const ColumnProfiles& query, const ColumnProfiles& reference,
          static_cast<double>(half - columns.begin());
 }
 
+// The tenth smallest; of fewer the largest.
+double tenth_of(std::vector<double> differences) {
+  std::ranges::sort(differences);
+  return differences[std::min<std::size_t>(10, differences.size()) - 1];
+}
+
+// Each by its own number.
+std::vector<ViewId> drawn_views(std::span<const ViewId> views) {
+  std::vector<std::pair<std::uint64_t, ViewId>> drawn;
+  for (const ViewId view : views) drawn.emplace_back(Random(1, view.value).next(), view);
+  const std::size_t kept = std::min(drawn.size(), chance_views + spare_views);
+  std::ranges::partial_sort(drawn, drawn.begin() + static_cast<std::ptrdiff_t>(kept));
+  std::vector<ViewId> sample;
+  for (std::size_t i = 0; i < kept; ++i) sample.push_back(drawn[i].second);
+  return sample;
+}
+
 }  // namespace
 
 void visit_options(PlaceModelOptions& options, OptionVisitor& visitor) {
@@ -143,17 +160,17 @@ double place_probability(const PlaceEvidence& evidence) noexcept {
   return 1.0 / (1.0 + std::exp(-z));
 }
 
-PlaceCriterion::PlaceCriterion(const ColumnRanking& ranking) : ranking_(&ranking) {
-  std::vector<std::pair<std::uint64_t, ViewId>> drawn;
-  for (const ViewId view : ranking.memory().views()) {
-    drawn.emplace_back(Random(1, view.value).next(), view);
-  }
-  const std::size_t kept = std::min(drawn.size(), chance_views + spare_views);
-  std::ranges::partial_sort(drawn, drawn.begin() + static_cast<std::ptrdiff_t>(kept));
-  for (std::size_t i = 0; i < kept; ++i) {
-    sample_.push_back(drawn[i].second);
-    profiles_.push_back(profiles(drawn[i].second, {}));
-  }
+PlaceCriterion::PlaceCriterion(const ColumnRanking& ranking)
+    : ranking_(&ranking), sample_(drawn_views(ranking.memory().views())) {
+  for (const ViewId view : sample_) profiles_.push_back(profiles(view, {}));
+}
+
+PlaceCriterion::PlaceCriterion(const ViewSource& source)
+    : views_(static_cast<int>(source.views().size())), sample_(drawn_views(source.views())) {
+  std::vector<ViewId> ascending = sample_;
+  std::ranges::sort(ascending);
+  const VisualMemory loaded = source.load(ascending);
+  for (const ViewId view : sample_) profiles_.emplace_back(loaded.packed(view));
 }
 
 ColumnProfiles PlaceCriterion::profiles(ViewId view,
@@ -163,15 +180,34 @@ ColumnProfiles PlaceCriterion::profiles(ViewId view,
              : ColumnProfiles(ranking_->memory().packed(view), 0, allowed_rows);
 }
 
+double PlaceCriterion::chance(const PackedSignature& query, const ColumnProfiles& asked,
+                              const SearchMask& mask) const {
+  // A picture without structure is like any other without structure.
+  const auto is_flat = [](std::uint8_t value) { return value == 128; };
+  if (std::ranges::all_of(asked.values(), is_flat)) return 0.0;
+  const ColumnProfiles elsewhere(mirrored(query), 0, mask.allowed_rows);
+  std::vector<double> by_chance;
+  for (std::size_t i = 0; i < sample_.size() && by_chance.size() < chance_views; ++i) {
+    if (std::ranges::find(mask.excluded_views, sample_[i]) != mask.excluded_views.end()) continue;
+    const ColumnProfiles reference =
+        mask.allowed_rows.empty() ? profiles_[i] : profiles(sample_[i], mask.allowed_rows);
+    by_chance.push_back(
+        better_half(elsewhere, reference, match_columns(elsewhere, reference).heading_rad));
+  }
+  if (by_chance.empty()) return PlaceEvidence{}.chance;
+  const double middle = mean(by_chance);
+  double variance = 0.0;
+  for (const double value : by_chance) variance += (value - middle) * (value - middle);
+  variance /= static_cast<double>(std::max<std::size_t>(1, by_chance.size() - 1));
+  return std::max(0.0, middle - decile_deviations * std::sqrt(variance));
+}
+
 PlaceEvidence PlaceCriterion::evidence(const PackedSignature& query,
                                        std::span<const RankedMatch> matches,
                                        const SearchMask& mask) const {
   const VisualMemory& memory = ranking_->memory();
   PlaceEvidence found{.components = memory.shape().components};
   if (matches.empty()) return found;
-  const auto is_excluded = [&](ViewId view) {
-    return std::ranges::find(mask.excluded_views, view) != mask.excluded_views.end();
-  };
   found.views = static_cast<int>(memory.size()) -
                 static_cast<int>(std::ranges::count_if(
                     mask.excluded_views, [&](ViewId view) { return memory.contains(view); }));
@@ -190,28 +226,28 @@ PlaceEvidence PlaceCriterion::evidence(const PackedSignature& query,
     found.of_all_columns = std::min(found.of_all_columns, turned.difference);
     differences.push_back(better_half(asked, reference, turned.heading_rad));
   }
-  std::ranges::sort(differences);
+  found.difference = *std::ranges::min_element(differences);
+  found.tenth = tenth_of(std::move(differences));
+  found.chance = chance(query, asked, mask);
+  return found;
+}
+
+PlaceEvidence PlaceCriterion::evidence_for_first(
+    const PackedSignature& query, std::span<const PackedSignature> candidates) const {
+  PlaceEvidence found{.components = query.shape.components};
+  if (candidates.empty()) return found;
+  found.views = views_;
+  const ColumnProfiles asked(query);
+  std::vector<double> differences;
+  for (const PackedSignature& candidate : candidates) {
+    const ColumnProfiles reference(candidate);
+    const ColumnMatch turned = match_columns(asked, reference);
+    if (differences.empty()) found.of_all_columns = std::min(1.0, turned.difference);
+    differences.push_back(better_half(asked, reference, turned.heading_rad));
+  }
   found.difference = differences.front();
-  found.tenth = differences[std::min<std::size_t>(10, differences.size()) - 1];
-  const ColumnProfiles elsewhere(mirrored(query), 0, mask.allowed_rows);
-  std::vector<double> by_chance;
-  for (std::size_t i = 0; i < sample_.size() && by_chance.size() < chance_views; ++i) {
-    if (is_excluded(sample_[i])) continue;
-    const ColumnProfiles reference =
-        mask.allowed_rows.empty() ? profiles_[i] : profiles(sample_[i], mask.allowed_rows);
-    by_chance.push_back(
-        better_half(elsewhere, reference, match_columns(elsewhere, reference).heading_rad));
-  }
-  if (!by_chance.empty()) {
-    const double middle = mean(by_chance);
-    double variance = 0.0;
-    for (const double value : by_chance) variance += (value - middle) * (value - middle);
-    variance /= static_cast<double>(std::max<std::size_t>(1, by_chance.size() - 1));
-    found.chance = std::max(0.0, middle - decile_deviations * std::sqrt(variance));
-  }
-  // A picture without structure is like any other without structure.
-  const auto is_flat = [](std::uint8_t value) { return value == 128; };
-  if (std::ranges::all_of(asked.values(), is_flat)) found.chance = 0.0;
+  found.tenth = tenth_of(std::move(differences));
+  found.chance = chance(query, asked, {});
   return found;
 }
 

@@ -8,6 +8,7 @@
 
 #include "panonav/core/options.hpp"
 #include "panonav/localisation/column_ranking.hpp"
+#include "panonav/memory/view_source.hpp"
 
 namespace panonav {
 
@@ -102,18 +103,29 @@ class PlaceCriterion {
   /// Keeps the column profiles of 80 views drawn from the memory, each by its own number, so that a
   /// view more or less leaves the others in. The ranking must outlive *this.
   explicit PlaceCriterion(const ColumnRanking& ranking);
+  /// Of a memory that is not held whole: loads the drawn views, and no others later.
+  explicit PlaceCriterion(const ViewSource& source);
 
-  /// `matches`: what the search found with this mask; of these the 16 that differ least are looked
-  /// at. Chance is that of the first 64 drawn views that are not excluded. Cost: 0.15 ms.
+  /// `matches`: what the search over the ranking's memory found with this mask; of these the 16
+  /// that differ least are looked at. Chance is that of the first 64 drawn views that are not
+  /// excluded. Cost: 0.15 ms.
   [[nodiscard]] PlaceEvidence evidence(const PackedSignature& query,
                                        std::span<const RankedMatch> matches,
                                        const SearchMask& mask = {}) const;
+  /// What the query tells of one place, right or not, instead of the best match's: that of
+  /// `candidates.front()`. The others are the views of the memory most like the query.
+  [[nodiscard]] PlaceEvidence evidence_for_first(const PackedSignature& query,
+                                                 std::span<const PackedSignature> candidates) const;
 
  private:
   [[nodiscard]] ColumnProfiles profiles(ViewId view,
                                         std::span<const std::uint8_t> allowed_rows) const;
+  /// `PlaceEvidence::chance`; 0 where there is nothing to see.
+  [[nodiscard]] double chance(const PackedSignature& query, const ColumnProfiles& asked,
+                              const SearchMask& mask) const;
 
-  const ColumnRanking* ranking_;
+  const ColumnRanking* ranking_ = nullptr;  ///< null: the memory is not held
+  int views_ = 0;                           ///< of that memory when *this was made
   std::vector<ViewId> sample_;
   std::vector<ColumnProfiles> profiles_;  ///< of these, over all rows
 };

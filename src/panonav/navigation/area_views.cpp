@@ -124,6 +124,27 @@ std::optional<FoundView> AreaViews::nearest(const NavigationGraph& graph, const 
                    image_difference(view(best->view, seen.components), seen.view)};
 }
 
+std::vector<PackedSignature> AreaViews::with_most_alike(ViewId view, const SeenView& seen,
+                                                        int count) const {
+  const VisualMemory* const own = part_of(view);
+  require(own != nullptr, "view", static_cast<double>(view.value), "one that is loaded");
+  std::vector<Match> others;
+  for (const VisualMemory& part : here_.parts) {
+    const SearchResult found =
+        part.search(seen.packed, {.top = count, .components = seen.components},
+                    {.excluded_views = std::span(&view, part.contains(view) ? 1 : 0)});
+    others.insert(others.end(), found.matches.begin(), found.matches.end());
+  }
+  std::ranges::sort(others, {},
+                    [](const Match& match) { return std::pair(match.dissimilarity, match.view); });
+  std::vector<PackedSignature> alike{own->packed(view)};
+  for (const Match& match : others) {
+    if (alike.size() > static_cast<std::size_t>(count)) break;
+    alike.push_back(part_of(match.view)->packed(match.view));
+  }
+  return alike;
+}
+
 std::optional<FoundView> search_everywhere(const ViewSource& source, const NavigationGraph& graph,
                                            const SubAreas& areas, const FourierSignature& view,
                                            const std::function<bool(std::size_t)>& is_wanted) {

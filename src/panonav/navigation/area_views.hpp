@@ -68,7 +68,12 @@ class AreaViews {
   [[nodiscard]] std::optional<FoundView> nearest(const NavigationGraph& graph,
                                                  const SeenView& seen);
 
-  /// Bytes of signatures, and of the index over them, that the comparisons so far have read.
+  /// A loaded view, and then the `count` others that are least dissimilar to what is seen.
+  [[nodiscard]] std::vector<PackedSignature> with_most_alike(ViewId view, const SeenView& seen,
+                                                             int count) const;
+
+  /// Bytes of signatures, and of the index over them, that the comparisons so far have read;
+  /// without `with_most_alike`.
   [[nodiscard]] std::uint64_t bytes_read() const noexcept { return bytes_read_; }
 
  private:

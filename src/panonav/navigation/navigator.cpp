@@ -58,7 +58,8 @@ Navigator::Core::Core(const ViewSource& source_, AreaPlanner planner_,
       planner(std::move(planner_)),
       options(options_),
       // The next place and what is looked at there are at hand on both sides of a border.
-      views(source_, options_.near_links + 1) {
+      views(source_, options_.near_links + 1),
+      criterion(source_) {
   validate(options);
   scales = learn_scales(source_, planner, options);
 }
@@ -305,6 +306,7 @@ void Navigator::Core::decide(Step& step) {
     // Nothing was closed that could be opened.
     if (!guide().reachable()) state = NavigationState::unreachable;
   }
+  judge_place(step);
   last = {};
   // At an unknown place the robot waits for observations to agree; then it goes by the best guess.
   const int unknown_steps = place.doubt.unknown_steps;

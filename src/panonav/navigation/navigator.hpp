@@ -33,7 +33,9 @@ struct NavigatorOptions {
   HomingPursuitOptions homing;
   int min_agreeing_steps =
       3;  ///< observations that must agree before another place or a block is believed
-  int lost_patience = 12;  ///< observations without a known place after which the robot is lost
+  /// Observations without a known place, or with a place that is probably not the robot's, after
+  /// which it is lost.
+  int lost_patience = 12;
   /// Observations without coming nearer to the goal, more along a longer edge than usual; from half
   /// of them on the robot searches around. Then the edge that was tried most counts as blocked.
   int edge_patience = 8;
@@ -96,13 +98,17 @@ struct NavigationDecision {
   bool homing = false;            ///< the last stretch, by the home vector to the goal itself
   bool on_route = false;          ///< a leg along a recorded route, by the horizon scanline
   std::optional<ViewId> nearest;  ///< the place
-  std::optional<ViewId> next;     ///< the reference ahead; of a leg that at its end
-  std::size_t area = 0;           ///< that is loaded
+  /// That the robot is there: `place_probability` of what is seen, with the difference of `nearest`
+  /// instead of the best match's. 0 once the run has ended.
+  double probability = 0.0;
+  std::optional<ViewId> next;  ///< the reference ahead; of a leg that at its end
+  std::size_t area = 0;        ///< that is loaded
   double difference =
       0.0;             ///< of what is seen from `nearest` (homing: the goal), `image_difference`
   double way = 0.0;    ///< that is left along the edges, in the graph's unit
   int components = 0;  ///< of the signatures, by which references were compared
-  std::uint64_t bytes_read = 0;  ///< of the loaded area's signatures and index, by this observation
+  /// Of the loaded area's signatures and index, by this observation, `probability` not included.
+  std::uint64_t bytes_read = 0;
   std::vector<NavigationEvent> events;
 };
 /// A line for a log.

@@ -26,10 +26,14 @@ std::string_view name_of(NavigationEvent event) {
 
 std::string describe(const NavigationDecision& decision) {
   std::string line = std::to_string(decision.step) + " " + std::string(name_of(decision.state));
-  if (decision.nearest) line += " at view " + std::to_string(decision.nearest->value);
+  std::array<char, 120> numbers{};
+  if (decision.nearest) {
+    std::snprintf(numbers.data(), numbers.size(), " at view %u (probability %.2f)",
+                  static_cast<unsigned>(decision.nearest->value), decision.probability);
+    line += numbers.data();
+  }
   if (decision.next) line += " to view " + std::to_string(decision.next->value);
   line += " in area " + std::to_string(decision.area);
-  std::array<char, 120> numbers{};
   std::snprintf(numbers.data(), numbers.size(), ", way left %.4g, difference %.3f", decision.way,
                 decision.difference);
   line += numbers.data();

@@ -12,6 +12,7 @@
 
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/homing/homing_pursuit.hpp"
+#include "panonav/localisation/place_model.hpp"
 #include "panonav/navigation/area_planner.hpp"
 #include "panonav/navigation/area_views.hpp"
 #include "panonav/navigation/direction_field.hpp"
@@ -47,7 +48,9 @@ struct NavigationGoal {
 
 /// What speaks against the place where the robot is taken to be. Begins anew with a goal.
 struct PlaceDoubt {
-  int unknown_steps = 0;    ///< one after the other at which no reference looked right
+  int unknown_steps = 0;  ///< one after the other at which no reference looked right
+  int improbable_steps =
+      0;                    ///< one after the other at which the place was probably not the robot's
   int elsewhere_steps = 0;  ///< one after the other that agree on another place
   std::optional<std::size_t> elsewhere;
 };
@@ -131,6 +134,7 @@ struct Navigator::Core {
   NavigatorOptions options;
   AreaViews views;
   MemoryScales scales;
+  PlaceCriterion criterion;
   RoutePilot pilot;
 
   NavigationState state = NavigationState::moving;
@@ -159,6 +163,8 @@ struct Navigator::Core {
   [[nodiscard]] bool needs_all_components() const;
   [[nodiscard]] Located search_around(const SeenView& view);
   void locate(Step& step);
+  [[nodiscard]] bool line_tells() const;
+  void judge_place(Step& step);
   void accept(const Located& located, Step& step);
   void relocalise(Step& step);
   void enter(std::size_t node, Step& step);

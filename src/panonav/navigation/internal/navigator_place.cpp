@@ -13,6 +13,8 @@ namespace {
 // The next place is looked for again around the outermost that was found, so often: a step is half
 // an edge, and four where references stand eight times as close as it was meant for.
 constexpr int rounds_farther = 2;
+// Views beside the place by which the probability that it is right is told.
+constexpr int compared_with_place = 15;
 
 }  // namespace
 
@@ -107,10 +109,13 @@ void Navigator::Core::accept(const Located& located, Step& step) {
   }
 }
 
+bool Navigator::Core::line_tells() const {
+  return pilot.drives() && pilot.unknown_steps() == 0;
+}
+
 void Navigator::Core::locate(Step& step) {
-  const bool line_tells = pilot.drives() && pilot.unknown_steps() == 0;
   std::optional<ViewId> told = step.report.estimate;
-  if (!told && line_tells) told = pilot.place();
+  if (!told && line_tells()) told = pilot.place();
   if (told) {
     const auto node = graph().node_of(*told);
     if (node) enter(*node, step);
@@ -134,7 +139,7 @@ void Navigator::Core::locate(Step& step) {
   }
   // Between references that stand far apart no place looks right.
   int& unknown_steps = place.doubt.unknown_steps;
-  if (looks_right() || plan.under_way || line_tells) {
+  if (looks_right() || plan.under_way || line_tells()) {
     unknown_steps = 0;
     if (looks_right() && !plan.under_way) place.known_node = place.node;
     return;
@@ -146,6 +151,32 @@ void Navigator::Core::locate(Step& step) {
     unknown_steps = 0;
     place.known_node = place.node;
   } else if (unknown_steps >= options.lost_patience) {
+    state = NavigationState::lost;
+  }
+}
+
+// A reference that looks right has to look better than chance, too: in another building the limit
+// of the difference lets enough views through to drive on for ever.
+void Navigator::Core::judge_place(Step& step) {
+  const auto probability = [&] {
+    return place_probability(criterion.evidence_for_first(
+        step.view.packed,
+        views.with_most_alike(graph().view(*place.node), step.view, compared_with_place)));
+  };
+  step.decision.probability = probability();
+  int& improbable_steps = place.doubt.improbable_steps;
+  // Between references that stand far apart no place is probable.
+  if (step.decision.probability < 0.5 && !plan.under_way && !line_tells()) ++improbable_steps;
+  const bool sought = std::ranges::find(step.decision.events, NavigationEvent::relocalised) !=
+                      step.decision.events.end();
+  if (state == NavigationState::moving && improbable_steps > 0 && !sought &&
+      improbable_steps % options.min_agreeing_steps == 0) {
+    relocalise(step);
+    step.decision.probability = probability();
+  }
+  if (step.decision.probability >= 0.5) {
+    improbable_steps = 0;
+  } else if (state == NavigationState::moving && improbable_steps >= options.lost_patience) {
     state = NavigationState::lost;
   }
 }
