@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -11,6 +12,7 @@
 #include "panonav/pipeline/mapper.hpp"
 #include "support/command_runner.hpp"
 #include "support/landmark_pictures.hpp"
+#include "support/recorded_messages.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -62,6 +64,31 @@ TEST_F(Map, EveryPictureBecomesANodeOfTheMap) {
   again.erase("step_ms");
   before.erase("step_ms");
   EXPECT_EQ(again, before);
+}
+
+TEST_F(Map, ARecordHoldsTheFinishedMap) {
+  const std::string record = folder_ / "map.mcap";
+  const json said = map({"--record", record});
+  ASSERT_EQ(said["connected_components"].size(), 1U);
+  expect_record(record, 100,
+                {{"/diagnostics", {"diagnostic_msgs/DiagnosticArray", 100}},
+                 {"/edges", {"sensor_msgs/PointCloud2", 1}},
+                 {"/ground_truth", {"geometry_msgs/PoseStamped", 100}},
+                 {"/references", {"sensor_msgs/PointCloud2", 1}},
+                 {"/visited", {"nav_msgs/OccupancyGrid", 1}}});
+  for_each_message<ros::PointCloud2>(
+      record, "/references", [](const ros::PointCloud2& cloud) { EXPECT_EQ(cloud.width, 100U); });
+  // Ends of all edges at least, closures among them.
+  for_each_message<ros::PointCloud2>(record, "/edges", [&](const ros::PointCloud2& cloud) {
+    EXPECT_GE(cloud.width, 2 * (99 + said["closures"].get<unsigned>()));
+    std::size_t of_closures = 0;
+    for (std::size_t i = 0; i < cloud.width; ++i) {
+      float kind = 0.0F;
+      std::memcpy(&kind, &cloud.data[16 * i + 12], sizeof(kind));
+      of_closures += kind == static_cast<float>(LinkKind::closure) ? 1 : 0;
+    }
+    EXPECT_GE(of_closures, 2 * said["closures"].get<std::size_t>());
+  });
 }
 
 TEST_F(Map, ViewsThatHardlyDifferAreSkipped) {

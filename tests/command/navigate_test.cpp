@@ -13,6 +13,7 @@
 #include "panonav/storage/memory_file.hpp"
 #include "support/command_runner.hpp"
 #include "support/landmark_pictures.hpp"
+#include "support/recorded_messages.hpp"
 #include "support/toy_world.hpp"
 
 namespace panonav::testing {
@@ -122,6 +123,35 @@ TEST_F(Navigate, IsLostInAnotherBuilding) {
   EXPECT_NE(text.out.find("sure of its place, with a probability of 0.5 or more, in 0 of "),
             std::string::npos)
       << text.out;
+}
+
+TEST_F(Navigate, ARecordHoldsTheGoalThePlanAndTheDirections) {
+  const std::string record = *folder / "mission.mcap";
+  const auto asked = there(memory, {"--json"});
+  const auto with_record = run_panonav(with(asked, {"--record", record}));
+  EXPECT_EQ(with_record.out, run_panonav(asked).out);  // it changes nothing
+  const std::size_t looks = lines(with_record.out).size() - 1;
+  auto topics = topics_of(record);
+  EXPECT_GE(topics.at("/plan").second, 1U);
+  const std::uint64_t plans = topics.at("/plan").second;
+  const std::uint64_t matches = topics.at("/best_match/compressed").second;
+  expect_record(record, looks,
+                {{"/best_match/compressed", {"sensor_msgs/CompressedImage", matches}},
+                 {"/diagnostics", {"diagnostic_msgs/DiagnosticArray", looks}},
+                 {"/directions", {"geometry_msgs/PoseArray", 1}},
+                 {"/goal", {"geometry_msgs/PoseStamped", 1}},
+                 {"/ground_truth", {"geometry_msgs/PoseStamped", looks}},
+                 {"/plan", {"nav_msgs/Path", plans}},
+                 {"/plan/points", {"sensor_msgs/PointCloud2", plans}},
+                 {"/references", {"sensor_msgs/PointCloud2", 1}},
+                 {"/visited", {"nav_msgs/OccupancyGrid", 1}}});
+  Pose2 goal;
+  for_each_message<ros::PoseStamped>(
+      record, "/goal", [&](const ros::PoseStamped& pose) { goal = ros::planar(pose.pose); });
+  for_each_message<ros::Path>(record, "/plan", [&](const ros::Path& way) {
+    ASSERT_FALSE(way.poses.empty());
+    EXPECT_NEAR(ros::planar(way.poses.back().pose).x_m, goal.x_m, 1e-9);
+  });
 }
 
 TEST_F(Navigate, SameSeedSameRunOnAnyNumberOfThreads) {

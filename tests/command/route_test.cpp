@@ -19,6 +19,7 @@
 #include "panonav/pipeline/route_follower.hpp"
 #include "panonav/pipeline/route_recorder.hpp"
 #include "support/command_runner.hpp"
+#include "support/recorded_messages.hpp"
 #include "support/toy_world.hpp"
 
 namespace panonav::testing {
@@ -166,6 +167,32 @@ TEST_F(RouteVerbs, RecordsALineEveryTenCentimetresAndFollowsToTheCentimetre) {
   ASSERT_EQ(alone.size(), 21U);
   for (const auto& answer : alone) EXPECT_EQ(answer["origin"], "search");
   EXPECT_LT(worst_error_m(alone), 0.02);
+}
+
+TEST_F(RouteVerbs, ARecordHoldsTheRouteAndTheFixes) {
+  record();
+  const std::string file = folder_ / "follow.mcap";
+  const auto answers = answers_of(
+      {"route", "follow", folder_ / "m.panonav", folder_ / "repeat", "--json", "--record", file});
+  const auto topics = topics_of(file);
+  EXPECT_EQ(topics.at("/plan"), (std::pair<std::string, std::uint64_t>{"nav_msgs/Path", 1}));
+  EXPECT_EQ(topics.at("/diagnostics").second, answers.size());
+  for_each_message<ros::Path>(file, "/plan",
+                              [](const ros::Path& way) { EXPECT_EQ(way.poses.size(), 41U); });
+  std::vector<Pose2> poses;
+  for_each_message<ros::PoseWithCovarianceStamped>(file, "/pose",
+                                                   [&](const ros::PoseWithCovarianceStamped& pose) {
+                                                     EXPECT_GT(pose.pose.covariance[0], 0.0);
+                                                     poses.push_back(ros::planar(pose.pose.pose));
+                                                   });
+  std::size_t fixes = 0;
+  for (const json& answer : answers) {
+    if (!answer["on_route"].get<bool>()) continue;
+    ASSERT_LT(fixes, poses.size());
+    EXPECT_EQ(poses[fixes++].x_m, answer["pose"]["x_m"]);
+  }
+  EXPECT_EQ(fixes, poses.size());
+  EXPECT_GE(fixes, answers.size() / 2);
 }
 
 TEST_F(RouteVerbs, ARouteGrowsWhereItEndsAndNowhereElse) {

@@ -14,11 +14,10 @@
 #include "panonav/core/text.hpp"
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/io/image_file.hpp"
-#include "panonav/io/recording.hpp"
-#include "panonav/io/ros_messages.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "support/command_runner.hpp"
 #include "support/landmark_pictures.hpp"
+#include "support/recorded_messages.hpp"
 #include "support/text.hpp"
 
 namespace panonav::testing {
@@ -164,6 +163,46 @@ TEST_F(Walk, StandardInputGivesTheMemoryOfItsPictures) {
   expect_same_signatures(views(path("a.panonav")), views(path("b.panonav")));
 }
 
+TEST_F(Walk, PicturesOnStandardInputAreAnsweredAndTrackedAsTheyCome) {
+  run_well({"memorise", path("walk"), path("a.panonav")});
+  const std::string command = " < " + shell_quoted(path("walk.mjpeg")) + " 2> /dev/null";
+  const auto answers = objects(said_by_shell(shell_quoted(PANONAV_COMMAND) + " localise " +
+                                                 shell_quoted(path("a.panonav")) + " - --json -o " +
+                                                 shell_quoted(path("a.csv")) + " --record " +
+                                                 shell_quoted(path("a.mcap")) + command,
+                                             folder.path()));
+  ASSERT_EQ(answers.size(), count);
+  double before_s = 0.0;
+  for (std::size_t i = 0; i < count; ++i) {
+    EXPECT_EQ(answers[i].at("matches").at(0).at("file"), view_name(i));
+    EXPECT_GT(answers[i].at("stamp_s"), before_s);
+    before_s = answers[i].at("stamp_s");
+  }
+  std::ostringstream table;
+  table << std::ifstream(path("a.csv")).rdbuf();
+  EXPECT_EQ(lines(table.str()).size(), count + 1);
+  EXPECT_EQ(topics_of(path("a.mcap")).at("/camera/image/compressed").second, count);
+
+  const auto tracked = objects(said_by_shell(
+      "(" + shell_quoted(PANONAV_COMMAND) + " track " + shell_quoted(path("a.panonav")) +
+          " - --json --every 2 --count 20" + command + " || true)",
+      folder.path()));
+  EXPECT_EQ(tracked.size(), 10U);
+}
+
+TEST_F(Walk, ALiveSourceIsReadWhileItIsOpen) {
+  run_well({"memorise", path("walk"), path("a.panonav")});
+  // The writer waits for the answer to the first picture before it ends its own stream.
+  const std::string command =
+      "mkfifo " + shell_quoted(path("pipe")) + " && (" + shell_quoted(PANONAV_COMMAND) +
+      " localise " + shell_quoted(path("a.panonav")) + " - --json < " + shell_quoted(path("pipe")) +
+      " > " + shell_quoted(path("out")) + " 2> /dev/null & exec 3> " + shell_quoted(path("pipe")) +
+      "; cat " + shell_quoted(path("jpegs/000001.jpg")) + " " +
+      shell_quoted(path("jpegs/000002.jpg")) + " >&3; for i in $(seq 100); do [ -s " +
+      shell_quoted(path("out")) + " ] && echo answered && break; sleep 0.1; done; exec 3>&-; wait)";
+  EXPECT_EQ(said_by_shell(command, folder.path()), "answered\n");
+}
+
 TEST_F(Walk, RunLearnsANewPlaceOnceAndKnowsItThen) {
   const std::string memory = path("new.panonav");
   const auto first = answers_of({"run", path("walk"), "--memory", memory, "--learn", "--json"});
@@ -195,28 +234,6 @@ TEST_F(Walk, RunLearnsANewPlaceOnceAndKnowsItThen) {
             run_panonav({"run", path("walk"), "--memory", path("copy.panonav"), "--json"}).out);
 }
 
-/// Messages of each topic.
-std::map<std::string, std::uint64_t> topics_of(const std::string& file) {
-  std::map<std::string, std::uint64_t> counts;
-  const auto recording = Recording::open(file);
-  EXPECT_TRUE(recording->warnings().empty());
-  for (const auto& topic : recording->topics()) counts[topic.name] = topic.messages;
-  return counts;
-}
-
-template <class Message, class Use>
-void for_each_message(const std::string& file, const std::string& topic, const Use& use) {
-  const auto recording = Recording::open(file);
-  for (std::uint32_t i = 0; i < recording->topics().size(); ++i) {
-    if (recording->topics()[i].name != topic) continue;
-    EXPECT_EQ(recording->topics()[i].type, Message::type);
-    recording->for_each(std::array{i}, {},
-                        [&](const MessagePlace&, std::span<const std::uint8_t> bytes) {
-                          use(ros::read_message<Message>(bytes, MessageEncoding::cdr));
-                        });
-  }
-}
-
 TEST_F(Walk, ARecordHoldsWhatWasSeenAndAnswered) {
   run_well({"memorise", path("walk"), path("a.panonav")});
   const auto answers = answers_of(
@@ -224,13 +241,13 @@ TEST_F(Walk, ARecordHoldsWhatWasSeenAndAnswered) {
   const auto topics = topics_of(path("run.mcap"));
   for (const char* topic : {"/camera/image/compressed", "/panorama/compressed",
                             "/best_match/compressed", "/tf", "/diagnostics", "/ground_truth"}) {
-    EXPECT_EQ(topics.at(topic), count) << topic;
+    EXPECT_EQ(topics.at(topic).second, count) << topic;
   }
-  EXPECT_EQ(topics.at("/references"), 1U);
-  EXPECT_EQ(topics.at("/visited"), 1U);
+  EXPECT_EQ(topics.at("/references").second, 1U);
+  EXPECT_EQ(topics.at("/visited").second, 1U);
   std::size_t known = 0;
   for (const auto& answer : answers) known += answer.at("known").get<bool>() ? 1 : 0;
-  EXPECT_EQ(topics.at("/pose"), known);
+  EXPECT_EQ(topics.at("/pose").second, known);
   // The pictures are those of the walk.
   std::size_t number = 0;
   for_each_message<ros::CompressedImage>(
@@ -280,7 +297,7 @@ TEST_F(Walk, TheBestMatchOfARecordIsThatOfTheNamedViewAlsoWhereItWasJustLearnt) 
     of_learnt += answer.at("matches").at(0).at("file").get<std::string>().starts_with("o") ? 1 : 0;
   }
   EXPECT_GE(of_learnt, 5U);
-  EXPECT_EQ(topics_of(path("run.mcap")).at("/best_match/compressed"), count);
+  EXPECT_EQ(topics_of(path("run.mcap")).at("/best_match/compressed").second, count);
 }
 
 TEST_F(Walk, ATrackIsRecordedWithItsParticlesAndItsPath) {
@@ -289,7 +306,7 @@ TEST_F(Walk, ATrackIsRecordedWithItsParticlesAndItsPath) {
   const auto topics = topics_of(path("track.mcap"));
   for (const char* topic : {"/camera/image/compressed", "/best_match/compressed", "/particles",
                             "/particles/poses", "/diagnostics"}) {
-    EXPECT_EQ(topics.at(topic), count) << topic;
+    EXPECT_EQ(topics.at(topic).second, count) << topic;
   }
   for_each_message<ros::PointCloud2>(path("track.mcap"), "/particles",
                                      [](const ros::PointCloud2& cloud) {
@@ -302,8 +319,30 @@ TEST_F(Walk, ATrackIsRecordedWithItsParticlesAndItsPath) {
     for_each_message<ros::Path>(path("track.mcap"), "/path", [&](const ros::Path& line) {
       EXPECT_EQ(line.poses.size(), ++poses);  // it grows by one each time
     });
-    EXPECT_EQ(poses, topics.at("/pose"));
+    EXPECT_EQ(poses, topics.at("/pose").second);
   }
+}
+
+TEST_F(Walk, AnswersAreRecordedAndARecordIsInputAgain) {
+  run_well({"memorise", path("walk"), path("a.panonav")});
+  const std::vector<std::string> ask{"localise", path("a.panonav")};
+  const auto by_folder =
+      answers_of(with(ask, {path("walk"), "--json", "--record", path("answers.mcap")}));
+  expect_record(path("answers.mcap"), count,
+                {{"/best_match/compressed", {"sensor_msgs/CompressedImage", count}},
+                 {"/diagnostics", {"diagnostic_msgs/DiagnosticArray", count}},
+                 {"/ground_truth", {"geometry_msgs/PoseStamped", count}},
+                 {"/references", {"sensor_msgs/PointCloud2", 1}},
+                 {"/visited", {"nav_msgs/OccupancyGrid", 1}}});
+  const auto by_record = answers_of(with(ask, {path("answers.mcap"), "--json"}));
+  ASSERT_EQ(by_record.size(), count);
+  for (std::size_t i = 0; i < count; ++i) {
+    EXPECT_EQ(by_folder[i].at("matches"), by_record[i].at("matches"));
+    EXPECT_EQ(by_folder[i].at("position"), by_record[i].at("position"));
+  }
+  EXPECT_NE(refusal(with(ask, {path("answers.mcap"), "--record", path("answers.mcap")}))
+                .find("another file"),
+            std::string::npos);
 }
 
 TEST_F(Walk, ARecordThatCannotBeWrittenDoesNotEndTheRun) {
@@ -321,6 +360,21 @@ TEST_F(Walk, ARecordThatCannotBeWrittenDoesNotEndTheRun) {
   EXPECT_NE(full.err.find("full.mcap"), std::string::npos) << full.err;
 }
 
+TEST_F(Walk, PicturesThatCannotBeReadAreCountedAndDoNotFlood) {
+  run_well({"memorise", path("walk"), path("a.panonav")});
+  fs::create_directories(folder / "bad");
+  for (std::size_t i = 0; i < 200; ++i) {
+    write_file(folder / "bad" / (std::to_string(i) + ".png"), std::string_view("no picture"));
+  }
+  fs::copy_file(folder / "walk" / view_name(0), folder / "bad" / "z.png");
+  const auto result = run_panonav({"run", path("bad"), "--memory", path("a.panonav"), "--json"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(lines(result.out).size(), 1U);
+  EXPECT_LE(lines(result.err).size(), 10U) << result.err;
+  EXPECT_NE(result.err.find("skipped: "), std::string::npos);
+  EXPECT_NE(result.err.find("200 could not be read"), std::string::npos) << result.err;
+}
+
 TEST_F(Walk, RunRefusesWhatHasNoEffect) {
   EXPECT_NE(refusal({"run", path("walk"), "--memory", path("none.panonav")}).find("--learn"),
             std::string::npos);
@@ -331,14 +385,22 @@ TEST_F(Walk, RunRefusesWhatHasNoEffect) {
   EXPECT_NE(
       refusal(with(ask, {"--camera-width", "96", "--camera-height", "12"})).find("no live source"),
       std::string::npos);
-  EXPECT_NE(refusal({"run", "/dev/video99", "--memory", path("a.panonav"), "--every", "2"})
+  for (const char* verb : {"localise", "track"}) {
+    EXPECT_NE(refusal({verb, path("a.panonav"), "/dev/video99", "--report", path("r")})
+                  .find("live source"),
+              std::string::npos);
+    EXPECT_NE(
+        refusal({verb, path("a.panonav"), path("walk"), "--count", "3"}).find("no live source"),
+        std::string::npos);
+  }
+  EXPECT_NE(refusal({"run", "/dev/video99", "--memory", path("a.panonav"), "--image-topic", "/a"})
                 .find("live source"),
             std::string::npos);
   EXPECT_NE(refusal({"run", "/dev/video99", "--memory", path("a.panonav")}).find("/dev/video99"),
             std::string::npos);
-  EXPECT_NE(refusal({"memorise", "/dev/video99", path("b.panonav"), "--kind", "panorama"})
-                .find("panonav run"),
-            std::string::npos);
+  EXPECT_NE(
+      refusal({"map", "/dev/video99", path("b.panonav"), "--kind", "panorama"}).find("live source"),
+      std::string::npos);
 }
 
 #ifdef PANONAV_V4L2_SHIM
@@ -378,6 +440,23 @@ TEST_F(Walk, RunFollowsACameraThatIsUnpluggedAndComesBack) {
   std::ostringstream notes;
   notes << std::ifstream(path("notes")).rdbuf();
   EXPECT_NE(notes.str().find("1 interruptions of the source"), std::string::npos) << notes.str();
+}
+
+TEST_F(Walk, AnInterruptedMemoriseHasStoredWhatTheCameraSaw) {
+  write_camera_pictures();
+  const std::string command =
+      "V4L2_SHIM_RATE=50 V4L2_SHIM_PICTURES=" + shell_quoted(path("pictures")) +
+      " ASAN_OPTIONS=verify_asan_link_order=0:detect_leaks=0 LD_PRELOAD=" +
+      shell_quoted(PANONAV_V4L2_SHIM) + " timeout --preserve-status -s INT 3 " +
+      shell_quoted(PANONAV_COMMAND) + " memorise /dev/video7 " + shell_quoted(path("new.panonav")) +
+      " --every 0.2s --json --kind panorama --elevation-deg -20 20 2> " +
+      shell_quoted(path("notes"));
+  const auto said = objects(said_by_shell(command, folder.path()));
+  ASSERT_EQ(said.size(), 1U);
+  EXPECT_GE(said[0].at("appended"), 5);
+  EXPECT_LE(said[0].at("appended"), 16);  // five a second, and not fifty
+  EXPECT_EQ(views(path("new.panonav")).size(), said[0].at("views"));
+  run_well({"verify", path("new.panonav")});
 }
 
 TEST_F(Walk, AnInterruptedRunHasStoredWhatItLearnt) {

@@ -9,8 +9,10 @@
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/panorama_reader.hpp"
+#include "panonav/io/recorded_dataset.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "support/command_runner.hpp"
+#include "support/recorded_messages.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -50,6 +52,35 @@ TEST_F(Simulate, WritesADataSetThatSaysWhereEachViewWasTaken) {
     EXPECT_NEAR(steps, std::round(steps), 1e-9);
   }
   EXPECT_NE(bytes_of(dataset.entries[0].path), bytes_of(dataset.entries[1].path));
+}
+
+TEST_F(Simulate, ARecordOfASimulatedRunIsTheDataSetAgain) {
+  const std::string record = folder / "run.mcap";
+  run_well(with_small({"simulate", "office", folder / "run", "--path", "walk", "--poses", "12",
+                       "--speed-m-s", "1", "--record", record}));
+  expect_record(
+      record, 12,
+      {{"/ground_truth", {"geometry_msgs/PoseStamped", 12}}, {"/odom", {"nav_msgs/Odometry", 12}}});
+  const Dataset written = read_dataset(folder / "run");
+  const Dataset recorded = panonav::read_recording(record, written.source).dataset;
+  ASSERT_EQ(recorded.entries.size(), 12U);
+  for (std::size_t i = 0; i < 12; ++i) {
+    const DatasetEntry& a = written.entries[i];
+    const DatasetEntry& b = recorded.entries[i];
+    EXPECT_EQ(read_image(a.path), read_picture(b));
+    EXPECT_NEAR(*a.stamp_s, *b.stamp_s, 1e-6);
+    EXPECT_NEAR(a.pose->x_m, b.pose->x_m, 1e-9);
+    EXPECT_NEAR(*a.pose->heading_rad, *b.pose->heading_rad, 1e-6);
+    EXPECT_NEAR(a.odometry->y_m, b.odometry->y_m, 1e-9);
+  }
+  // The tree of frames: where odometry leads is where the robot truly is.
+  std::size_t moments = 0;
+  for_each_message<ros::TFMessage>(record, "/tf", [&](const ros::TFMessage& tf) {
+    ASSERT_EQ(tf.transforms.size(), 4U);
+    const Pose2 map_from_base =
+        ros::planar(tf.transforms[2].transform) * ros::planar(tf.transforms[1].transform);
+    EXPECT_NEAR(map_from_base.x_m, written.entries[moments++].pose->x_m, 1e-9);
+  });
 }
 
 TEST_F(Simulate, AMeshThatCrashesItsReaderGivesOneLine) {

@@ -1,9 +1,14 @@
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <map>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "panonav/io/recording.hpp"
@@ -66,5 +71,57 @@ class RecordedMessages : public Recording {
   std::vector<MessagePlace> places_;
   std::vector<std::vector<std::uint8_t>> messages_;
 };
+
+/// Of each topic of a file without warnings: its type and how many messages it has.
+inline std::map<std::string, std::pair<std::string, std::uint64_t>> topics_of(
+    const std::string& file) {
+  std::map<std::string, std::pair<std::string, std::uint64_t>> topics;
+  const auto recording = panonav::Recording::open(file);
+  EXPECT_TRUE(recording->warnings().empty());
+  for (const auto& topic : recording->topics()) {
+    topics[topic.name] = {topic.type, topic.messages};
+  }
+  return topics;
+}
+
+/// `use` gets each message of a topic, as CDR, which must be of the type.
+template <class Message, class Use>
+void for_each_message(const std::string& file, const std::string& topic, const Use& use) {
+  const auto recording = panonav::Recording::open(file);
+  for (std::uint32_t i = 0; i < recording->topics().size(); ++i) {
+    if (recording->topics()[i].name != topic) continue;
+    EXPECT_EQ(recording->topics()[i].type, Message::type);
+    recording->for_each(std::array{i}, {},
+                        [&](const MessagePlace&, std::span<const std::uint8_t> bytes) {
+                          use(ros::read_message<Message>(bytes, MessageEncoding::cdr));
+                        });
+  }
+}
+
+/// Expects what every record of a run of `count` pictures with true poses and one for each has:
+/// types and numbers of the messages, stamps that ascend, and a path to which each pose is added.
+inline void expect_record(
+    const std::string& file, std::size_t count,
+    const std::map<std::string, std::pair<std::string, std::uint64_t>>& more) {
+  auto topics = topics_of(file);
+  std::map<std::string, std::pair<std::string, std::uint64_t>> expected{
+      {"/camera/image/compressed", {"sensor_msgs/CompressedImage", count}},
+      {"/panorama/compressed", {"sensor_msgs/CompressedImage", count}},
+      {"/tf", {"tf2_msgs/TFMessage", count}},
+      {"/pose", {"geometry_msgs/PoseWithCovarianceStamped", count}},
+      {"/path", {"nav_msgs/Path", count}},
+      {"/path/points", {"sensor_msgs/PointCloud2", count}}};
+  expected.insert(more.begin(), more.end());
+  EXPECT_EQ(topics, expected) << file;
+  std::int64_t before_ns = -1;
+  std::size_t poses = 0;
+  for_each_message<ros::Path>(file, "/path", [&](const ros::Path& path) {
+    EXPECT_GT(path.header.stamp_ns, before_ns);
+    before_ns = path.header.stamp_ns;
+    EXPECT_EQ(path.poses.size(), ++poses);
+    EXPECT_EQ(path.poses.back().header.stamp_ns, path.header.stamp_ns);
+  });
+  EXPECT_EQ(poses, count);
+}
 
 }  // namespace panonav::testing

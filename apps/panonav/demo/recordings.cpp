@@ -206,7 +206,7 @@ std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& s
                         ring.poses.size() + walk.poses.size());
   const auto record_run = [&](const PlannedRun& run, const char* name) {
     return record_dataset(run.world, options.out / name, run.poses, run.with_path, executor,
-                          [&] { progress.advance(); });
+                          [&](const DatasetEntry&, const Image&) { progress.advance(); });
   };
   DemoRecordings recordings;
   recordings.memory_run = record_run(office, "memory_run");

@@ -3,35 +3,76 @@
 #include <algorithm>
 #include <cmath>
 
+#include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "verbs/recording.hpp"
 
 namespace panonav::command {
 
+namespace {
+
+void describe(RunMoment& moment, const FollowedImage& image) {
+  moment.sure = image.fix.has_value();
+  moment.state = moment.sure ? "on the route" : "not on this route";
+  moment.truth.reset();  // a recording's poses may be in another frame than the route's
+  if (image.truth) {
+    moment.truth = {image.truth->x_m, image.truth->y_m, image.truth->heading_rad};
+  }
+  if (!image.fix) return;
+  moment.pose = image.fix->fix.pose;
+  moment.covariance = image.fix->fix.covariance;
+  moment.values = {{"origin", std::string(name_of(image.fix->origin))},
+                   {"along_m", fixed(image.fix->along_m, 3)},
+                   {"lateral_m", fixed(image.fix->lateral_m, 3)},
+                   {"correlation", fixed(image.fix->fix.correlation, 4)},
+                   {"changed", std::to_string(image.changed.size())}};
+}
+
+}  // namespace
+
 void follow(RouteFollower& follower, const Dataset& run, const std::vector<Pose2>& truth,
-            int every_nth, Executor& executor, const std::function<void(FollowedImage&&)>& report) {
+            int every_nth, const PanoramaReader* recorded, Executor& executor,
+            const std::function<void(FollowedImage&&)>& report) {
+  struct Seen {
+    std::vector<float> line;
+    std::optional<RunMoment> moment;
+  };
   const auto every = static_cast<std::size_t>(every_nth);
-  make_in_order(
-      (run.entries.size() + every - 1) / every, executor,
-      [&](std::size_t i) { return follower.encode(read_observation(run.entries[i * every])); },
-      [&](std::size_t i, std::vector<float>&& line) {
-        const std::size_t index = i * every;
-        const DatasetEntry& entry = run.entries[index];
-        RouteStep step = follower.step(std::move(line), entry.odometry);
-        FollowedImage image{index,
-                            entry.file,
-                            entry.stamp_s,
-                            std::move(step.line),
-                            std::move(step.fix),
-                            std::move(step.changed)};
-        if (!truth.empty()) {
-          image.truth = truth[index];
-          image.true_place =
-              place_on_route(follower.tracker().lines().poses(), truth[index].position());
-        }
-        report(std::move(image));
-      });
+  make_in_order((run.entries.size() + every - 1) / every, executor,
+                [&](std::size_t i) {
+                  const Observation observation = read_observation(run.entries[i * every]);
+                  Seen seen{follower.encode(observation), std::nullopt};
+                  if (recorded == nullptr) return seen;
+                  seen.moment = moment_of(observation, i * every);
+                  seen.moment->panorama = recorded->convert(seen.moment->picture->view(),
+                                                            observation.tilt.value_or(Tilt{}));
+                  return seen;
+                },
+                [&](std::size_t i, Seen&& seen) {
+                  const std::size_t index = i * every;
+                  const DatasetEntry& entry = run.entries[index];
+                  RouteStep step = follower.step(std::move(seen.line), entry.odometry);
+                  FollowedImage image{index,
+                                      entry.file,
+                                      entry.stamp_s,
+                                      std::move(step.line),
+                                      std::move(step.fix),
+                                      std::move(step.changed),
+                                      std::nullopt,
+                                      std::nullopt,
+                                      std::move(seen.moment)};
+                  const auto& route = follower.tracker().lines().poses();
+                  if (!truth.empty()) {
+                    image.truth = truth[index];
+                    image.true_place = place_on_route(route, truth[index].position());
+                  }
+                  if (image.moment) {
+                    describe(*image.moment, image);
+                    if (i == 0) image.moment->plan.assign(route.begin(), route.end());
+                  }
+                  report(std::move(image));
+                });
 }
 
 FollowSummary summarise_follow(const std::vector<FollowedImage>& images, bool headings_known) {

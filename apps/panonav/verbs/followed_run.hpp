@@ -9,7 +9,9 @@
 
 #include "panonav/core/executor.hpp"
 #include "panonav/io/dataset.hpp"
+#include "panonav/io/panorama_reader.hpp"
 #include "panonav/pipeline/route_follower.hpp"
+#include "panonav/pipeline/run_recorder.hpp"
 #include "panonav/route/route_changes.hpp"
 #include "panonav/route/route_place.hpp"
 #include "panonav/route/route_tracker.hpp"
@@ -26,14 +28,16 @@ struct FollowedImage {
   std::vector<AzimuthRange> changed;   ///< where the scene is not as remembered
   std::optional<Pose2> truth;          ///< in the route's frame, where it is known
   std::optional<RoutePlace> true_place;
+  std::optional<RunMoment> moment;  ///< what was seen and said, where a record is wanted
 };
 
 /// Follows a run along a route, every N-th picture of it. Lines are read on all threads, the
 /// follower runs in order; the same on any number of threads. `truth`: poses of all entries, or
-/// empty. `report` is called after each picture, in order. Throws FileError on a picture that
-/// cannot be read.
+/// empty. `recorded`: makes panoramas of the pictures for moments; null: there are none. `report`
+/// is called after each picture, in order. Throws FileError on a picture that cannot be read.
 void follow(RouteFollower& follower, const Dataset& run, const std::vector<Pose2>& truth,
-            int every_nth, Executor& executor, const std::function<void(FollowedImage&&)>& report);
+            int every_nth, const PanoramaReader* recorded, Executor& executor,
+            const std::function<void(FollowedImage&&)>& report);
 
 struct FollowSummary {
   std::size_t images = 0;

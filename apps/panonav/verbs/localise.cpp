@@ -13,8 +13,10 @@
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "reports/localise_report.hpp"
+#include "verbs/live_run.hpp"
 #include "verbs/localised_query.hpp"
 #include "verbs/recording.hpp"
+#include "verbs/run_record.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES
 #include "reports/report_page.hpp"
 #endif
@@ -34,43 +36,42 @@ struct LocaliseArguments {
   bool areas = false;
   std::optional<std::string> out;
   std::optional<std::string> report;
+  std::optional<std::string> record;
+  LiveArguments live;
 };
 
-/// One line for each picture, with the header of docs/formats.md; unknown values are empty.
-std::string as_csv(const std::vector<LocalisedQuery>& answers) {
-  std::string table =
-      "file,answer,known_probability,x_m,y_m,radius_m,heading_deg,best,dissimilarity,column_"
-      "difference,"
-      "turn_deg,next,"
-      "next_dissimilarity,next_column_difference,error\n";
-  const auto add = [&table](const std::string& field) {
-    table += ',';
-    table += field;
+/// Of the CSV table (docs/formats.md).
+constexpr std::string_view csv_header =
+    "file,answer,known_probability,x_m,y_m,radius_m,heading_deg,best,dissimilarity,column_"
+    "difference,turn_deg,next,next_dissimilarity,next_column_difference,error\n";
+
+/// Unknown values are empty.
+std::string csv_row(const LocalisedQuery& answer) {
+  const auto& [probability, known, matches, position, heading_rad, components, read, areas] =
+      answer.place;
+  std::string row = csv_field(answer.file);
+  const auto add = [&row](const std::string& field) {
+    row += ',';
+    row += field;
   };
   const auto add_degrees = [&](const std::optional<double>& angle_rad) {
     add(angle_rad ? to_text(written_degrees(*angle_rad)) : "");
   };
-  for (const LocalisedQuery& answer : answers) {
-    const auto& [probability, known, matches, position, heading_rad, components, read, areas] =
-        answer.place;
-    table += csv_field(answer.file);
-    add(!answer.error.empty() ? "unreadable" : known ? "known" : "unknown");
-    add(answer.error.empty() ? fixed(probability, 4) : "");
-    add(position ? to_text(position->x_m) : "");
-    add(position ? to_text(position->y_m) : "");
-    add(position && position->radius_m ? to_text(*position->radius_m) : "");
-    add_degrees(heading_rad);
-    for (std::size_t i = 0; i < 2; ++i) {
-      const PlaceMatch* const match = i < matches.size() ? &matches[i] : nullptr;
-      add(match ? csv_field(match->name) : "");
-      add(match ? std::to_string(match->dissimilarity) : "");
-      add(match ? to_text(match->column_difference) : "");
-      if (i == 0) add_degrees(match ? match->heading_rad : std::nullopt);
-    }
-    add(answer.error.empty() ? "" : csv_field(readable_line(answer.error)));
-    table += '\n';
+  add(!answer.error.empty() ? "unreadable" : known ? "known" : "unknown");
+  add(answer.error.empty() ? fixed(probability, 4) : "");
+  add(position ? to_text(position->x_m) : "");
+  add(position ? to_text(position->y_m) : "");
+  add(position && position->radius_m ? to_text(*position->radius_m) : "");
+  add_degrees(heading_rad);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const PlaceMatch* const match = i < matches.size() ? &matches[i] : nullptr;
+    add(match ? csv_field(match->name) : "");
+    add(match ? std::to_string(match->dissimilarity) : "");
+    add(match ? to_text(match->column_difference) : "");
+    if (i == 0) add_degrees(match ? match->heading_rad : std::nullopt);
   }
-  return table;
+  add(answer.error.empty() ? "" : csv_field(readable_line(answer.error)));
+  return row + '\n';
 }
 
 /// Turns the robot as it is asked for; gives by how much.
@@ -85,14 +86,27 @@ double turn(Observation& observation, const PlaceRecogniser& recogniser,
   return wrap_angle(2.0 * std::numbers::pi * turned / static_cast<double>(columns));
 }
 
-LocalisedQuery answer(const PlaceRecogniser& recogniser, const LocaliseArguments& wanted,
-                      const DatasetEntry& entry, Observation observation, std::size_t index) {
-  LocalisedQuery answer{
-      entry.file, turn(observation, recogniser, wanted, index), {}, entry.pose, ""};
-  // Several pictures are called as they were typed.
-  const std::string name = wanted.inputs.size() > 1 ? entry.path.filename().string() : entry.file;
-  answer.place =
-      recogniser.localise(observation, std::span(&name, wanted.exclude_same_file ? 1 : 0));
+/// An answer and what is recorded of it.
+struct Answer {
+  LocalisedQuery query;
+  std::exception_ptr failure;  ///< why there is none
+  std::optional<RunMoment> moment;
+};
+
+/// `name`: what is called the same file.
+Answer answer(const PlaceRecogniser& recogniser, const LocaliseArguments& wanted,
+              const std::string& name, Observation observation, std::size_t index) {
+  const double turned_rad = turn(observation, recogniser, wanted, index);
+  Answer answer{
+      {observation.name, turned_rad,
+       recogniser.localise(observation, std::span(&name, wanted.exclude_same_file ? 1 : 0)),
+       observation.pose, ""},
+      nullptr,
+      std::nullopt};
+  if (!wanted.record) return answer;
+  RunMoment& moment = answer.moment.emplace(moment_of(observation, index));
+  moment.panorama = recogniser.encoder().panorama(observation);
+  describe(moment, answer.query.place);
   return answer;
 }
 
@@ -139,7 +153,11 @@ void check(const Arguments& arguments, const LocaliseArguments& wanted,
 /// All answers, told as they come. What cannot be read is named; throws where nothing can.
 std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
                                        const LocaliseArguments& wanted, const Dataset& recording,
-                                       Session& session) {
+                                       const MemoryFile& file, Session& session) {
+  std::vector<std::string> read = wanted.inputs;
+  read.push_back(wanted.memory);
+  RunRecord record(wanted.record, read, false, session);
+  auto references = reference_positions(recogniser.memory());  // for the first moment
   const std::size_t total = recording.entries.size();
   Progress progress(session, "localising", total);
   std::vector<LocalisedQuery> answers;
@@ -147,21 +165,29 @@ std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
   std::exception_ptr failure;
   make_in_order(
       total, session.executor(),
-      [&](std::size_t i) -> std::pair<LocalisedQuery, std::exception_ptr> {
+      [&](std::size_t i) -> Answer {
         const DatasetEntry& entry = recording.entries[i];
         std::optional<Observation> seen;
         try {
           seen = read_observation(entry);
         } catch (const FileError& error) {
-          return {{entry.file, 0.0, {}, entry.pose, error.what()}, std::current_exception()};
+          return {{entry.file, 0.0, {}, entry.pose, error.what()}, std::current_exception(), {}};
         }
-        return {answer(recogniser, wanted, entry, std::move(*seen), i), nullptr};
+        // Several pictures are called as they were typed.
+        return answer(recogniser, wanted,
+                      wanted.inputs.size() > 1 ? entry.path.filename().string() : entry.file,
+                      std::move(*seen), i);
       },
-      [&](std::size_t, std::pair<LocalisedQuery, std::exception_ptr>&& made) {
-        answers.push_back(std::move(made.first));
-        if (made.second && !failure) failure = made.second;
+      [&](std::size_t, Answer&& made) {
+        if (made.moment) {
+          made.moment->best_match = best_match_of(made.query.place, file);
+          made.moment->references = std::exchange(references, {});
+          record.add(std::move(*made.moment));
+        }
+        answers.push_back(std::move(made.query));
+        if (made.failure && !failure) failure = made.failure;
         progress.advance();
-        if (told == 0 && made.second) return;  // it may be all that there is to say
+        if (told == 0 && made.failure) return;  // it may be all that there is to say
         progress.clear();
         for (; told < answers.size(); ++told) {
           const LocalisedQuery& given = answers[told];
@@ -174,12 +200,61 @@ std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
         }
       });
   if (told == 0 && failure) std::rethrow_exception(failure);
+  record.close();
   return answers;
+}
+
+/// Answers pictures as they come until the source ends or the user interrupts.
+ExitCode localise_live(const Arguments& arguments, const LocaliseArguments& wanted,
+                       const MemoryFile& file, Session& session) {
+  const std::string& input = wanted.inputs.front();
+  arguments.refuse_unused({"--report", "--exclude-same-file"},
+                          "where " + input + " is a live source");
+  const auto source = open_live(arguments, input, checked_beside(wanted.pictures, file),
+                                file.header().source, wanted.live);
+  const PlaceRecogniser recogniser(
+      file, {.localiser = wanted.localiser,
+             .source = source->pictures(),
+             .areas = wanted.areas ? std::optional(wanted.accuracy) : std::nullopt});
+  RunRecord record(wanted.record, std::span(&wanted.memory, 1), true, session);
+  auto references = reference_positions(recogniser.memory());  // for the first moment
+  std::string table(csv_header);
+  std::size_t number = 0;
+  std::size_t known = 0;
+  Answer given;
+  LiveRun taking(*source, wanted.pictures.part, wanted.live, session);
+  taking.take(
+      [&](const Observation& seen) {
+        given = answer(recogniser, wanted, seen.name, seen, number);
+        ++number;
+        if (given.query.place.known) ++known;
+        if (!session.json()) return as_text(given.query, session);
+        auto json = as_json(given.query, wanted.areas);
+        json["stamp_s"] = or_null(seen.stamp_s);
+        return json_line(json);
+      },
+      [&](Observation&&) {
+        if (wanted.out) table += csv_row(given.query);
+        if (!given.moment) return;
+        given.moment->best_match = best_match_of(given.query.place, file);
+        given.moment->references = std::exchange(references, {});
+        record.add(std::move(*given.moment));
+      });
+  if (wanted.out) write_file(*wanted.out, std::string_view(table));
+  record.close();
+  const LiveCounts& counts = taking.finish();
+  session.note(std::to_string(known) + " of " + std::to_string(number) + " views show a place of " +
+               wanted.memory + events_text(counts, record.left_out()));
+  return known > 0 ? ExitCode::done : ExitCode::no_answer;
 }
 
 ExitCode localise(const Arguments& arguments, const LocaliseArguments& wanted, Session& session) {
   const auto file = MemoryFile::open(wanted.memory, Access::read_only);
   check(arguments, wanted, file.header());
+  if (wanted.inputs.size() == 1 && is_live(wanted.inputs.front())) {
+    return localise_live(arguments, wanted, file, session);
+  }
+  refuse_live(arguments, wanted.inputs.front(), true);
 #ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) prepare_localise_report(*wanted.report);
 #endif
@@ -188,14 +263,18 @@ ExitCode localise(const Arguments& arguments, const LocaliseArguments& wanted, S
       file, {.localiser = wanted.localiser,
              .source = recording.source,
              .areas = wanted.areas ? std::optional(wanted.accuracy) : std::nullopt});
-  const auto answers = answer_all(recogniser, wanted, recording, session);
+  const auto answers = answer_all(recogniser, wanted, recording, file, session);
   const auto count = [&](const auto& holds) {
     return static_cast<std::size_t>(std::ranges::count_if(answers, holds));
   };
   const std::size_t known = count([](const LocalisedQuery& query) { return query.place.known; });
   const std::size_t unread =
       count([](const LocalisedQuery& query) { return !query.error.empty(); });
-  if (wanted.out) write_file(*wanted.out, std::string_view(as_csv(answers)));
+  if (wanted.out) {
+    std::string table(csv_header);
+    for (const LocalisedQuery& one : answers) table += csv_row(one);
+    write_file(*wanted.out, std::string_view(table));
+  }
   if (!session.json() && answers.size() > 1) {
     session.print(
         session.strong(std::to_string(known) + " of " + std::to_string(answers.size() - unread)) +
@@ -220,9 +299,12 @@ Run declare_localise(Arguments& arguments) {
   arguments.positional("MEMORY", wanted->memory, "Memory file");
   arguments.positionals(
       "INPUT", wanted->inputs,
-      "Data set, folder of pictures, video, recording of topics, - for JPEG pictures "
-      "on standard input, or one or more pictures");
+      "Data set, folder of pictures, video, recording of topics, one or more pictures, or a live "
+      "source: - for JPEG pictures on standard input, a camera (/dev/video0), an address "
+      "(rtsp://, http://, tcp://)");
   declare_pictures(arguments, wanted->pictures);
+  declare_live(arguments, wanted->live);
+  declare_record(arguments, wanted->record);
   arguments.option("-o,--out FILE", wanted->out, "Write a CSV table, one line for each picture");
 #ifdef PANONAV_COMMAND_SIMULATES
   arguments.option("--report FOLDER", wanted->report,
@@ -251,11 +333,13 @@ Verb localise_verb() {
       "localise",
       "Tell where pictures were taken and which way the robot faced",
       "Pictures without a dataset.toml are read as those that the memory was made from. Pictures "
-      "that cannot be read are named and skipped. The exit code is 1 when no picture shows a place "
-      "of the memory.",
+      "that cannot be read are named and skipped. Of a live source the newest picture is answered "
+      "as "
+      "it comes, until Ctrl-C. The exit code is 1 when no picture shows a place of the memory.",
       "  panonav localise office.panonav query_run --report answers\n"
       "  panonav localise office.panonav one.png two.png -o answers.csv\n"
       "  panonav localise office.panonav view.png --json\n"
+      "  panonav localise office.panonav /dev/video0\n"
       "  panonav localise office.panonav office_run --exclude-same-file --turn-randomly 7 --json",
       declare_localise,
       "localize"};

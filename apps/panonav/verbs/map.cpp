@@ -1,6 +1,9 @@
 #include <algorithm>
+#include <array>
 #include <filesystem>
+#include <map>
 #include <memory>
+#include <utility>
 
 #include "cli/json.hpp"
 #include "cli/session.hpp"
@@ -13,6 +16,7 @@
 #include "panonav/pipeline/observation_source.hpp"
 #include "verbs/memorising.hpp"
 #include "verbs/recording.hpp"
+#include "verbs/run_record.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES
 #include "reports/map_picture.hpp"
 #endif
@@ -29,6 +33,7 @@ struct MapArguments {
   std::optional<std::string> tum;
   std::optional<std::string> graph;
   std::optional<std::string> picture;
+  std::optional<std::string> record;
   PictureArguments pictures;
   SignatureOptions signature;
   MapperOptions mapper;
@@ -178,6 +183,53 @@ MappedRun map_recording(const Dataset& recording, Mapper& mapper, Session& sessi
   return mapper.finish();
 }
 
+/// Writes the finished map, then each picture with the pose that it got: of the largest connected
+/// component, as components have no common frame.
+void record_map(const MapArguments& wanted, const Dataset& recording, const MappedRun& run,
+                const ViewEncoder& encoder, Session& session) {
+  RunRecord record(wanted.record, std::array{wanted.dataset, wanted.memory}, false, session);
+  const std::size_t component = largest_component(run.map);
+  std::vector<Point2> places;
+  std::map<std::size_t, std::size_t> nodes;  // by observation
+  for (std::size_t i = 0; i < run.map.nodes.size(); ++i) {
+    nodes[run.observations[i]] = i;
+    if (run.map.nodes[i].component == component) {
+      places.push_back(run.map.nodes[i].pose.position());
+    }
+  }
+  std::vector<RunEdge> edges;
+  const auto node_of = [&](ViewId view) {
+    return *std::ranges::lower_bound(run.map.nodes, view, {}, &MapNode::view);
+  };
+  for (const MapEdge& edge : run.map.edges) {
+    const MapNode a = node_of(edge.a);
+    if (a.component != component) continue;
+    edges.push_back({a.pose.position(), node_of(edge.b).pose.position(), edge.kind});
+  }
+  Progress progress(session, "recording", recording.entries.size());
+  make_in_order(
+      recording.entries.size(), session.executor(),
+      [&](std::size_t i) {
+        const Observation seen = read_observation(recording.entries[i]);
+        RunMoment moment = moment_of(seen, i);
+        moment.panorama = encoder.panorama(seen);
+        return moment;
+      },
+      [&](std::size_t i, RunMoment&& moment) {
+        const auto node = nodes.find(i);
+        moment.state = node == nodes.end() ? "between places" : "place of the map";
+        moment.sure = node != nodes.end();
+        if (moment.sure && run.map.nodes[node->second].component == component) {
+          moment.pose = run.map.nodes[node->second].pose;
+        }
+        moment.references = std::exchange(places, {});
+        moment.edges = std::exchange(edges, {});
+        record.add(std::move(moment));
+        progress.advance();
+      });
+  record.close();
+}
+
 /// Refuses what is typed and does nothing with this recording, and a height of the camera, also of
 /// a file, where lengths cannot be read from the ground.
 void refuse_without_effect(const Arguments& arguments, const MapArguments& wanted,
@@ -237,6 +289,7 @@ ExitCode map(const Arguments& arguments, const MapArguments& wanted, Session& se
       return recording.entries[run.observations[number]].file;
     });
   }
+  if (wanted.record) record_map(wanted, recording, run, mapper.encoder(), session);
 #ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.picture) write_map_picture(*wanted.picture, recording, run);
 #endif
@@ -257,6 +310,7 @@ Run declare_map(Arguments& arguments) {
       "Write the poses of the largest component to this file: TUM text, or CSV for a name "
       "that ends in .csv");
   arguments.option("--graphml FILE", wanted->graph, "Write the map as a graph to this file");
+  declare_record(arguments, wanted->record);
 #ifdef PANONAV_COMMAND_SIMULATES
   arguments.option("--picture FILE", wanted->picture,
                    "Draw the map, beside the truth where it is known, into this PNG or SVG file");

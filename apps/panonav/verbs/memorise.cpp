@@ -11,6 +11,7 @@
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/observation_source.hpp"
+#include "verbs/live_run.hpp"
 #include "verbs/memorising.hpp"
 #include "verbs/recording.hpp"
 
@@ -29,6 +30,7 @@ struct MemoriseArguments {
   bool no_thumbnails = false;
   bool no_features = false;
   bool strict = false;
+  LiveArguments live;
 };
 
 /// A picture that was not memorised.
@@ -83,17 +85,9 @@ void add_all(const Dataset& missing, const Dataset& recording, bool strict, Memo
   }
 }
 
-ExitCode memorise(const Arguments& arguments, const MemoriseArguments& wanted, Session& session) {
-  const bool resumes = fs::exists(wanted.memory);
-  const auto open = [&] {
-    if (!resumes) return open_recording(wanted.input, wanted.pictures, std::nullopt, session);
-    const auto memory = MemoryFile::open(wanted.memory, Access::read_write);
-    require_kept_options(arguments, wanted.signature, wanted.preprocessing, memory);
-    return open_recording(wanted.input, wanted.pictures, memory, session);
-  };
-  const Dataset recording = open();
-  std::vector<Skipped> skipped;
-  MemoriserOptions options{.source = recording.source,
+MemoriserOptions options_of(const MemoriseArguments& wanted, const PictureSource& source,
+                            std::vector<Skipped>& skipped, Session& session) {
+  MemoriserOptions options{.source = source,
                            .signature = wanted.signature,
                            .preprocessing = wanted.preprocessing,
                            .thumbnails = !wanted.no_thumbnails,
@@ -104,7 +98,71 @@ ExitCode memorise(const Arguments& arguments, const MemoriseArguments& wanted, S
       skip(seen.name, error, skipped, session);
     };
   }
-  Memoriser memoriser(wanted.memory, options);
+  return options;
+}
+
+void tell(const MemoriseArguments& wanted, const MemoryFile& memory, std::size_t appended,
+          std::size_t known_before, const std::vector<Skipped>& skipped, Session& session) {
+  const auto info = memory.info();
+  if (session.json()) {
+    auto skipped_json = ordered_json::array();
+    for (const Skipped& one : skipped) {
+      skipped_json.push_back({{"file", one.file}, {"why", one.why}});
+    }
+    session.print(json_line(ordered_json{{"memory", wanted.memory},
+                                         {"appended", appended},
+                                         {"known_before", known_before},
+                                         {"skipped", std::move(skipped_json)},
+                                         {"views", info.views},
+                                         {"file_bytes", info.file_bytes}}));
+    return;
+  }
+  session.print(
+      session.strong(std::to_string(appended)) + " views memorised" +
+      (known_before > 0 ? ", " + std::to_string(known_before) + " were known before" : "") +
+      (skipped.empty() ? "" : ", " + std::to_string(skipped.size()) + " could not be read") + "; " +
+      wanted.memory + " holds " + std::to_string(info.views));
+  if (!memory.header().elevations) {
+    session.print(
+        "The pictures' elevations are not known: every row is treated as on the horizon.");
+  }
+  session.suggest({"panonav", "localise", wanted.memory, "INPUT"});
+}
+
+/// Memorises pictures as they come until the source ends or the user interrupts.
+ExitCode memorise_live(const Arguments& arguments, const MemoriseArguments& wanted,
+                       const std::optional<PictureSource>& remembered, Session& session) {
+  const auto source = open_live(arguments, wanted.input, wanted.pictures, remembered, wanted.live);
+  std::vector<Skipped> skipped;
+  Memoriser memoriser(wanted.memory, options_of(wanted, source->pictures(), skipped, session));
+  LiveRun taking(*source, wanted.pictures.part, wanted.live, session);
+  taking.take([](const Observation&) { return ""; },
+              [&](Observation&& seen) { memoriser.add(std::move(seen)); });
+  const LiveCounts& counts = taking.finish();
+  if (counts.pictures == 0) throw FileError(wanted.input, "gave no picture");
+  const auto stored = memoriser.finish(session.executor());
+  tell(wanted, *memoriser.file(), stored.appended, stored.known_before, skipped, session);
+  if (const std::string events = events_text(counts, 0); !events.empty()) {
+    session.note(std::to_string(counts.pictures) + " pictures" + events);
+  }
+  return ExitCode::done;
+}
+
+ExitCode memorise(const Arguments& arguments, const MemoriseArguments& wanted, Session& session) {
+  const bool resumes = fs::exists(wanted.memory);
+  const bool live = is_live(wanted.input);
+  if (!live) refuse_live(arguments, wanted.input, true);
+  std::optional<PictureSource> remembered;
+  if (resumes) {
+    const auto memory = MemoryFile::open(wanted.memory, Access::read_write);
+    require_kept_options(arguments, wanted.signature, wanted.preprocessing, memory);
+    (void)checked_beside(wanted.pictures, memory);
+    remembered = memory.header().source;
+  }
+  if (live) return memorise_live(arguments, wanted, remembered, session);
+  const Dataset recording = open_recording(wanted.input, wanted.pictures, remembered, session);
+  std::vector<Skipped> skipped;
+  Memoriser memoriser(wanted.memory, options_of(wanted, recording.source, skipped, session));
   Dataset missing = recording;
   if (resumes) {
     Progress comparing(session, "comparing", recording.entries.size());
@@ -117,31 +175,7 @@ ExitCode memorise(const Arguments& arguments, const MemoriseArguments& wanted, S
   const std::size_t known_before = recording.entries.size() - missing.entries.size();
   add_all(missing, recording, wanted.strict, memoriser, skipped, session);
   const auto counts = memoriser.finish(session.executor());
-  const MemoryFile* const memory = memoriser.file();
-  const auto info = memory->info();
-  if (session.json()) {
-    auto skipped_json = ordered_json::array();
-    for (const Skipped& one : skipped) {
-      skipped_json.push_back({{"file", one.file}, {"why", one.why}});
-    }
-    session.print(json_line(ordered_json{{"memory", wanted.memory},
-                                         {"appended", counts.appended},
-                                         {"known_before", known_before},
-                                         {"skipped", std::move(skipped_json)},
-                                         {"views", info.views},
-                                         {"file_bytes", info.file_bytes}}));
-    return ExitCode::done;
-  }
-  session.print(
-      session.strong(std::to_string(counts.appended)) + " views memorised" +
-      (known_before > 0 ? ", " + std::to_string(known_before) + " were known before" : "") +
-      (skipped.empty() ? "" : ", " + std::to_string(skipped.size()) + " could not be read") + "; " +
-      wanted.memory + " holds " + std::to_string(info.views));
-  if (!memory->header().elevations) {
-    session.print(
-        "The pictures' elevations are not known: every row is treated as on the horizon.");
-  }
-  session.suggest({"panonav", "localise", wanted.memory, "INPUT"});
+  tell(wanted, *memoriser.file(), counts.appended, known_before, skipped, session);
   return ExitCode::done;
 }
 
@@ -150,10 +184,12 @@ Run declare_memorise(Arguments& arguments) {
   arguments.positional(
       "INPUT", wanted->input,
       "Data set, folder of pictures, one picture, video, recording of topics (MCAP, "
-      "rosbag2, ROS 1 bag), or - for JPEG pictures on standard input");
+      "rosbag2, ROS 1 bag), or a live source: - for JPEG pictures on standard input, a camera "
+      "(/dev/video0), an address (rtsp://, http://, tcp://)");
   arguments.positional("MEMORY", wanted->memory,
                        "Memory file (NAME.panonav); grows if it is there");
   declare_pictures(arguments, wanted->pictures);
+  declare_live(arguments, wanted->live);
   arguments.flag("--no-thumbnails", wanted->no_thumbnails,
                  "Do not keep small pictures of the views");
   arguments.flag("--no-features", wanted->no_features,
@@ -182,9 +218,10 @@ Verb memorise_verb() {
       "not at all; after an interruption the same command goes on where it stopped. Views that "
       "the\n"
       "memory knows by name must be the same views: another pose, stamp or picture under a known\n"
-      "name is refused.",
+      "name is refused. A live source is memorised until Ctrl-C.",
       "  panonav memorise office_run office.panonav\n"
-      "  panonav memorise photos walk.panonav --kind equirectangular --elevation-deg -30 40",
+      "  panonav memorise photos walk.panonav --kind equirectangular --elevation-deg -30 40\n"
+      "  panonav memorise /dev/video0 walk.panonav --kind equirectangular --every 0.5s",
       declare_memorise,
       "memorize"};
 }

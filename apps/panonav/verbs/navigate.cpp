@@ -2,7 +2,9 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "cli/json.hpp"
@@ -13,7 +15,9 @@
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
+#include "panonav/navigation/direction_field.hpp"
 #include "verbs/navigated_run.hpp"
+#include "verbs/run_record.hpp"
 
 namespace panonav::command {
 
@@ -29,6 +33,7 @@ struct NavigateArguments {
   std::optional<std::string> route;
   std::optional<std::string> log;
   std::optional<std::string> picture;
+  std::optional<std::string> record;
   SimulationArguments simulation;
   MissionOptions mission;
   KnownRouteOptions known_route;
@@ -212,6 +217,82 @@ Mission mission_of(const NavigateArguments& wanted, ViewId goal, const MissionPl
   return mission;
 }
 
+/// What a record tells of a mission. Seconds are numbers of looks; no pose is estimated, so that
+/// the pose is the true one.
+class MissionMoments {
+ public:
+  MissionMoments(const RobotNavigator& robot, const RememberedPlace& remembered,
+                 const FieldOptions& field)
+      : robot_(robot), remembered_(remembered), field_(field) {}
+
+  void saw(const Image& picture, const Panorama& panorama) {
+    picture_ = picture;
+    panorama_ = panorama;
+  }
+  RunMoment of(const NavigationDecision& decision, const Pose2& pose) {
+    RunMoment moment{.stamp_s = static_cast<double>(number_++), .pose = pose};
+    moment.picture = std::exchange(picture_, std::nullopt);
+    moment.panorama = std::exchange(panorama_, std::nullopt);
+    moment.truth = ReferencePose{pose.x_m, pose.y_m, pose.heading_rad};
+    moment.sure = decision.probability >= 0.5;
+    moment.state = name_of(decision.state);
+    moment.values.emplace_back("probability", fixed(decision.probability, 4));
+    for (const NavigationEvent event : decision.events) {
+      moment.values.emplace_back("event", name_of(event));
+    }
+    if (decision.nearest) {
+      moment.values.emplace_back("nearest", robot_.info(*decision.nearest).name);
+      moment.best_match =
+          robot_.memory().thumbnail(*decision.nearest).value_or(std::vector<std::uint8_t>{});
+      const auto way = planned_from(*decision.nearest);
+      if (way != plan_) moment.plan = plan_ = way;
+    }
+    if (number_ == 1) add_field(moment);
+    return moment;
+  }
+
+ private:
+  [[nodiscard]] static bool is_known(const Pose2& pose) { return std::isfinite(pose.x_m); }
+
+  [[nodiscard]] std::vector<Pose2> planned_from(ViewId view) const {
+    std::vector<Pose2> way;
+    const auto node = robot_.graph().node_of(view);
+    if (!node) return way;
+    for (const std::size_t next : robot_.planner().planned_way(*node)) {
+      const Pose2& pose = remembered_.truth[next];
+      if (is_known(pose)) way.push_back({pose.x_m, pose.y_m, 0.0});
+    }
+    for (std::size_t i = 0; i + 1 < way.size(); ++i) {
+      way[i].heading_rad = std::atan2(way[i + 1].y_m - way[i].y_m, way[i + 1].x_m - way[i].x_m);
+    }
+    return way;
+  }
+  /// The views, where each sends the robot, and the goal.
+  void add_field(RunMoment& moment) const {
+    const auto guides = direction_field(remembered_.graph, robot_.goal(), field_);
+    for (std::size_t i = 0; i < guides.size(); ++i) {
+      const Pose2& pose = remembered_.truth[i];
+      if (!is_known(pose)) continue;
+      moment.references.push_back(pose.position());
+      if (!guides[i].direction_rad || !std::isfinite(pose.heading_rad)) continue;
+      moment.directions.push_back(
+          {pose.x_m, pose.y_m, wrap_angle(pose.heading_rad + *guides[i].direction_rad)});
+    }
+    Pose2 goal = remembered_.truth[*remembered_.graph.node_of(robot_.goal())];
+    if (!is_known(goal)) return;
+    if (!std::isfinite(goal.heading_rad)) goal.heading_rad = 0.0;
+    moment.goal = goal;
+  }
+
+  const RobotNavigator& robot_;
+  const RememberedPlace& remembered_;
+  FieldOptions field_;
+  std::optional<Image> picture_;
+  std::optional<Panorama> panorama_;
+  std::vector<Pose2> plan_;
+  std::size_t number_ = 0;
+};
+
 ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, Session& session) {
   const auto given = [&](const std::string& section, const std::string& name) {
     return arguments.given(section, name);
@@ -237,8 +318,13 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
                                        " was taken, so half of the way neither; leave out "
                                        "--kidnap");
   }
-  const MissionPlace place =
-      place_as_remembered(wanted.scene, wanted.simulation, robot, given, session);
+  RunRecord record(wanted.record, std::span(&wanted.memory, 1), false, session);
+  MissionMoments moments(robot, remembered, wanted.mission.planner.field);
+  const MissionPlace place = place_as_remembered(
+      wanted.scene, wanted.simulation, robot, given, session,
+      record.wanted()
+          ? [&](const Image& picture, const Panorama& panorama) { moments.saw(picture, panorama); }
+          : SightReport());
   const auto seed = static_cast<std::uint64_t>(wanted.simulation.simulation.scene.seed);
   const Mission mission = mission_of(wanted, robot.goal(), place, seed);
   if (!session.json()) {
@@ -251,12 +337,14 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
   const MissionRun run =
       run_mission(place, remembered, robot.navigator(), mission, wanted.mission, seed,
                   [&](const NavigationDecision& decision, const Pose2& pose) {
+                    if (record.wanted()) record.add(moments.of(decision, pose));
                     if (session.json()) {
                       session.print(json_line(as_json(decision, pose, robot)));
                     } else if (!decision.events.empty()) {
                       session.print(as_text(decision, robot));
                     }
                   });
+  record.close();
   if (wanted.log) write_log(*wanted.log, run);
   if (wanted.picture) {
     write_mission_picture(
@@ -294,6 +382,8 @@ Run declare_navigate(Arguments& arguments) {
   arguments.option("--picture FILE", wanted->picture,
                    "Draw the directions to the goal, the way planned and the way driven into this "
                    "PNG or SVG file");
+  declare_record(arguments, wanted->record);
+  arguments.uncommon({"--record"});
   arguments.options("simulation", wanted->simulation.simulation.scene);
   arguments.options("navigator", wanted->mission.navigator);
   arguments.options("planner", wanted->mission.planner);

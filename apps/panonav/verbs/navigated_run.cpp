@@ -55,19 +55,22 @@ RememberedPlace remembered_by(const RobotNavigator& robot) {
 std::function<FourierSignature(const Pose2& pose, std::uint64_t seed)> sight_through(
     std::shared_ptr<const Renderer> renderer, const RecordingCamera& camera,
     const FrameOptions& frame, const SensorOptions& sensor,
-    std::shared_ptr<const ViewEncoder> pipeline, Executor* executor) {
+    std::shared_ptr<const ViewEncoder> pipeline, Executor* executor, SightReport seen) {
   return [renderer = std::move(renderer), camera, frame, sensor, pipeline = std::move(pipeline),
-          executor](const Pose2& pose, std::uint64_t seed) {
+          executor, seen = std::move(seen)](const Pose2& pose, std::uint64_t seed) {
     Executor here(1);
     const Image picture = take_picture(*renderer, pose, camera, frame, sensor, seed,
                                        executor == nullptr ? here : *executor);
-    return pipeline->signature(pipeline->panorama(picture.view()));
+    const Panorama panorama = pipeline->panorama(picture.view());
+    if (seen) seen(picture, panorama);
+    return pipeline->signature(panorama);
   };
 }
 
 MissionPlace place_as_remembered(
     const std::string& scene, SimulationArguments wanted, const RobotNavigator& robot,
-    const std::function<bool(const std::string&, const std::string&)>& given, Session& session) {
+    const std::function<bool(const std::string&, const std::string&)>& given, Session& session,
+    SightReport seen) {
   const MemoryHeader& header = robot.memory().header();
   const bool mirror = header.source.kind == PictureKind::mirror;
   if (!mirror) {
@@ -92,7 +95,7 @@ MissionPlace place_as_remembered(
   MissionPlace place = world.place();
   const SimulationArguments& settled = world.arguments();
   place.sight = sight_through(place.renderer, camera, settled.frame, settled.sensor, pipeline,
-                              &session.executor());
+                              &session.executor(), std::move(seen));
   if (const RouteSource* const route = robot.route()) {
     place.line = [renderer = place.renderer, camera, frame = settled.frame, sensor = settled.sensor,
                   encoder = std::make_shared<LineEncoder>(source, *route),

@@ -17,13 +17,16 @@ namespace panonav::command {
 /// its views were taken. No signature is held.
 [[nodiscard]] RememberedPlace remembered_by(const RobotNavigator& robot);
 
+/// Hears of each picture that a simulated robot takes, and of its panorama.
+using SightReport = std::function<void(const Image& picture, const Panorama& panorama)>;
+
 /// What a robot sees through a simulated camera, as the memory compares it: to be a
 /// `MissionPlace::sight`. `executor` empty: each picture is made by the thread that asks, so that
 /// any number of them may; else it must outlive the answer and one thread may ask.
 [[nodiscard]] std::function<FourierSignature(const Pose2& pose, std::uint64_t seed)> sight_through(
     std::shared_ptr<const Renderer> renderer, const RecordingCamera& camera,
     const FrameOptions& frame, const SensorOptions& sensor,
-    std::shared_ptr<const ViewEncoder> pipeline, Executor* executor);
+    std::shared_ptr<const ViewEncoder> pipeline, Executor* executor, SightReport seen = {});
 
 /// A robot in a simulated world that sees as the memory's views were seen: by the camera, size and
 /// preprocessing of its header. `wanted.simulation` says what differs in the scene, the rest of it
@@ -32,6 +35,7 @@ namespace panonav::command {
 /// `SimulatedWorld`. `session` must outlive the place.
 [[nodiscard]] MissionPlace place_as_remembered(
     const std::string& scene, SimulationArguments wanted, const RobotNavigator& robot,
-    const std::function<bool(const std::string&, const std::string&)>& given, Session& session);
+    const std::function<bool(const std::string&, const std::string&)>& given, Session& session,
+    SightReport seen = {});
 
 }  // namespace panonav::command

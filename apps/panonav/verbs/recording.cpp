@@ -256,7 +256,7 @@ Dataset open_whole(const std::string& input, const PictureArguments& pictures,
     return read_jpeg_stream(STDIN_FILENO, "standard input", *source);
   }
   if (is_live(input)) {
-    throw UsageError(input + " is a live source; panonav run takes pictures of it");
+    throw UsageError(input + " is a live source; allowed with run, localise, memorise and track");
   }
   if (!fs::exists(input, ignored)) throw FileError(input, "there is no such file or folder");
   if (is_recording(input)) {
@@ -332,11 +332,9 @@ Dataset open_recording(const std::string& input, const PictureArguments& picture
   return recording;
 }
 
-Dataset open_recording(const std::string& input, const PictureArguments& pictures,
-                       const MemoryFile& memory, Session& session) {
+const PictureArguments& checked_beside(const PictureArguments& pictures, const MemoryFile& memory) {
   const MemoryHeader& header = memory.header();
-  Dataset recording = open_recording(input, pictures, header.source, session);
-  if (!pictures.elevation_deg) return recording;
+  if (!pictures.elevation_deg) return pictures;
   const auto [low, high] = *pictures.elevation_deg;
   const std::string typed =
       "--elevation-deg is " + short_number(low) + " " + short_number(high) + "; allowed: ";
@@ -353,6 +351,13 @@ Dataset open_recording(const std::string& input, const PictureArguments& picture
                      ", the band of " + memory.path().string() +
                      "; leave it out or start a new memory");
   }
+  return pictures;
+}
+
+Dataset open_recording(const std::string& input, const PictureArguments& pictures,
+                       const MemoryFile& memory, Session& session) {
+  Dataset recording = open_recording(input, pictures, memory.header().source, session);
+  (void)checked_beside(pictures, memory);
   return recording;
 }
 

@@ -55,11 +55,15 @@ void declare_pictures(Arguments& arguments, PictureArguments& pictures);
 /// A data set, a folder of pictures, one picture, a video or a recording of topics. `remembered` is
 /// how pictures lay that the memory was made from: it reads what comes without a description of its
 /// own. A data set describes itself, so flags beside it throw UsageError, as topics do of what has
-/// none. Throws FileError. Notes what of a folder or recording is left out and pictures that look
-/// as if they were of another kind.
+/// none, and live sources but standard input, which is read to its end. Throws FileError. Notes
+/// what of a folder or recording is left out and pictures that look as if they were of another
+/// kind.
 [[nodiscard]] Dataset open_recording(const std::string& input, const PictureArguments& pictures,
                                      const std::optional<PictureSource>& remembered,
                                      Session& session);
+/// Throws UsageError on a band (--elevation-deg) that is not that of the memory's views.
+[[nodiscard]] const PictureArguments& checked_beside(const PictureArguments& pictures,
+                                                     const MemoryFile& memory);
 /// The same beside a memory, whose pictures lie as its header says. The memory's views keep their
 /// band: another --elevation-deg throws UsageError.
 [[nodiscard]] Dataset open_recording(const std::string& input, const PictureArguments& pictures,

@@ -1,3 +1,4 @@
+#include <array>
 #include <filesystem>
 #include <memory>
 
@@ -11,6 +12,7 @@
 #include "panonav/storage/memory_file.hpp"
 #include "verbs/followed_run.hpp"
 #include "verbs/recording.hpp"
+#include "verbs/run_record.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES
 #include "reports/report_page.hpp"
 #include "reports/route_report.hpp"
@@ -30,6 +32,7 @@ struct FollowArguments {
   bool no_odometry = false;
   std::optional<std::string> tum;
   std::optional<std::string> report;
+  std::optional<std::string> record;
   RouteTrackerOptions tracker;
   RouteFitOptions fit;
 };
@@ -155,14 +158,21 @@ ExitCode follow_run(const Arguments& arguments, const FollowArguments& wanted, S
 #endif
   std::vector<FollowedImage> images;
   Progress progress(session, "following", (run.entries.size() - 1) / wanted.every + 1);
-  follow(follower, run, truth, wanted.every, session.executor(), [&](FollowedImage&& image) {
-    progress.clear();
-    session.print(session.json() ? json_line(as_json(image, headings_known))
-                                 : as_text(image, session));
-    images.push_back(std::move(image));
-    progress.advance();
-  });
+  RunRecord record(wanted.record, std::array{wanted.dataset, wanted.memory}, false, session);
+  std::optional<PanoramaReader> recorded;
+  if (record.wanted()) recorded.emplace(run.source, PanoramaShape{});
+  follow(follower, run, truth, wanted.every, recorded ? &*recorded : nullptr, session.executor(),
+         [&](FollowedImage&& image) {
+           progress.clear();
+           session.print(session.json() ? json_line(as_json(image, headings_known))
+                                        : as_text(image, session));
+           if (image.moment) record.add(std::move(*image.moment));
+           image.moment.reset();
+           images.push_back(std::move(image));
+           progress.advance();
+         });
   progress.clear();
+  record.close();
 
   if (wanted.tum) {
     std::vector<StampedPose> trajectory;
@@ -187,7 +197,8 @@ Run declare_route_follow(Arguments& arguments) {
   auto wanted = std::make_shared<FollowArguments>();
   arguments.positional("MEMORY", wanted->memory, "Memory file with a route");
   arguments.positional("DATASET", wanted->dataset,
-                       "Data set, folder of pictures or recording of a later drive, in its order");
+                       "Data set, folder of pictures, video or recording of a later drive, in its "
+                       "order");
   declare_topics(arguments, wanted->topics);
   declare_part(arguments, wanted->part, false);
   arguments.option("--name NAME", wanted->name,
@@ -199,6 +210,7 @@ Run declare_route_follow(Arguments& arguments) {
   arguments.option("--tum FILE", wanted->tum,
                    "Write the poses on the route to this file: TUM text, or CSV for a name that "
                    "ends in .csv");
+  declare_record(arguments, wanted->record);
 #ifdef PANONAV_COMMAND_SIMULATES
   arguments.option("--report FOLDER", wanted->report,
                    "Write pictures of the route, the fixes, and what was seen beside what the "

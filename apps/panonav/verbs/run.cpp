@@ -1,31 +1,18 @@
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <array>
-#include <atomic>
-#include <chrono>
-#include <condition_variable>
-#include <csignal>
-#include <deque>
 #include <filesystem>
-#include <functional>
 #include <memory>
-#include <mutex>
-#include <thread>
-#include <vector>
 
 #include "cli/json.hpp"
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
-#include "panonav/core/statistics.hpp"
-#include "panonav/core/text.hpp"
 #include "panonav/pipeline/live_memory.hpp"
 #include "panonav/pipeline/observation_source.hpp"
-#include "panonav/pipeline/run_recorder.hpp"
+#include "verbs/live_run.hpp"
 #include "verbs/localised_query.hpp"
 #include "verbs/memorising.hpp"
 #include "verbs/recording.hpp"
+#include "verbs/run_record.hpp"
 
 namespace panonav::command {
 
@@ -39,136 +26,11 @@ struct RunArguments {
   PictureArguments pictures;
   bool learn = false;
   std::optional<double> learn_interval_s;
-  std::optional<int> camera_width;
-  std::optional<int> camera_height;
-  std::optional<int> count;
+  LiveArguments live;
   std::optional<std::string> record;
   SignatureOptions signature;
   PreprocessingOptions preprocessing;
 };
-
-volatile std::sig_atomic_t signal_pipe = -1;  // what a handler may use is static
-
-/// Calls `stop` on another thread when the user or the system asks the program to end; a second
-/// time ends it at once.
-class StopSignals {
- public:
-  explicit StopSignals(std::function<void()> stop) : stop_(std::move(stop)) {
-    if (pipe2(pipe_.data(), O_CLOEXEC) != 0) throw Error("no pipe can be made");
-    signal_pipe = pipe_[1];
-    struct sigaction action {};
-    action.sa_handler = [](int) {
-      const char asked = 's';
-      (void)!write(signal_pipe, &asked, 1);
-    };
-    action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
-    sigaction(SIGINT, &action, &interrupt_);
-    sigaction(SIGTERM, &action, &terminate_);
-    waiting_ = std::thread([this] {
-      char asked = 0;
-      while (read(pipe_[0], &asked, 1) < 0) {
-      }
-      if (asked == 's') stop_();
-    });
-  }
-  ~StopSignals() {
-    sigaction(SIGINT, &interrupt_, nullptr);
-    sigaction(SIGTERM, &terminate_, nullptr);
-    const char over = 'o';
-    (void)!write(pipe_[1], &over, 1);
-    waiting_.join();
-    signal_pipe = -1;
-    close(pipe_[0]);
-    close(pipe_[1]);
-  }
-  StopSignals(const StopSignals&) = delete;
-  StopSignals& operator=(const StopSignals&) = delete;
-
- private:
-  std::function<void()> stop_;
-  std::array<int, 2> pipe_{-1, -1};
-  struct sigaction interrupt_ {};
-  struct sigaction terminate_ {};
-  std::thread waiting_;
-};
-
-/// Prints lines on a thread of its own. A reader that is slow does not hold up the robot: beyond
-/// `max_waiting` lines the oldest are left out and counted.
-class LinePrinter {
- public:
-  LinePrinter(Session& session, bool wait)
-      : session_(session), wait_(wait), thread_([this] { work(); }) {}
-  ~LinePrinter() { finish(); }
-  LinePrinter(const LinePrinter&) = delete;
-  LinePrinter& operator=(const LinePrinter&) = delete;
-
-  void print(std::string line) {
-    std::unique_lock lock(mutex_);
-    if (wait_) printed_.wait(lock, [this] { return lines_.size() < max_waiting; });
-    if (lines_.size() == max_waiting) {
-      lines_.pop_front();
-      ++left_out_;
-    }
-    lines_.push_back(std::move(line));
-    came_.notify_one();
-  }
-  void finish() {
-    if (!thread_.joinable()) return;
-    {
-      const std::lock_guard lock(mutex_);
-      over_ = true;
-    }
-    came_.notify_one();
-    thread_.join();
-  }
-  [[nodiscard]] std::size_t left_out() const noexcept { return left_out_; }
-
- private:
-  void work() {
-    std::unique_lock lock(mutex_);
-    while (true) {
-      came_.wait(lock, [this] { return over_ || !lines_.empty(); });
-      if (lines_.empty()) return;
-      const std::string line = std::move(lines_.front());
-      lines_.pop_front();
-      lock.unlock();
-      session_.print(line);
-      if (!wait_) session_.flush();
-      lock.lock();
-      printed_.notify_one();
-    }
-  }
-
-  static constexpr std::size_t max_waiting = 256;
-  Session& session_;
-  bool wait_;
-  std::mutex mutex_;
-  std::condition_variable came_;
-  std::condition_variable printed_;
-  std::deque<std::string> lines_;
-  std::size_t left_out_ = 0;
-  bool over_ = false;
-  std::thread thread_;
-};
-
-/// How the pictures lie that a new memory is made from, or as those of the memory.
-PictureSource source_of(const RunArguments& wanted,
-                        const std::optional<PictureSource>& remembered) {
-  if (auto stated = picture_source(wanted.pictures)) return *stated;
-  if (remembered) return *remembered;
-  throw UsageError(wanted.memory + " is a new memory; say what the pictures show with --kind");
-}
-
-struct RunCounts {
-  std::size_t pictures = 0;
-  std::size_t known = 0;
-  std::size_t skipped = 0;
-  std::vector<double> delays_ms;
-};
-
-double now_s() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
 
 std::string line_of(const Observation& seen, const LiveMemory::Answer& answer, Session& session) {
   const LocalisedQuery query{seen.name, 0.0, answer.place.value_or(Place{}), seen.pose, ""};
@@ -182,106 +44,42 @@ std::string line_of(const Observation& seen, const LiveMemory::Answer& answer, S
   return json_line(json);
 }
 
-/// Records what is seen and answered, in a live run as far as the disk keeps up.
-class Recording {
+/// What a record needs of a run.
+class RunMoments {
  public:
-  Recording(const std::string& file, std::string memory, bool wait, Session& session)
-      : recorder_(file, {.wait = wait}), path_(std::move(memory)), session_(session) {}
+  RunMoments(const LiveMemory& memory, std::string path)
+      : memory_(memory), path_(std::move(path)) {}
 
-  void add(const Observation& seen, const LiveMemory::Answer& answer, const LiveMemory& memory) {
-    if (failed_) return;
-    try {
-      write(seen, answer, memory);
-    } catch (const FileError& error) {
-      failed_ = true;  // the robot goes on
-      session_.note("the recording ends here: " + readable_line(error.what()));
+  RunMoment of(const Observation& seen, const LiveMemory::Answer& answer) {
+    RunMoment moment = moment_of(seen, number_++);
+    const PlaceRecogniser* const recogniser = memory_.recogniser();
+    if (recogniser != nullptr) moment.panorama = recogniser->encoder().panorama(seen);
+    if (!answer.place) {
+      moment.state = "no memory yet";
+      return moment;
     }
-  }
-  void close() {
-    try {
-      if (!failed_) recorder_.close();
-    } catch (const FileError& error) {
-      session_.note("the recording is cut short: " + readable_line(error.what()));
+    describe(moment, *answer.place);
+    if (!file_) file_ = MemoryFile::open(path_, Access::read_only);
+    moment.best_match = best_match_of(*answer.place, *file_);
+    // Rarely: the cloud is that of all views.
+    if (memory_.views() > references_ + references_ / 8) {
+      references_ = memory_.views();
+      moment.references = reference_positions(recogniser->memory());
     }
+    return moment;
   }
-  [[nodiscard]] std::size_t left_out() const { return recorder_.left_out(); }
 
  private:
-  void write(const Observation& seen, const LiveMemory::Answer& answer, const LiveMemory& memory) {
-    RunMoment moment;
-    moment.stamp_s = seen.stamp_s.value_or(static_cast<double>(moments_));
-    ++moments_;
-    if (const auto* const picture = std::get_if<Image>(&seen.picture)) moment.picture = *picture;
-    moment.truth = seen.pose;
-    const PlaceRecogniser* const recogniser = memory.recogniser();
-    if (recogniser != nullptr) moment.panorama = recogniser->encoder().panorama(seen);
-    if (answer.place) {
-      describe(moment, *answer.place);
-      if (!answer.place->matches.empty()) {
-        moment.best_match = thumbnail(answer.place->matches.front().name);
-      }
-      // Rarely: the cloud is that of all views.
-      if (memory.views() > references_ + references_ / 8) {
-        references_ = memory.views();
-        recorder_.add_references(recogniser->memory(), moment.stamp_s);
-      }
-    } else {
-      moment.state = "no memory yet";
-    }
-    recorder_.add(std::move(moment));
-  }
-  /// By name: views that were just learnt have other ids in the file.
-  std::vector<std::uint8_t> thumbnail(const std::string& name) {
-    if (!file_) file_ = MemoryFile::open(path_, Access::read_only);
-    const auto view = file_->find(name);
-    const auto picture = view ? file_->thumbnail(*view) : std::nullopt;
-    return picture.value_or(std::vector<std::uint8_t>{});
-  }
-
-  RunRecorder recorder_;
+  const LiveMemory& memory_;
   std::string path_;
-  Session& session_;
-  std::optional<MemoryFile> file_;
-  std::size_t moments_ = 0;
-  std::size_t references_ = 0;
-  bool failed_ = false;
+  std::optional<MemoryFile> file_;  // there is none before a new memory's first views
+  std::size_t number_ = 0;
+  std::size_t references_ = 0;  // that are in the record
 };
 
-void tell(const RunCounts& counts, const LiveMemory& memory, const LivePictures* live,
-          std::size_t lines_left_out, std::size_t moments_left_out, const RunArguments& wanted,
-          Session& session) {
-  const LivePictures::Counts source = live != nullptr ? live->counts() : LivePictures::Counts{};
-  std::string line = std::to_string(counts.pictures) + " pictures, " +
-                     std::to_string(counts.known) + " of places of " + wanted.memory;
-  if (wanted.learn) line += ", " + std::to_string(memory.learnt()) + " views learnt";
-  const auto add = [&line](std::uint64_t count, const std::string& what) {
-    if (count > 0) line += ", " + std::to_string(count) + " " + what;
-  };
-  add(counts.skipped + source.damaged, "could not be read");
-  add(source.dropped, "came too fast and were dropped");
-  add(source.interruptions, "interruptions of the source");
-  add(lines_left_out, "lines were not printed for a slow reader");
-  add(moments_left_out, "moments were not recorded on a slow disk");
-  if (!counts.delays_ms.empty()) {
-    line += "; from arrival to answer " + fixed(quantile(counts.delays_ms, 0.5), 1) +
-            " ms median, " + fixed(quantile(counts.delays_ms, 0.99), 1) + " ms in 99 %";
-  }
-  session.note(line);
-}
-
 ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& session) {
-  if (wanted.camera_width.has_value() != wanted.camera_height.has_value()) {
-    throw UsageError("--camera-width and --camera-height go together");
-  }
   const bool live = is_live(wanted.source);
-  if (live) {
-    arguments.refuse_unused({"--from", "--to", "--every", "--image-topic", "--odometry-topic",
-                             "--odometry-frames", "--imu-topic"},
-                            "where " + wanted.source + " is a live source");
-  } else {
-    arguments.refuse_unused({"--camera-width", "--camera-height"},
-                            "where " + wanted.source + " is no live source");
-  }
+  if (!live) refuse_live(arguments, wanted.source, false);
   std::optional<PictureSource> remembered;
   if (fs::exists(wanted.memory)) {
     const auto memory = MemoryFile::open(wanted.memory, Access::read_only);
@@ -291,14 +89,8 @@ ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& se
     throw FileError(wanted.memory, "no such file; --learn makes it");
   }
   std::unique_ptr<ObservationSource> source;
-  LivePictures* pictures = nullptr;
   if (live) {
-    LiveOptions options;
-    if (wanted.camera_width) options.size = ImageSize{*wanted.camera_width, *wanted.camera_height};
-    auto observations =
-        std::make_unique<LiveObservations>(wanted.source, source_of(wanted, remembered), options);
-    pictures = &observations->live();
-    source = std::move(observations);
+    source = open_live(arguments, wanted.source, wanted.pictures, remembered, wanted.live);
   } else {
     source = std::make_unique<DatasetObservations>(
         open_recording(wanted.source, wanted.pictures, remembered, session), session.executor());
@@ -311,46 +103,28 @@ ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& se
                             .localiser = {}};
   if (wanted.learn_interval_s) options.min_interval_s = *wanted.learn_interval_s;
   LiveMemory memory(wanted.memory, options);
-
-  RunCounts counts;
-  std::atomic<bool> stopped = false;
-  LinePrinter printer(session, !live);
-  std::optional<Recording> recording;
-  if (wanted.record) recording.emplace(*wanted.record, wanted.memory, !live, session);
-  {
-    const StopSignals signals([&] {
-      stopped = true;
-      if (pictures != nullptr) pictures->stop();
-    });
-    const auto wanted_more = [&] {
-      return !stopped &&
-             (!wanted.count || counts.pictures < static_cast<std::size_t>(*wanted.count));
-    };
-    while (wanted_more()) {
-      std::optional<Observation> seen;
-      LiveMemory::Answer answer;
-      try {
-        seen = source->next();
-        if (!seen) break;
-        ++counts.pictures;
-        answer = memory.answer(*seen);
-      } catch (const Error& error) {
-        ++counts.skipped;
-        session.note("skipped: " + readable_line(error.what()));
-        continue;
-      }
-      if (live) counts.delays_ms.push_back(1e3 * (now_s() - *seen->stamp_s));
-      if (answer.place && answer.place->known) ++counts.known;
-      printer.print(line_of(*seen, answer, session));
-      if (recording) recording->add(*seen, answer, memory);
-      if (answer.is_new) memory.learn(std::move(*seen));
-    }
-  }
+  RunRecord record(wanted.record, std::array{wanted.source, wanted.memory}, live, session);
+  RunMoments moments(memory, wanted.memory);
+  std::size_t known = 0;
+  LiveMemory::Answer answer;
+  LiveRun taking(*source, wanted.pictures.part, wanted.live, session);
+  taking.take(
+      [&](const Observation& seen) {
+        answer = memory.answer(seen);
+        if (answer.place && answer.place->known) ++known;
+        return line_of(seen, answer, session);
+      },
+      [&](Observation&& seen) {
+        if (record.wanted()) record.add(moments.of(seen, answer));
+        if (answer.is_new) memory.learn(std::move(seen));
+      });
   memory.finish();  // a reader of the lines may never go on
-  if (recording) recording->close();
-  printer.finish();
-  tell(counts, memory, pictures, printer.left_out(), recording ? recording->left_out() : 0, wanted,
-       session);
+  record.close();
+  const LiveCounts& counts = taking.finish();
+  session.note(std::to_string(counts.pictures) + " pictures, " + std::to_string(known) +
+               " of places of " + wanted.memory +
+               (wanted.learn ? ", " + std::to_string(memory.learnt()) + " views learnt" : "") +
+               events_text(counts, record.left_out()));
   return counts.pictures > 0 ? ExitCode::done : ExitCode::no_answer;
 }
 
@@ -363,17 +137,12 @@ Run declare_run(Arguments& arguments) {
   arguments.flag("--learn", wanted->learn, "Add views of places that the memory does not know");
   arguments.option("--learn-interval-s", wanted->learn_interval_s,
                    "Time between two views that are added, at least; default 0.5");
-  arguments.option("--count N", wanted->count, 1, "End after this many pictures");
-  arguments.option("--record FILE", wanted->record,
-                   "Write what is seen and answered as MCAP, for Rerun, Foxglove and Lichtblick");
-  arguments.option("--camera-width", wanted->camera_width, 1,
-                   "Wanted width of a camera's pictures");
-  arguments.option("--camera-height", wanted->camera_height, 1,
-                   "Wanted height of a camera's pictures");
+  declare_record(arguments, wanted->record);
+  declare_live(arguments, wanted->live);
   declare_pictures(arguments, wanted->pictures);
   arguments.options("signature", wanted->signature);
   arguments.options("preprocessing", wanted->preprocessing);
-  arguments.uncommon({"--camera-width", "--camera-height"});
+  arguments.common({"--count"});
   arguments.used_only(
       {"--learn-interval-s"}, [wanted] { return wanted->learn; }, "without --learn");
   return [wanted, &arguments](Session& session) { return run(arguments, *wanted, session); };

@@ -5,7 +5,9 @@
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/io/panorama_reader.hpp"
 #include "panonav/io/trajectory_file.hpp"
+#include "verbs/run_record.hpp"
 #include "verbs/simulated_recording.hpp"
 
 namespace panonav::command {
@@ -20,6 +22,7 @@ struct SimulateArguments {
   std::optional<double> grid_m;
   std::optional<std::uint64_t> random;
   std::optional<std::string> trajectory;
+  std::optional<std::string> record;
   SimulationArguments simulation;
 };
 
@@ -85,6 +88,19 @@ void check_out(const std::string& out) {
   }
 }
 
+/// What the robot saw, and where it truly was.
+RunMoment moment_of(const DatasetEntry& entry, const Image& picture,
+                    const PanoramaReader& panoramas, std::size_t number) {
+  RunMoment moment{.stamp_s = entry.stamp_s.value_or(static_cast<double>(number)),
+                   .picture = picture,
+                   .panorama = panoramas.convert(picture.view(), entry.tilt.value_or(Tilt{})),
+                   .odometry = entry.odometry,
+                   .tilt = entry.tilt,
+                   .truth = entry.pose};
+  moment.pose = Pose2{entry.pose->x_m, entry.pose->y_m, *entry.pose->heading_rad};
+  return moment;
+}
+
 ExitCode simulate(const Arguments& arguments, SimulateArguments wanted, Session& session) {
   apply_shorthands(arguments, wanted);
   check_out(wanted.out);
@@ -103,10 +119,19 @@ ExitCode simulate(const Arguments& arguments, SimulateArguments wanted, Session&
                            static_cast<std::uint64_t>(settled.simulation.scene.seed));
   const bool with_path =
       wanted.trajectory.has_value() || settled.recording.path != RecordingPath::random;
+  RunRecord record(wanted.record, {}, false, session);
+  const PanoramaReader panoramas(world.source(), {});
+  std::size_t number = 0;
   Progress progress(session, "rendering", poses.size());
   const auto dataset = record_dataset(world, wanted.out, poses, with_path, session.executor(),
-                                      [&] { progress.advance(); });
+                                      [&](const DatasetEntry& entry, const Image& picture) {
+                                        if (record.wanted())
+                                          record.add(moment_of(entry, picture, panoramas, number));
+                                        ++number;
+                                        progress.advance();
+                                      });
   progress.clear();
+  record.close();
   if (session.json()) {
     session.print(json_line(ordered_json{{"dataset", wanted.out},
                                          {"scene", world.scene().name},
@@ -136,6 +161,8 @@ Run declare_simulate_verb(Arguments& arguments) {
                    "Short for --path random --poses: random places and headings");
   arguments.option("--trajectory FILE", wanted->trajectory,
                    "Poses of a trajectory file (TUM text or CSV)");
+  declare_record(arguments, wanted->record);
+  arguments.uncommon({"--record"});
   declare_simulation(arguments, wanted->simulation);
   arguments.common(
       {"--path", "--spacing-m", "--poses", "--kind", "--seed", "--light", "--moved-objects"});

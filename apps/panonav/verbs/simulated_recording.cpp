@@ -287,7 +287,7 @@ MissionPlace SimulatedWorld::place() const {
 
 Dataset record_dataset(const SimulatedWorld& world, const fs::path& folder,
                        std::span<const RecordedPose> poses, bool with_path, Executor& executor,
-                       const std::function<void()>& advance) {
+                       const std::function<void(const DatasetEntry&, const Image&)>& taken) {
   std::error_code error;
   const bool made_folder = fs::create_directories(folder, error);
   if (error) throw FileError(folder.string(), "cannot be made: " + error.message());
@@ -311,7 +311,7 @@ Dataset record_dataset(const SimulatedWorld& world, const fs::path& folder,
              if (wanted.frame.tilt_rad > 0.0) entry.tilt = frame.tilt;
              write_png(entry.path, frame.picture.view());
              dataset.entries.push_back(std::move(entry));
-             advance();
+             taken(dataset.entries.back(), frame.picture);
            });
     write_dataset(dataset);
   } catch (...) {

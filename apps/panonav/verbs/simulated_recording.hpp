@@ -85,10 +85,10 @@ class SimulatedWorld {
 };
 
 /// Writes a data set: pictures first, dataset.toml last. `with_path`: the poses are a path, so
-/// stamps and odometry mean something. `advance` is called after each picture. Throws FileError;
-/// what was written is then removed again.
+/// stamps and odometry mean something. `taken` is called after each picture. Throws FileError; what
+/// was written is then removed again.
 Dataset record_dataset(const SimulatedWorld& world, const std::filesystem::path& folder,
                        std::span<const RecordedPose> poses, bool with_path, Executor& executor,
-                       const std::function<void()>& advance);
+                       const std::function<void(const DatasetEntry&, const Image&)>& taken);
 
 }  // namespace panonav::command

@@ -1,7 +1,10 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <span>
+#include <utility>
 
 #include "cli/arguments.hpp"
 #include "cli/json.hpp"
@@ -12,7 +15,9 @@
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/trajectory_file.hpp"
+#include "verbs/live_run.hpp"
 #include "verbs/recording.hpp"
+#include "verbs/run_record.hpp"
 #include "verbs/tracked_run.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES
 #include "reports/report_page.hpp"
@@ -53,6 +58,7 @@ struct TrackArguments {
   std::optional<std::string> tum;
   std::optional<std::string> report;
   std::optional<std::string> record;
+  LiveArguments live;
   StartOptions start;
   MonteCarloOptions filter;
   OdometryNoise odometry;
@@ -217,9 +223,74 @@ void print_summary(const TrackSummary& summary, Session& session) {
   }
 }
 
+ExitCode exit_code_of(const TrackSummary& summary) {
+  return summary.localised > 0 ? ExitCode::done : ExitCode::no_answer;
+}
+
+/// Follows a robot through pictures as they come, until the source ends or the user interrupts. A
+/// live source has no odometry: motion is read from the pictures.
+ExitCode track_live(const Arguments& arguments, const TrackArguments& wanted,
+                    const MemoryFile& file, Session& session) {
+  arguments.refuse_unused({"--report"}, "where " + wanted.dataset + " is a live source");
+  const auto source = open_live(arguments, wanted.dataset, {}, file.header().source, wanted.live);
+  Tracker tracker(
+      file, {wanted.filter, arguments.given("odometry") ? wanted.odometry : visual_odometry_noise(),
+             source->pictures()});
+  VisualOdometry odometry = visual_odometry(tracker.memory());
+  session.note("panonav track: motion is read from the pictures; one unit of the views is " +
+               short_number(odometry.scale_m()) + " m, as in the memory");
+  start(tracker, wanted);
+  RunRecord record(wanted.record, std::span(&wanted.memory, 1), true, session);
+  auto references = reference_positions(tracker.memory());  // for the first moment
+  const TrackSettings settings{.recorded = record.wanted() ? &file : nullptr};
+  std::vector<StampedPose> trajectory;
+  TrackSummary summary;
+  std::size_t index = 0;
+  std::optional<RunMoment> moment;
+  LiveRun taking(*source, wanted.part, wanted.live, session);
+  taking.take(
+      [&](const Observation& seen) -> std::string {
+        const std::size_t number = index++;
+        odometry.add(OdometryView(tracker.encoder().signature(seen)));
+        tracker.move_to(odometry.pose());
+        if (number % static_cast<std::size_t>(wanted.every) != 0) return "";
+        if (record.wanted()) {
+          moment = moment_of(seen, number);
+          moment->odometry = odometry.pose();
+          moment->panorama = tracker.encoder().panorama(seen);
+          moment->references = std::exchange(references, {});
+        }
+        TrackedImage image =
+            track_image(tracker, tracker.encoder().packed(seen), settings, std::move(moment));
+        moment = std::move(image.moment);
+        image.index = number;
+        image.file = seen.name;
+        image.stamp_s = seen.stamp_s;
+        add(summary, image);
+        const bool later = trajectory.empty() || trajectory.back().stamp_s < *seen.stamp_s;
+        if (wanted.tum && is_localised(image) && later) {
+          trajectory.push_back({*seen.stamp_s, *image.estimate.pose});
+        }
+        return session.json() ? json_line(as_json(image)) : as_text(image, session);
+      },
+      [&](Observation&&) {
+        if (moment) record.add(std::move(*moment));
+        moment.reset();
+      });
+  if (wanted.tum) write_trajectory(*wanted.tum, trajectory);
+  record.close();
+  const LiveCounts& counts = taking.finish();
+  if (!session.json()) print_summary(summary, session);
+  session.note(std::to_string(counts.pictures) + " pictures, " + std::to_string(odometry.breaks()) +
+               " steps unread" + events_text(counts, record.left_out()));
+  return exit_code_of(summary);
+}
+
 ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Session& session) {
   check(arguments, wanted);
   const auto file = MemoryFile::open(wanted.memory, Access::read_only);
+  if (is_live(wanted.dataset)) return track_live(arguments, wanted, file, session);
+  refuse_live(arguments, wanted.dataset, true);
   Dataset run = read_run(wanted.dataset, wanted.topics, wanted.part, file, session);
   const bool visual = odometry_poses(run).empty();
   if (!visual) check_odometry(run, wanted.dataset);
@@ -244,24 +315,20 @@ ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Ses
   }
 #endif
 
-  std::optional<RunRecorder> recorder;
-  if (wanted.record) {
-    recorder.emplace(*wanted.record, RunRecorderOptions{.wait = true});
-    recorder->add_references(tracker.memory(), run.entries.front().stamp_s.value_or(0.0));
-    settings.recorded = &file;
-  }
+  RunRecord record(wanted.record, std::array{wanted.dataset, wanted.memory}, false, session);
+  if (record.wanted()) settings.recorded = &file;
   std::vector<TrackedImage> images;
   Progress progress(session, "tracking", (run.entries.size() - 1) / settings.every + 1);
   track(tracker, run, settings, session.executor(), [&](TrackedImage&& image) {
     progress.clear();
     session.print(session.json() ? json_line(as_json(image)) : as_text(image, session));
-    if (image.moment) recorder->add(std::move(*image.moment));
+    if (image.moment) record.add(std::move(*image.moment));
     image.moment.reset();
     images.push_back(std::move(image));
     progress.advance();
   });
   progress.clear();
-  if (recorder) recorder->close();
+  record.close();
 
   if (wanted.tum) {
     std::vector<StampedPose> trajectory;
@@ -279,7 +346,7 @@ ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Ses
     tell_report(*wanted.report, session);
   }
 #endif
-  return summary.localised > 0 ? ExitCode::done : ExitCode::no_answer;
+  return exit_code_of(summary);
 }
 
 Run declare_track(Arguments& arguments) {
@@ -287,8 +354,8 @@ Run declare_track(Arguments& arguments) {
   arguments.positional("MEMORY", wanted->memory, "Memory file");
   arguments.positional(
       "DATASET", wanted->dataset,
-      "Data set, folder of pictures or recording, in the order of the run; without odometry motion "
-      "is read from the pictures");
+      "Data set, folder of pictures, video or recording, in the order of the run, or a live source "
+      "(-, /dev/video0, rtsp://); without odometry motion is read from the pictures");
   declare_topics(arguments, wanted->topics);
   declare_part(arguments, wanted->part, false);
   arguments.option("--every N", wanted->every, 1,
@@ -301,8 +368,8 @@ Run declare_track(Arguments& arguments) {
   arguments.option("--tum FILE", wanted->tum,
                    "Write the trajectory of localised images to this file: TUM text, or CSV for a "
                    "name that ends in .csv");
-  arguments.option("--record FILE", wanted->record,
-                   "Write the run as MCAP, for Rerun, Foxglove and Lichtblick");
+  declare_record(arguments, wanted->record);
+  declare_live(arguments, wanted->live);
 #ifdef PANONAV_COMMAND_SIMULATES
   arguments.option("--report FOLDER", wanted->report,
                    "Write pictures and an animation of particles, estimate and truth into this "
@@ -325,17 +392,19 @@ Run declare_track(Arguments& arguments) {
 }  // namespace
 
 Verb track_verb() {
-  return {"track", "Follow a moving robot through its pictures and odometry",
-          "Monte-Carlo localisation: the robot need not know where it starts, several places that "
-          "look\n"
-          "alike are kept until a picture tells them apart, and a robot that was kidnapped is "
-          "found\n"
-          "again. The exit code is 1 when it was never localised.",
-          "  panonav track office.panonav run\n"
-          "  panonav track office.panonav run --every 10 --report report\n"
-          "  panonav track office.panonav run --tum estimate.tum --json\n"
-          "  panonav evaluate estimate.tum run/poses.csv --align false",
-          declare_track};
+  return {
+      "track", "Follow a moving robot through its pictures and odometry",
+      "Monte-Carlo localisation: the robot need not know where it starts, several places that "
+      "look\n"
+      "alike are kept until a picture tells them apart, and a robot that was kidnapped is "
+      "found\n"
+      "again. A live source is followed until Ctrl-C. The exit code is 1 when the robot was never "
+      "localised.",
+      "  panonav track office.panonav run\n"
+      "  panonav track office.panonav run --every 10 --report report\n"
+      "  panonav track office.panonav run --tum estimate.tum --json\n"
+      "  panonav evaluate estimate.tum run/poses.csv --align false",
+      declare_track};
 }
 
 }  // namespace panonav::command

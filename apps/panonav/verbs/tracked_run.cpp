@@ -27,26 +27,28 @@ std::optional<double> heading_error_rad(const TrackedImage& image) {
   return std::abs(angle_difference(image.estimate.pose->heading_rad, *image.truth->heading_rad));
 }
 
+void add(TrackSummary& summary, const TrackedImage& image) {
+  const std::size_t before = summary.localised + summary.ambiguous + summary.lost;
+  switch (image.estimate.state) {
+    case LocalisationState::localised:
+      ++summary.localised;
+      break;
+    case LocalisationState::ambiguous:
+      ++summary.ambiguous;
+      break;
+    case LocalisationState::lost:
+      ++summary.lost;
+      break;
+  }
+  if (!is_localised(image)) return;
+  if (!summary.first_localised) summary.first_localised = before + 1;
+  if (const auto error = position_error_m(image)) summary.errors_m.push_back(*error);
+  if (const auto error = heading_error_rad(image)) summary.heading_errors_rad.push_back(*error);
+}
+
 TrackSummary summarise_track(const std::vector<TrackedImage>& images) {
   TrackSummary summary;
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    const TrackedImage& image = images[i];
-    switch (image.estimate.state) {
-      case LocalisationState::localised:
-        ++summary.localised;
-        break;
-      case LocalisationState::ambiguous:
-        ++summary.ambiguous;
-        break;
-      case LocalisationState::lost:
-        ++summary.lost;
-        break;
-    }
-    if (!is_localised(image)) continue;
-    if (!summary.first_localised) summary.first_localised = i + 1;
-    if (const auto error = position_error_m(image)) summary.errors_m.push_back(*error);
-    if (const auto error = heading_error_rad(image)) summary.heading_errors_rad.push_back(*error);
-  }
+  for (const TrackedImage& image : images) add(summary, image);
   return summary;
 }
 
@@ -87,10 +89,14 @@ OdometryNoise visual_odometry_noise() {
           .rotation_from_translation = mapping.turn_deviation};
 }
 
-std::string add_visual_odometry(Dataset& run, const Tracker& tracker, Executor& executor) {
+VisualOdometry visual_odometry(const VisualMemory& memory) {
   VisualOdometryOptions options;
-  options.scale_m = scale_of(tracker.memory(), options);
-  VisualOdometry odometry(options);
+  options.scale_m = scale_of(memory, options);
+  return VisualOdometry(options);
+}
+
+std::string add_visual_odometry(Dataset& run, const Tracker& tracker, Executor& executor) {
+  VisualOdometry odometry = visual_odometry(tracker.memory());
   make_in_order(
       run.entries.size(), executor,
       [&](std::size_t i) {
@@ -101,7 +107,7 @@ std::string add_visual_odometry(Dataset& run, const Tracker& tracker, Executor& 
         run.entries[i].odometry = odometry.pose();
       });
   return std::to_string(odometry.breaks()) + " of " + std::to_string(run.entries.size() - 1) +
-         " steps unread; one unit of the views is " + short_number(options.scale_m) +
+         " steps unread; one unit of the views is " + short_number(odometry.scale_m()) +
          " m, as in the memory";
 }
 
@@ -124,6 +130,22 @@ std::vector<Pose2> even_sample(const Particles& particles, std::size_t count) {
   return sample;
 }
 
+TrackedImage track_image(Tracker& tracker, const PackedSignature& view,
+                         const TrackSettings& settings, std::optional<RunMoment> moment) {
+  TrackedImage image;
+  image.estimate = tracker.observe(view);
+  image.particles = even_sample(tracker.localiser().particles(), settings.particles_kept);
+  if (moment) {
+    describe(*moment, image.estimate);
+    moment->particles = even_sample(tracker.localiser().particles(), 500);
+    const auto found = tracker.memory().search(view, {.top = 1});
+    moment->best_match = settings.recorded->thumbnail(found.matches.front().view)
+                             .value_or(std::vector<std::uint8_t>{});
+    image.moment = std::move(moment);
+  }
+  return image;
+}
+
 void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, Executor& executor,
            const std::function<void(TrackedImage&&)>& report) {
   const auto& entries = run.entries;
@@ -141,12 +163,10 @@ void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, 
         signatures[i] = tracker.encoder().packed(seen);
         return;
       }
-      RunMoment& moment = moments[i].emplace();
-      moment.stamp_s = seen.stamp_s.value_or(static_cast<double>(index));
-      moment.truth = seen.pose;
+      RunMoment& moment = moments[i].emplace(moment_of(seen, index));
       moment.panorama = tracker.encoder().panorama(seen);
       signatures[i] = tracker.encoder().packed(*moment.panorama);
-      moment.picture = std::move(std::get<Image>(seen.picture));
+      if (index == 0) moment.references = reference_positions(tracker.memory());
     });
     for (std::size_t i = 0; i < count; ++i) {
       const std::size_t index = (begin + i) * every;
@@ -154,17 +174,11 @@ void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, 
         tracker.move_to(*entries[e].odometry);
       }
       const DatasetEntry& entry = entries[index];
-      TrackedImage image{
-          index, entry.file, entry.stamp_s, entry.pose, tracker.observe(*signatures[i]), {}};
-      image.particles = even_sample(tracker.localiser().particles(), settings.particles_kept);
-      if (moments[i]) {
-        describe(*moments[i], image.estimate);
-        moments[i]->particles = even_sample(tracker.localiser().particles(), 500);
-        const auto found = tracker.memory().search(*signatures[i], {.top = 1});
-        moments[i]->best_match = settings.recorded->thumbnail(found.matches.front().view)
-                                     .value_or(std::vector<std::uint8_t>{});
-        image.moment = std::move(moments[i]);
-      }
+      TrackedImage image = track_image(tracker, *signatures[i], settings, std::move(moments[i]));
+      image.index = index;
+      image.file = entry.file;
+      image.stamp_s = entry.stamp_s;
+      image.truth = entry.pose;
       report(std::move(image));
     }
   }

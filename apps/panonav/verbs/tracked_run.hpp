@@ -9,6 +9,7 @@
 #include "panonav/core/executor.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/localisation/monte_carlo.hpp"
+#include "panonav/mapping/visual_odometry.hpp"
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav/pipeline/run_recorder.hpp"
 #include "panonav/pipeline/tracker.hpp"
@@ -41,6 +42,8 @@ struct TrackSummary {
   std::vector<double> errors_m;                ///< of localised images with a true position
   std::vector<double> heading_errors_rad;
 };
+/// Counts the next image, too.
+void add(TrackSummary& summary, const TrackedImage& image);
 [[nodiscard]] TrackSummary summarise_track(const std::vector<TrackedImage>& images);
 
 struct TrackSettings {
@@ -49,6 +52,11 @@ struct TrackSettings {
   /// The memory's file, for the thumbnails of best matches: moments are filled. Null: they are not.
   const MemoryFile* recorded = nullptr;
 };
+
+/// What the filter says of the image, and with `recorded` what is recorded of it.
+[[nodiscard]] TrackedImage track_image(Tracker& tracker, const PackedSignature& view,
+                                       const TrackSettings& settings,
+                                       std::optional<RunMoment> moment);
 
 /// Runs the filter over a recording whose entries all have odometry: it moves with every entry and
 /// looks at every `settings.every`-th picture, the first one included. Signatures are computed on
@@ -59,6 +67,8 @@ void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, 
 
 /// The noise of odometry that is read from pictures, as a map takes it to be.
 [[nodiscard]] OdometryNoise visual_odometry_noise();
+/// Reads motion from pictures in metres as views of the memory differ over known ways.
+[[nodiscard]] VisualOdometry visual_odometry(const VisualMemory& memory);
 /// Fills the odometry of all entries from the pictures themselves (`VisualOdometry`); metres as
 /// views of the memory differ over known ways. Says how many steps could not be read, where the
 /// robot then seems to stand, and which scale it took. Throws FileError on a picture that cannot be

@@ -167,6 +167,10 @@ class TransformChain {
 bool is_picture_type(std::string_view type) {
   return type == ros::Image::type || type == ros::CompressedImage::type;
 }
+/// What a record of a run makes of the pictures of its camera.
+bool is_made_of_pictures(std::string_view topic) {
+  return topic == "/panorama/compressed" || topic == "/best_match/compressed";
+}
 bool is_odometry_type(std::string_view type) {
   return type == ros::Odometry::type;
 }
@@ -441,7 +445,8 @@ class Collector {
   void choose_pictures(const RecordingTopics& wanted) {
     constexpr std::string_view types = "sensor_msgs/Image or sensor_msgs/CompressedImage";
     if (!wanted.image) {
-      const auto names = names_of(recording_, is_picture_type);
+      auto names = names_of(recording_, is_picture_type);
+      if (names.size() > 1) std::erase_if(names, is_made_of_pictures);
       if (names.size() == 1) {
         use(topics_named(recording_, names[0], is_picture_type), Job::picture);
         return;

@@ -33,6 +33,8 @@ struct RecordedDataset {
 /// order of their recording, named by their stamps ("1700000000_250000000"), which are read when
 /// they are needed. `source` says how they lie; a recording cannot.
 ///
+/// - Of several topics of pictures "/panorama/compressed" and "/best_match/compressed", which
+///   records of runs have beside their camera's, are passed over unless named.
 /// - Stamps are those of the headers; where all of a topic are 0, log times serve for all topics.
 /// - Odometry is interpolated between the messages before and after the picture, and extrapolated
 ///   over one interval between messages at either end. It is missing further out and in gaps of

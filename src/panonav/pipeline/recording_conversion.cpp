@@ -41,35 +41,15 @@ RecordingConversion convert_to_recording(const Dataset& dataset, const fs::path&
   // JPEG and PNG are packed already.
   McapWriter writer(unfinished.path(), {.compression = McapCompression::none});
   TopicWriter<ros::CompressedImage> pictures(writer, "/camera/image/compressed");
-  TopicWriter<ros::Odometry> odometry(writer, "/odom");
-  TopicWriter<ros::Imu> imu(writer, "/imu");
-  TopicWriter<ros::PoseStamped> poses(writer, "/ground_truth");
-  TopicWriter<ros::PointStamped> positions(writer, "/ground_truth");
+  RobotTopics robot(writer, "world");
   std::int64_t log_ns = 0;
   for (std::size_t i = 0; i < dataset.entries.size(); ++i) {
     const DatasetEntry& entry = dataset.entries[i];
     const std::int64_t ns = nanoseconds(done.stamps ? *entry.stamp_s : static_cast<double>(i));
     log_ns = std::max(log_ns, ns);  // readers go by it, and the order of pictures stays
-    if (entry.odometry) {
-      ros::Odometry message{{ns, "odom"}, "base_link", {ros::pose_of(*entry.odometry), {}},
-                            {},           {},          {}};
-      odometry.write(log_ns, ns, message);
-    }
-    if (entry.tilt) {
-      ros::Imu message;
-      message.header = {ns, "base_link"};
-      message.orientation = ros::pose_of({}, *entry.tilt).orientation;
-      message.angular_velocity_covariance[0] = -1.0;
-      message.linear_acceleration_covariance[0] = -1.0;
-      imu.write(log_ns, ns, message);
-    }
-    if (entry.pose && done.headings) {
-      poses.write(log_ns, ns,
-                  {{ns, "world"},
-                   ros::pose_of({entry.pose->x_m, entry.pose->y_m, *entry.pose->heading_rad})});
-    } else if (entry.pose) {
-      positions.write(log_ns, ns, {{ns, "world"}, {entry.pose->x_m, entry.pose->y_m, 0.0}});
-    }
+    std::optional<ReferencePose> truth = entry.pose;
+    if (truth && !done.headings) truth->heading_rad.reset();
+    robot.write(log_ns, ns, entry.odometry, entry.tilt, truth);
     const auto bytes = read_encoded_picture(entry);
     pictures.write(log_ns, ns,
                    {{ns, "camera"},

@@ -73,9 +73,9 @@ class RobotNavigator {
 
   [[nodiscard]] GraphOrigin origin() const noexcept { return origin_; }
   [[nodiscard]] ViewId goal() const noexcept { return goal_; }
-  [[nodiscard]] const NavigationGraph& graph() const noexcept {
-    return navigator_->planner().graph();
-  }
+  [[nodiscard]] const NavigationGraph& graph() const noexcept { return planner().graph(); }
+  /// Knows the way, and which edges are blocked.
+  [[nodiscard]] const AreaPlanner& planner() const noexcept { return navigator_->planner(); }
   [[nodiscard]] const MemoryFile& memory() const noexcept { return views_.file(); }
   /// What the memory knows of a view besides its signature; read from the file.
   [[nodiscard]] ReferenceInfo info(ViewId view) const;

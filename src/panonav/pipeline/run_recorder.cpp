@@ -6,7 +6,6 @@
 #include <condition_variable>
 #include <deque>
 #include <exception>
-#include <functional>
 #include <mutex>
 #include <numbers>
 #include <span>
@@ -93,7 +92,43 @@ ros::Covariance6 in_space(const std::array<double, 9>& planar) {
   return covariance;
 }
 
+/// Points along the edges, near enough to look like lines, but not more than viewers take.
+Cloud edge_points(const std::vector<RunEdge>& edges) {
+  constexpr double max_points = 1e5;
+  double length_m = 0.0;
+  for (const RunEdge& edge : edges) length_m += distance(edge.from, edge.to);
+  const double step_m = std::max(0.05, length_m / max_points);
+  Cloud cloud;
+  for (const RunEdge& edge : edges) {
+    const auto steps = static_cast<int>(std::ceil(distance(edge.from, edge.to) / step_m));
+    for (int i = 0; i <= steps; ++i) {
+      const double share = static_cast<double>(i) / std::max(1, steps);
+      cloud.add({std::lerp(edge.from.x_m, edge.to.x_m, share),
+                 std::lerp(edge.from.y_m, edge.to.y_m, share)},
+                static_cast<double>(edge.kind));
+    }
+  }
+  return cloud;
+}
+
 }  // namespace
+
+RunMoment moment_of(const Observation& seen, std::size_t number) {
+  RunMoment moment{.stamp_s = seen.stamp_s.value_or(static_cast<double>(number)),
+                   .odometry = seen.odometry,
+                   .tilt = seen.tilt,
+                   .truth = seen.pose};
+  if (const auto* const picture = std::get_if<Image>(&seen.picture)) moment.picture = *picture;
+  return moment;
+}
+
+std::vector<Point2> reference_positions(const VisualMemory& memory) {
+  std::vector<Point2> positions;
+  for (const ViewId view : memory.views()) {
+    if (const auto& pose = memory.info(view).pose) positions.push_back(pose->position());
+  }
+  return positions;
+}
 
 void describe(RunMoment& moment, const MonteCarloEstimate& estimate) {
   moment.pose = estimate.pose;
@@ -136,40 +171,44 @@ struct RunRecorder::Implementation {
         best_matches(writer, "/best_match/compressed"),
         transforms(writer, "/tf"),
         references(writer, "/references"),
+        edges(writer, "/edges"),
         particles(writer, "/particles"),
         path_points(writer, "/path/points"),
+        plan_points(writer, "/plan/points"),
         particle_poses(writer, "/particles/poses"),
+        directions(writer, "/directions"),
         path(writer, "/path"),
+        plan(writer, "/plan"),
         grid(writer, "/visited"),
         poses(writer, "/pose"),
+        goals(writer, "/goal"),
         diagnostics(writer, "/diagnostics"),
-        truths(writer, "/ground_truth"),
+        robot(writer, "map"),
         thread([this] { work(); }) {}
 
   void write_picture(TopicWriter<ros::CompressedImage>& topic, std::int64_t ns,
-                     const std::string& frame, std::span<const std::uint8_t> bytes) {
-    topic.write(log_ns, ns, {{ns, frame}, "png", bytes});
+                     std::span<const std::uint8_t> bytes) {
+    topic.write(log_ns, ns, {{ns, "camera"}, "png", bytes});
   }
 
   void write(const RunMoment& moment) {
     const std::int64_t ns = nanoseconds(moment.stamp_s);
     log_ns = std::max(log_ns, ns);  // the clock may have been set back
-    if (moment.picture) {
-      write_picture(pictures, ns, "camera", encode_png(moment.picture->view()));
-    }
+    robot.write(log_ns, ns, moment.odometry, moment.tilt, moment.truth);
+    if (moment.picture) write_picture(pictures, ns, encode_png(moment.picture->view()));
     if (moment.panorama) {
       const Image picture = to_picture(*moment.panorama);
-      write_picture(panoramas, ns, "camera", encode_png(picture.view()));
+      write_picture(panoramas, ns, encode_png(picture.view()));
     }
-    if (!moment.best_match.empty()) write_picture(best_matches, ns, "camera", moment.best_match);
-    ros::TFMessage tf;
-    // Without it Rerun shows the topics that are given in "map" nowhere.
-    tf.transforms.push_back({{ns, "tf#/"}, "map", {}});
-    if (moment.pose) {
-      tf.transforms.push_back({{ns, "map"}, "base_link", ros::pose_of(*moment.pose)});
+    if (!moment.best_match.empty()) write_picture(best_matches, ns, moment.best_match);
+    write_transforms(moment, ns);
+    write_references(moment.references, ns);
+    if (!moment.edges.empty()) {
+      edges.write(log_ns, ns, edge_points(moment.edges).message(ns, "kind"));
     }
-    tf.transforms.push_back({{ns, "base_link"}, "camera", {}});
-    transforms.write(log_ns, ns, tf);
+    write_plan(moment.plan, ns);
+    if (!moment.directions.empty()) directions.write(log_ns, ns, pose_array(moment.directions, ns));
+    if (moment.goal) goals.write(log_ns, ns, {{ns, "map"}, ros::pose_of(*moment.goal)});
     if (moment.pose) {
       ros::PoseWithCovarianceStamped pose{{ns, "map"}, {ros::pose_of(*moment.pose), {}}};
       if (moment.covariance) pose.pose.covariance = in_space(*moment.covariance);
@@ -177,21 +216,10 @@ struct RunRecorder::Implementation {
       write_path(ns, *moment.pose);
     }
     if (!moment.particles.empty()) {
-      Cloud cloud;
-      ros::PoseArray array{{ns, "map"}, {}};
-      for (const Pose2& pose : moment.particles) {
-        cloud.add(pose.position(), pose.heading_rad);
-        array.poses.push_back(ros::pose_of(pose));
-      }
-      particles.write(log_ns, ns, cloud.message(ns, "heading"));
-      particle_poses.write(log_ns, ns, array);
+      particles.write(log_ns, ns, cloud_of(moment.particles).message(ns, "heading"));
+      particle_poses.write(log_ns, ns, pose_array(moment.particles, ns));
     }
-    if (moment.truth) {
-      truths.write(log_ns, ns,
-                   {{ns, "map"},
-                    ros::pose_of({moment.truth->x_m, moment.truth->y_m,
-                                  moment.truth->heading_rad.value_or(0.0)})});
-    }
+    if (moment.state.empty()) return;
     ros::DiagnosticStatus status{.level = static_cast<std::uint8_t>(moment.sure ? 0 : 1),
                                  .name = "panonav: localisation",
                                  .message = moment.state,
@@ -199,6 +227,40 @@ struct RunRecorder::Implementation {
                                  .values = {}};
     for (const auto& [key, value] : moment.values) status.values.push_back({key, value});
     diagnostics.write(log_ns, ns, {{ns, ""}, {status}});
+  }
+
+  /// Frames as REP 105 has them: map, odom where there is odometry, base_link.
+  void write_transforms(const RunMoment& moment, std::int64_t ns) {
+    ros::TFMessage tf;
+    const auto add = [&](const char* parent, const char* child, const Pose2& parent_from_child) {
+      tf.transforms.push_back({{ns, parent}, child, ros::pose_of(parent_from_child)});
+    };
+    add("tf#/", "map", {});  // without it Rerun shows what is given in "map" nowhere
+    if (moment.odometry) add("odom", "base_link", *moment.odometry);
+    if (moment.odometry && moment.pose)
+      add("map", "odom", *moment.pose * inverse(*moment.odometry));
+    if (moment.pose && !moment.odometry) add("map", "base_link", *moment.pose);
+    add("base_link", "camera", {});
+    transforms.write(log_ns, ns, tf);
+  }
+
+  static Cloud cloud_of(const std::vector<Pose2>& poses) {
+    Cloud cloud;
+    for (const Pose2& pose : poses) cloud.add(pose.position(), pose.heading_rad);
+    return cloud;
+  }
+  static ros::PoseArray pose_array(const std::vector<Pose2>& poses, std::int64_t ns) {
+    ros::PoseArray array{{ns, "map"}, {}};
+    for (const Pose2& pose : poses) array.poses.push_back(ros::pose_of(pose));
+    return array;
+  }
+  /// As PointCloud2 and as Path, whose poses have the stamp of their message.
+  void write_plan(const std::vector<Pose2>& way, std::int64_t ns) {
+    if (way.empty()) return;
+    ros::Path message{{ns, "map"}, {}};
+    for (const Pose2& pose : way) message.poses.push_back({{ns, "map"}, ros::pose_of(pose)});
+    plan_points.write(log_ns, ns, cloud_of(way).message(ns, "heading"));
+    plan.write(log_ns, ns, message);
   }
 
   /// So that a long run does not write a path of all its poses each time, every second one of them
@@ -223,10 +285,8 @@ struct RunRecorder::Implementation {
     path.write(log_ns, ns, message);
   }
 
-  void write_references(const std::vector<Point2>& positions, double stamp_s) {
+  void write_references(const std::vector<Point2>& positions, std::int64_t ns) {
     if (positions.empty()) return;
-    const std::int64_t ns = nanoseconds(stamp_s);
-    log_ns = std::max(log_ns, ns);
     Cloud cloud;
     for (std::size_t i = 0; i < positions.size(); ++i) {
       cloud.add(positions[i], static_cast<double>(i));
@@ -235,9 +295,7 @@ struct RunRecorder::Implementation {
     if (const auto visited = visited_grid(positions, ns)) grid.write(log_ns, ns, *visited);
   }
 
-  using Job = std::function<void()>;
-
-  void add(Job job) {
+  void add(RunMoment&& moment) {
     std::unique_lock lock(mutex);
     if (failure) std::rethrow_exception(failure);
     if (closed) throw ContractError("recording", "closed", "open, to be written to");
@@ -247,7 +305,7 @@ struct RunRecorder::Implementation {
       ++left_out;
       return;
     }
-    waiting.push_back(std::move(job));
+    waiting.push_back(std::move(moment));
     came.notify_one();
   }
 
@@ -256,12 +314,12 @@ struct RunRecorder::Implementation {
     while (true) {
       came.wait(lock, [this] { return closed || !waiting.empty(); });
       if (waiting.empty()) return;
-      const Job job = std::move(waiting.front());
+      const RunMoment moment = std::move(waiting.front());
       waiting.pop_front();
       lock.unlock();
       std::exception_ptr thrown;
       try {
-        if (!failed) job();
+        if (!failed) write(moment);
       } catch (const Error&) {
         thrown = std::current_exception();
         failed = true;
@@ -288,13 +346,14 @@ struct RunRecorder::Implementation {
   McapWriter writer;  // the thread's, from here
   TopicWriter<ros::CompressedImage> pictures, panoramas, best_matches;
   TopicWriter<ros::TFMessage> transforms;
-  TopicWriter<ros::PointCloud2> references, particles, path_points;
-  TopicWriter<ros::PoseArray> particle_poses;
-  TopicWriter<ros::Path> path;
+  TopicWriter<ros::PointCloud2> references, edges, particles, path_points, plan_points;
+  TopicWriter<ros::PoseArray> particle_poses, directions;
+  TopicWriter<ros::Path> path, plan;
   TopicWriter<ros::OccupancyGrid> grid;
   TopicWriter<ros::PoseWithCovarianceStamped> poses;
+  TopicWriter<ros::PoseStamped> goals;
   TopicWriter<ros::DiagnosticArray> diagnostics;
-  TopicWriter<ros::PoseStamped> truths;
+  RobotTopics robot;
   std::vector<std::pair<std::int64_t, Pose2>> taken;
   std::size_t moments_on_path = 0;
   std::size_t path_every = 1;
@@ -303,7 +362,7 @@ struct RunRecorder::Implementation {
   std::mutex mutex;
   std::condition_variable came;
   std::condition_variable taken_away;
-  std::deque<Job> waiting;
+  std::deque<RunMoment> waiting;
   std::exception_ptr failure;
   std::size_t left_out = 0;
   bool closed = false;
@@ -320,20 +379,8 @@ RunRecorder::~RunRecorder() {
   }
 }
 
-void RunRecorder::add_references(const VisualMemory& memory, double stamp_s) {
-  std::vector<Point2> positions;
-  for (const ViewId view : memory.views()) {
-    if (const auto& pose = memory.info(view).pose) positions.push_back(pose->position());
-  }
-  auto& self = *implementation_;
-  self.add([&self, positions = std::move(positions), stamp_s] {
-    self.write_references(positions, stamp_s);
-  });
-}
-
 void RunRecorder::add(RunMoment moment) {
-  auto& self = *implementation_;
-  self.add([&self, moment = std::move(moment)] { self.write(moment); });
+  implementation_->add(std::move(moment));
 }
 
 void RunRecorder::close() {

@@ -8,8 +8,11 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/geometry/pose2.hpp"
 #include "panonav/io/mcap_writer.hpp"
 #include "panonav/io/ros_messages.hpp"
+#include "panonav/memory/visual_memory.hpp"
+#include "panonav/panorama/tilt.hpp"
 
 namespace panonav {
 
@@ -46,5 +49,46 @@ inline std::int64_t nanoseconds(double stamp_s) {
   return std::llround(whole) * std::int64_t{1'000'000'000} +
          std::llround(is_whole_us ? 1e3 * rest_us : rest_ns);
 }
+
+/// What is known of a robot beside its pictures, on the topics where `read_recording` looks for it.
+class RobotTopics {
+ public:
+  /// `world`: the frame of true poses.
+  RobotTopics(McapWriter& writer, std::string world)
+      : world_(std::move(world)),
+        odometry_(writer, "/odom"),
+        imu_(writer, "/imu"),
+        poses_(writer, "/ground_truth"),
+        positions_(writer, "/ground_truth") {}
+
+  void write(std::int64_t log_ns, std::int64_t ns, const std::optional<Pose2>& odometry,
+             const std::optional<Tilt>& tilt, const std::optional<ReferencePose>& truth) {
+    if (odometry) {
+      odometry_.write(log_ns, ns,
+                      {{ns, "odom"}, "base_link", {ros::pose_of(*odometry), {}}, {}, {}, {}});
+    }
+    if (tilt) {
+      ros::Imu message;
+      message.header = {ns, "base_link"};
+      message.orientation = ros::pose_of({}, *tilt).orientation;
+      message.angular_velocity_covariance[0] = -1.0;
+      message.linear_acceleration_covariance[0] = -1.0;
+      imu_.write(log_ns, ns, message);
+    }
+    if (truth && truth->heading_rad) {
+      poses_.write(log_ns, ns,
+                   {{ns, world_}, ros::pose_of({truth->x_m, truth->y_m, *truth->heading_rad})});
+    } else if (truth) {
+      positions_.write(log_ns, ns, {{ns, world_}, {truth->x_m, truth->y_m, 0.0}});
+    }
+  }
+
+ private:
+  std::string world_;
+  TopicWriter<ros::Odometry> odometry_;
+  TopicWriter<ros::Imu> imu_;
+  TopicWriter<ros::PoseStamped> poses_;
+  TopicWriter<ros::PointStamped> positions_;
+};
 
 }  // namespace panonav
