@@ -31,6 +31,7 @@ namespace panonav::command {
 [[nodiscard]] Verb prune_verb();
 [[nodiscard]] Verb rename_verb();
 [[nodiscard]] Verb reproduce_verb();
+[[nodiscard]] Verb ros2_verb();
 [[nodiscard]] Verb route_follow_verb();
 [[nodiscard]] Verb route_record_verb();
 [[nodiscard]] Verb show_verb();

@@ -111,25 +111,6 @@ std::string add_visual_odometry(Dataset& run, const Tracker& tracker, Executor& 
          " m, as in the memory";
 }
 
-std::vector<Pose2> even_sample(const Particles& particles, std::size_t count) {
-  std::vector<Pose2> sample;
-  if (particles.size() <= count) {
-    for (std::size_t i = 0; i < particles.size(); ++i) sample.push_back(particles.pose(i));
-    return sample;
-  }
-  double total = 0.0;
-  for (const double weight : particles.weight) total += weight;
-  double passed = 0.0;
-  for (std::size_t i = 0; i < particles.size(); ++i) {
-    passed += particles.weight[i];
-    while (sample.size() < count && (static_cast<double>(sample.size()) + 0.5) * total <
-                                        passed * static_cast<double>(count)) {
-      sample.push_back(particles.pose(i));
-    }
-  }
-  return sample;
-}
-
 TrackedImage track_image(Tracker& tracker, const PackedSignature& view,
                          const TrackSettings& settings, std::optional<RunMoment> moment) {
   TrackedImage image;

@@ -11,6 +11,7 @@
 #include "panonav/localisation/monte_carlo.hpp"
 #include "panonav/mapping/visual_odometry.hpp"
 #include "panonav/memory/visual_memory.hpp"
+#include "panonav/pipeline/run_messages.hpp"
 #include "panonav/pipeline/run_recorder.hpp"
 #include "panonav/pipeline/tracker.hpp"
 #include "panonav/storage/memory_file.hpp"
@@ -75,8 +76,5 @@ void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, 
 /// read.
 [[nodiscard]] std::string add_visual_odometry(Dataset& run, const Tracker& tracker,
                                               Executor& executor);
-
-/// `count` particles drawn evenly by weight; all of them where there are fewer. No randomness.
-[[nodiscard]] std::vector<Pose2> even_sample(const Particles& particles, std::size_t count);
 
 }  // namespace panonav::command

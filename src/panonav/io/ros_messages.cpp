@@ -118,6 +118,18 @@ template <class A>
 void fields(A& a, Is<DiagnosticArray> auto& m) {
   a(m.header, m.status);
 }
+template <class A>
+void fields(A& a, Is<Twist> auto& m) {
+  a(m.linear, m.angular);
+}
+template <class A>
+void fields(A& a, Is<Clock> auto& m) {
+  a.stamp(m.clock_ns);
+}
+template <class A>
+void fields(A& a, Is<String> auto& m) {
+  a(m.data);
+}
 
 template <class Number>
 Number swapped(Number value) {
@@ -361,6 +373,8 @@ constexpr std::array definitions{
                "uint32 height\ngeometry_msgs/Pose origin\n"},
     Definition{"nav_msgs/OccupancyGrid",
                "std_msgs/Header header\nnav_msgs/MapMetaData info\nint8[] data\n"},
+    Definition{"rosgraph_msgs/Clock", "builtin_interfaces/Time clock\n"},
+    Definition{"std_msgs/String", "string data\n"},
     Definition{"tf2_msgs/TFMessage", "geometry_msgs/TransformStamped[] transforms\n"},
     Definition{"diagnostic_msgs/KeyValue", "string key\nstring value\n"},
     Definition{"diagnostic_msgs/DiagnosticStatus",
@@ -491,6 +505,9 @@ PANONAV_ROS_MESSAGE(PoseStamped);
 PANONAV_ROS_MESSAGE(PoseWithCovarianceStamped);
 PANONAV_ROS_MESSAGE(PoseArray);
 PANONAV_ROS_MESSAGE(DiagnosticArray);
+PANONAV_ROS_MESSAGE(Twist);
+PANONAV_ROS_MESSAGE(Clock);
+PANONAV_ROS_MESSAGE(String);
 #undef PANONAV_ROS_MESSAGE
 
 std::string ros2_type_name(std::string_view type) {

@@ -195,6 +195,22 @@ struct DiagnosticArray {
   std::vector<DiagnosticStatus> status;
 };
 
+struct Twist {
+  static constexpr std::string_view type = "geometry_msgs/Twist";
+  Vector3 linear;   ///< m/s, in the robot's frame
+  Vector3 angular;  ///< rad/s
+};
+
+struct Clock {
+  static constexpr std::string_view type = "rosgraph_msgs/Clock";
+  std::int64_t clock_ns = 0;
+};
+
+struct String {
+  static constexpr std::string_view type = "std_msgs/String";
+  std::string data;
+};
+
 /// What ROS 2 calls the `type` of a message: "sensor_msgs/msg/Image".
 [[nodiscard]] std::string ros2_type_name(std::string_view type);
 

@@ -1,0 +1,507 @@
+#include "ros2/localisation_node.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/pipeline/run_messages.hpp"
+#include "ros2/motion_history.hpp"
+
+namespace panonav::ros2 {
+
+namespace {
+
+using Steady = std::chrono::steady_clock;
+using namespace std::chrono_literals;  // NOLINT(google-build-using-namespace)
+using Bytes = std::vector<std::uint8_t>;
+
+constexpr std::int64_t second_ns = 1'000'000'000;
+
+std::int64_t system_ns() {
+  return std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+/// Particles that are shown: of thousands, no more tell a person more.
+constexpr std::size_t shown_particles = 500;
+
+}  // namespace
+
+void visit_options(LocalisationNodeOptions& options, OptionVisitor& visitor) {
+  using T = LocalisationNodeOptions;
+  constexpr OptionTable table{
+      choice<&T::motion>("where motion is read: the topic odom, or TF", "odometry", "tf"),
+      choice<&T::pictures>("the topic image, or image/compressed", "raw", "compressed"),
+      option<&T::transform_tolerance_s>("how far the transform is dated ahead", 0, 60),
+      option<&T::transform_rate_hz>("how often the transform is sent", above(0), 1000),
+      option<&T::use_sim_time>("time is what the topic /clock says"),
+      option<&T::tilt_from_imu>("level pictures by the orientation on the topic imu"),
+  };
+  table.visit(options, visitor);
+}
+
+struct RareNotes::State {
+  struct Kind {
+    Steady::time_point said;
+    std::size_t kept = 0;  // since then
+  };
+  Note note;
+  mutable std::mutex mutex;
+  std::map<std::string, Kind, std::less<>> kinds;
+  std::size_t count = 0;
+};
+
+RareNotes::RareNotes(Note note) : state_(std::make_unique<State>()) {
+  state_->note = std::move(note);
+}
+RareNotes::~RareNotes() = default;
+
+void RareNotes::say(std::string_view kind, const std::string& line) {
+  constexpr auto between = 10s;
+  const std::lock_guard lock(state_->mutex);
+  ++state_->count;
+  const auto now = Steady::now();
+  const auto found = state_->kinds.find(kind);
+  if (found != state_->kinds.end() && now - found->second.said < between) {
+    ++found->second.kept;
+    return;
+  }
+  const std::size_t kept = found == state_->kinds.end() ? 0 : found->second.kept;
+  state_->kinds.insert_or_assign(std::string(kind), State::Kind{now, 0});
+  state_->note("warning: " + line +
+               (kept > 0 ? " (and " + std::to_string(kept) + " times before)" : ""));
+}
+
+std::size_t RareNotes::count() const {
+  const std::lock_guard lock(state_->mutex);
+  return state_->count;
+}
+
+struct LocalisationNode::Implementation {
+  using Job = std::function<void()>;
+
+  Implementation(const LocalisationNodeSetup& wanted, RareNotes::Note note)
+      : setup(wanted),
+        options(wanted.node),
+        notes(std::move(note)),
+        file(MemoryFile::open(wanted.memory, Access::read_only)),
+        tracker(file, wanted.tracker),
+        participant(wanted.participant,
+                    [this](const std::string& line) { notes.say("qos", line); }),
+        transforms(participant, "/tf", {.depth = 100}),
+        poses(participant, "~/pose", {.depth = 1, .transient_local = true}),
+        particles(participant, "~/particles"),
+        references(participant, "~/references", {.depth = 1, .transient_local = true}),
+        best_matches(participant, "~/best_match/compressed"),
+        diagnostics(participant, "/diagnostics") {
+    validate(options);
+    publish_references();
+    subscribe();
+  }
+
+  // What comes: on the thread of `run`.
+
+  template <class Message, class Use>
+  void listen(const std::string& topic, const Qos& qos, Use use) {
+    participant.subscribe(topic, Message::type, qos,
+                          [this, topic, use](std::span<const std::uint8_t> cdr) {
+                            try {
+                              use(ros::read_message<Message>(cdr, MessageEncoding::cdr), cdr);
+                            } catch (const Error& error) {
+                              notes.say(topic, topic + ": " + readable_line(error.what()));
+                            }
+                          });
+  }
+
+  void subscribe() {
+    constexpr int sensor_depth = 50;
+    if (options.use_sim_time) {
+      listen<ros::Clock>("/clock", {.depth = 10, .reliable = false},
+                         [this](const ros::Clock& clock, auto&&) { sim_ns = clock.clock_ns; });
+    }
+    if (options.motion == MotionInput::odometry) {
+      listen<ros::Odometry>("odom", {.depth = sensor_depth},
+                            [this](const ros::Odometry& odometry, auto&&) { take(odometry); });
+    } else {
+      const auto use = [this](const ros::TFMessage& message, auto&&) { take(message); };
+      listen<ros::TFMessage>("/tf", {.depth = 100}, use);
+      listen<ros::TFMessage>("/tf_static", {.depth = 100, .transient_local = true}, use);
+    }
+    if (options.tilt_from_imu) {
+      listen<ros::Imu>("imu", {.depth = sensor_depth},
+                       [this](const ros::Imu& imu, auto&&) { take(imu); });
+    }
+    const auto keep = [this](const auto& message, std::span<const std::uint8_t> cdr) {
+      keep_picture(message.header.stamp_ns, cdr);
+    };
+    if (options.pictures == PictureInput::raw) {
+      listen<ros::Image>(picture_topic(), {}, keep);
+    } else {
+      listen<ros::CompressedImage>(picture_topic(), {}, keep);
+    }
+    listen<ros::PoseWithCovarianceStamped>(
+        "initialpose", {},
+        [this](const ros::PoseWithCovarianceStamped& pose, auto&&) { start_at(pose); });
+  }
+
+  [[nodiscard]] std::string picture_topic() const {
+    return options.pictures == PictureInput::raw ? "image" : "image/compressed";
+  }
+
+  void require_frame(const std::string& topic, const std::string& frame,
+                     const std::string& wanted) {
+    if (frame == wanted) return;
+    throw ContractError("frame of the message", "'" + readable_line(shortened(frame, 60)) + "'",
+                        wanted + ", as the parameters name it for " + topic);
+  }
+
+  void add_motion(const std::string& topic, std::int64_t stamp_ns, const ros::Pose& pose) {
+    MotionHistory::Added added{};
+    {
+      const std::lock_guard lock(mutex);
+      added = motion.add(stamp_ns, ros::planar(pose));
+    }
+    changed.notify_all();
+    if (added == MotionHistory::Added::late) {
+      notes.say("order of " + topic,
+                topic + ": a stamp is not after the one before it; the message is left out");
+    } else if (added == MotionHistory::Added::restarted) {
+      notes.say("start of " + topic,
+                topic + ": the motion begins anew, elsewhere or at an earlier time");
+    }
+  }
+
+  void take(const ros::Odometry& odometry) {
+    require_frame("odom", odometry.header.frame_id, setup.frames.odom);
+    require_frame("odom", odometry.child_frame_id, setup.frames.base);
+    add_motion("odom", odometry.header.stamp_ns, odometry.pose.pose);
+  }
+
+  void take(const ros::TFMessage& message) {
+    std::optional<std::int64_t> stamp_ns;
+    for (const ros::TransformStamped& each : message.transforms) {
+      if (each.child_frame_id == setup.frames.odom) continue;  // what we say ourselves
+      frames.set(each);
+      if (each.header.stamp_ns > 0) stamp_ns = std::max(stamp_ns.value_or(0), each.header.stamp_ns);
+    }
+    const auto odom_from_base = frames.lookup(setup.frames.odom, setup.frames.base);
+    if (!odom_from_base || !stamp_ns) return;
+    const auto before = motion.newest_ns();  // only this thread adds
+    // Transforms that others send meanwhile, of wheels, say, bring no news of the base.
+    if (last_transform && before && *stamp_ns <= *before) return;
+    last_transform = odom_from_base;
+    add_motion("/tf", *stamp_ns, *odom_from_base);
+  }
+
+  void take(const ros::Imu& imu) {
+    if (imu.orientation_covariance[0] == -1.0) {
+      throw ContractError("orientation_covariance[0]", -1.0,
+                          "another value: the sensor must state an orientation");
+    }
+    const Tilt now = ros::tilt_of(imu.orientation);
+    if (!std::isfinite(now.roll_rad) || !std::isfinite(now.pitch_rad)) {
+      throw ContractError("orientation", "not finite", "a unit quaternion");
+    }
+    const std::lock_guard lock(mutex);
+    tilt = now;
+  }
+
+  void keep_picture(std::int64_t stamp_ns, std::span<const std::uint8_t> cdr) {
+    const std::lock_guard lock(mutex);
+    if (last_picture_ns && stamp_ns <= *last_picture_ns &&
+        stamp_ns > *last_picture_ns - MotionHistory::late_ns) {
+      notes.say("order of pictures", picture_topic() +
+                                         ": a stamp is not after the one before it; the picture "
+                                         "is left out");
+      return;
+    }
+    last_picture_ns = stamp_ns;
+    last_picture_came = Steady::now();
+    if (picture) ++counts.dropped;
+    picture.emplace(cdr.begin(), cdr.end());
+    changed.notify_all();
+  }
+
+  void start_at(const ros::PoseWithCovarianceStamped& message) {
+    require_frame("initialpose", message.header.frame_id, setup.frames.map);
+    const auto& covariance = message.pose.covariance;
+    const double position_m2 = 0.5 * (covariance[0] + covariance[7]);
+    const double heading_rad2 = covariance[35];
+    if (!(position_m2 >= 0.0 && position_m2 < 1e6 && heading_rad2 >= 0.0 && heading_rad2 < 1e3)) {
+      throw ContractError("covariance of x, y and heading",
+                          to_text(position_m2) + ", " + to_text(heading_rad2), ">= 0, finite");
+    }
+    const Pose2 pose = ros::planar(message.pose.pose);
+    add_job(
+        [this, pose, position_m = std::sqrt(position_m2), heading_rad = std::sqrt(heading_rad2)] {
+          tracker.start_at(pose, position_m, heading_rad);
+          const std::lock_guard lock(mutex);
+          if (const auto now = motion.newest()) map_from_path = pose * inverse(now->path_from_base);
+        });
+  }
+
+  void add_job(Job job) {
+    constexpr std::size_t max_jobs = 16;
+    const std::lock_guard lock(mutex);
+    if (jobs.size() >= max_jobs) throw Error("too many requests at a time; this one is left out");
+    jobs.push_back(std::move(job));
+    changed.notify_all();
+  }
+
+  // What goes out at a rate, on the same thread.
+
+  [[nodiscard]] std::int64_t now_ns() const {
+    return options.use_sim_time ? sim_ns.load() : system_ns();
+  }
+
+  void send_transform() {
+    std::optional<Pose2> map_from_odom;
+    {
+      const std::lock_guard lock(mutex);
+      const auto now = motion.newest();
+      if (!map_from_path || !now) return;
+      map_from_odom = *map_from_path * now->path_from_base * inverse(now->odom_from_base);
+    }
+    const auto ahead = static_cast<std::int64_t>(options.transform_tolerance_s * second_ns);
+    const std::int64_t stamp_ns = now_ns() + ahead;
+    if (stamp_ns == last_transform_ns) return;  // a clock that stands: TF wants no two of a time
+    last_transform_ns = stamp_ns;
+    transforms.publish(
+        {{{{stamp_ns, setup.frames.map}, setup.frames.odom, ros::pose_of(*map_from_odom)}}});
+  }
+
+  void watch() {
+    for (const std::string& topic :
+         {picture_topic(),
+          std::string(options.motion == MotionInput::odometry ? "odom" : "initialpose")}) {
+      const std::size_t publishers = participant.publishers(topic);
+      if (publishers > 1 && topic != "initialpose") {
+        notes.say("publishers of " + topic, topic + " has " + std::to_string(publishers) +
+                                                " publishers; one is expected, all are heard");
+      }
+    }
+    bool silent = false;
+    {
+      const std::lock_guard lock(mutex);
+      silent = Steady::now() - last_picture_came > 2s;
+    }
+    if (silent) {
+      RunMoment moment;
+      moment.state = "no pictures on " + picture_topic();
+      diagnostics.publish(diagnostics_message(moment, now_ns()));
+    }
+  }
+
+  void run() {
+    std::thread worker([this] { look(); });
+    const auto period = std::chrono::duration_cast<Steady::duration>(
+        std::chrono::duration<double>(1.0 / options.transform_rate_hz));
+    auto next = Steady::now();
+    auto next_watch = next + 1s;
+    while (!stopped) {
+      participant.wait(std::max<Steady::duration>(next - Steady::now(), 0ns));
+      const auto now = Steady::now();
+      if (now < next) continue;
+      next = std::max(next + period, now);
+      try {
+        send_transform();
+        if (now < next_watch) continue;
+        next_watch = now + 1s;
+        watch();
+      } catch (const Error& error) {
+        notes.say("sending", readable_line(error.what()));
+      }
+    }
+    {
+      const std::lock_guard lock(mutex);  // the worker waits already, or sees that it may not
+    }
+    changed.notify_all();
+    worker.join();
+  }
+
+  // What looks at pictures, on a thread of its own.
+
+  void look() {
+    while (true) {
+      Job job;
+      Bytes message;
+      {
+        std::unique_lock lock(mutex);
+        changed.wait(lock, [this] { return stopped || picture || !jobs.empty(); });
+        if (stopped) return;
+        if (!jobs.empty()) {
+          job = std::move(jobs.front());
+          jobs.pop_front();
+        } else {
+          message = std::move(*picture);
+          picture.reset();
+        }
+      }
+      try {
+        if (job) {
+          job();
+        } else {
+          observe(message);
+        }
+      } catch (const Error& error) {
+        notes.say("work", (job ? "" : picture_topic() + ": ") + readable_line(error.what()));
+      }
+    }
+  }
+
+  /// Odometry of the time of the picture may still be on its way. Empty when it does not come: then
+  /// the picture cannot be placed.
+  std::optional<MotionHistory::Motion> motion_at(std::int64_t stamp_ns) {
+    std::unique_lock lock(mutex);
+    std::optional<MotionHistory::Motion> found;
+    changed.wait_for(lock, 300ms, [&] {
+      found = motion.at(stamp_ns);
+      return stopped || found || (motion.newest_ns() && *motion.newest_ns() >= stamp_ns);
+    });
+    return found;
+  }
+
+  void observe(const Bytes& message) {
+    const auto came = Steady::now();
+    std::int64_t stamp_ns = 0;
+    Observation seen = [&]() -> Observation {
+      if (options.pictures == PictureInput::raw) {
+        const auto read = ros::read_message<ros::Image>(message, MessageEncoding::cdr);
+        stamp_ns = read.header.stamp_ns;
+        return ros::picture_of(read);
+      }
+      const auto read = ros::read_message<ros::CompressedImage>(message, MessageEncoding::cdr);
+      stamp_ns = read.header.stamp_ns;
+      return ros::picture_of(read, picture_topic());
+    }();
+    seen.name = picture_topic();
+    const auto moved = motion_at(stamp_ns);
+    if (!moved) {
+      notes.say("motion",
+                "no odometry of the time of a picture (" +
+                    std::string(options.motion == MotionInput::odometry
+                                    ? "topic odom"
+                                    : "TF from " + setup.frames.odom + " to " + setup.frames.base) +
+                    "); the picture is left out");
+      return;
+    }
+    {
+      const std::lock_guard lock(mutex);
+      seen.tilt = tilt;
+    }
+    tracker.move_to(moved->path_from_base);
+    const PackedSignature view = tracker.encoder().packed(seen);
+    const MonteCarloEstimate estimate = tracker.observe(view);
+
+    RunMoment moment;
+    describe(moment, estimate);
+    const bool localised = moment.sure && estimate.pose;
+    if (localised) {
+      const Pose2 corrected = *estimate.pose * inverse(moved->path_from_base);
+      const std::lock_guard lock(mutex);
+      if (map_from_path) {
+        const Pose2 before = *map_from_path * moved->path_from_base;
+        moment.values.emplace_back(
+            "correction_m", fixed(distance(before.position(), estimate.pose->position()), 4));
+        moment.values.emplace_back(
+            "correction_rad",
+            fixed(std::abs(angle_difference(before.heading_rad, estimate.pose->heading_rad)), 4));
+      }
+      map_from_path = corrected;
+    }
+    if (localised) poses.publish(pose_message(moment, stamp_ns, setup.frames.map));
+    if (particles.subscribers() > 0) {
+      moment.particles = even_sample(tracker.localiser().particles(), shown_particles);
+      particles.publish(particles_message(moment, stamp_ns, setup.frames.map));
+    }
+    if (best_matches.subscribers() > 0) {
+      const auto found = tracker.memory().search(view, {.top = 1});
+      const auto thumbnail = file.thumbnail(found.matches.front().view);
+      if (thumbnail) best_matches.publish({{stamp_ns, setup.frames.base}, "png", *thumbnail});
+    }
+    moment.values.emplace_back(
+        "delay_ms",
+        fixed(std::chrono::duration<double, std::milli>(Steady::now() - came).count(), 1));
+    {
+      const std::lock_guard lock(mutex);
+      ++counts.pictures;
+      if (localised) ++counts.localised;
+      moment.values.emplace_back("dropped", std::to_string(counts.dropped));
+    }
+    moment.values.emplace_back("warnings", std::to_string(notes.count()));
+    diagnostics.publish(diagnostics_message(moment, stamp_ns));
+  }
+
+  void publish_references() {
+    PointValues cloud;
+    for (const ViewId view : tracker.memory().views()) {
+      const auto& pose = tracker.memory().info(view).pose;
+      if (pose) cloud.add(pose->position(), static_cast<double>(cloud.values.size() / 4));
+    }
+    references.publish(cloud.message(now_ns(), setup.frames.map, "number"));
+  }
+
+  LocalisationNodeSetup setup;
+  LocalisationNodeOptions options;
+  RareNotes notes;
+  MemoryFile file;  // file and tracker: of the thread that looks
+  Tracker tracker;
+  Participant participant;
+  Publisher<ros::TFMessage> transforms;
+  Publisher<ros::PoseWithCovarianceStamped> poses;
+  Publisher<ros::PoseArray> particles;
+  Publisher<ros::PointCloud2> references;
+  Publisher<ros::CompressedImage> best_matches;
+  Publisher<ros::DiagnosticArray> diagnostics;
+  std::atomic<bool> stopped = false;
+  std::atomic<std::int64_t> sim_ns = 0;
+  FrameTree frames;  // of the thread of `run`, as the next two
+  std::optional<ros::Pose> last_transform;
+  std::int64_t last_transform_ns = 0;
+
+  mutable std::mutex mutex;  // of what follows
+  std::condition_variable changed;
+  MotionHistory motion;
+  std::optional<Pose2> map_from_path;
+  std::optional<Tilt> tilt;
+  std::optional<std::int64_t> last_picture_ns;
+  Steady::time_point last_picture_came = Steady::now();
+  std::optional<Bytes> picture;  // the newest
+  std::deque<Job> jobs;
+  Counts counts;
+};
+
+LocalisationNode::LocalisationNode(const LocalisationNodeSetup& setup, RareNotes::Note note)
+    : implementation_(std::make_unique<Implementation>(setup, std::move(note))) {}
+LocalisationNode::~LocalisationNode() = default;
+
+void LocalisationNode::run() {
+  implementation_->run();
+}
+
+void LocalisationNode::stop() {
+  implementation_->stopped = true;
+  implementation_->participant.wake();
+}
+
+LocalisationNode::Counts LocalisationNode::counts() const {
+  Counts counts;
+  {
+    const std::lock_guard lock(implementation_->mutex);
+    counts = implementation_->counts;
+  }
+  counts.notes = implementation_->notes.count();
+  return counts;
+}
+
+}  // namespace panonav::ros2

@@ -1,0 +1,357 @@
+#include "ros2/localisation_node.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <mutex>
+#include <thread>
+
+#include "panonav/geometry/angles.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav/pipeline/memoriser.hpp"
+#include "support/fast_peer.hpp"
+#include "support/remembered_worlds.hpp"
+#include "support/temporary_folder.hpp"
+
+namespace panonav::ros2 {
+namespace {
+
+using namespace std::chrono_literals;
+namespace fs = std::filesystem;
+
+constexpr ElevationBand band{-0.45, 0.6};
+
+/// A robot in two rooms whose memory was made beforehand, and somebody else's programs around it.
+class LocalisationNodeOnTheWire : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_.emplace();
+    Memoriser memoriser(memory(), {.source = source()});
+    int number = 0;
+    for (double y = 0.4; y < 4.0; y += 0.4) {
+      for (double x = 0.4; x < 8.0; x += 0.4) {
+        if (!testing::robot_fits(world_, {x, y})) continue;
+        Observation seen(picture({x, y, 0.0}));
+        seen.name = "view_" + std::to_string(number++);
+        seen.pose = ReferencePose{x, y, 0.0};
+        memoriser.add(std::move(seen));
+      }
+    }
+    memoriser.finish();
+  }
+  static void TearDownTestSuite() { folder_.reset(); }
+
+  static fs::path memory() { return *folder_ / "rooms.panonav"; }
+  static PictureSource source() {
+    PictureSource source{.kind = PictureKind::panorama};
+    source.layout.elevations = band;
+    return source;
+  }
+  static Image picture(const Pose2& pose) {
+    return to_picture(world_.panorama(pose, 24, 128, band));
+  }
+
+  ~LocalisationNodeOnTheWire() override { stop(); }
+
+  void start(LocalisationNodeOptions options = {}, const ParticipantOptions& participant = {}) {
+    node_.emplace(
+        LocalisationNodeSetup{.memory = memory(), .participant = participant, .node = options},
+        [this](const std::string& line) {
+          const std::lock_guard lock(mutex_);
+          notes_.push_back(line);
+        });
+    thread_ = std::thread([this] { node_->run(); });
+  }
+  void stop() {
+    if (!thread_.joinable()) return;
+    node_->stop();
+    thread_.join();
+  }
+  [[nodiscard]] std::size_t notes_with(const std::string& words) {
+    const std::lock_guard lock(mutex_);
+    return static_cast<std::size_t>(std::ranges::count_if(
+        notes_, [&](const auto& line) { return line.find(words) != std::string::npos; }));
+  }
+  bool comes_true(const std::function<bool()>& condition) {
+    for (int i = 0; i < 500; ++i) {
+      if (condition()) return true;
+      std::this_thread::sleep_for(20ms);
+    }
+    return false;
+  }
+
+  template <class Message>
+  static Message read(const FastPeer::Bytes& cdr) {
+    return ros::read_message<Message>(cdr, MessageEncoding::cdr);
+  }
+  static std::int64_t now_ns() {
+    return std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count();
+  }
+  /// The robot sees odometry from an origin of its own.
+  static Pose2 odometry(const Pose2& pose) { return inverse(Pose2{1.0, 0.5, 0.4}) * pose; }
+  static ros::Odometry odometry_message(std::int64_t ns, const Pose2& pose) {
+    ros::Odometry message;
+    message.header = {ns, "odom"};
+    message.child_frame_id = "base_link";
+    message.pose.pose = ros::pose_of(odometry(pose));
+    return message;
+  }
+  static FastPeer::Bytes image_message(std::int64_t ns, const Image& picture) {
+    return ros::write_message(ros::Image{{ns, "camera"},
+                                         static_cast<std::uint32_t>(picture.height()),
+                                         static_cast<std::uint32_t>(picture.width()),
+                                         "mono8",
+                                         0,
+                                         static_cast<std::uint32_t>(picture.width()),
+                                         picture.pixels()});
+  }
+  /// Through the first room, 5 cm and 50 ms a step, with odometry before and after each picture.
+  Pose2 drive(FastPeer::Endpoint& odom, const std::function<void(std::int64_t, const Pose2&)>& see,
+              int steps = 40) {
+    Pose2 pose{0.6, 0.8, 0.0};
+    for (int i = 0; i < steps; ++i) {
+      const std::int64_t ns = now_ns();
+      EXPECT_TRUE(FastPeer::write(odom, ros::write_message(odometry_message(ns, pose))));
+      see(ns, pose);
+      std::this_thread::sleep_for(50ms);
+      if (i + 1 < steps) pose = pose * Pose2{0.05, 0.0, i > 20 ? 0.05 : 0.0};
+    }
+    return pose;
+  }
+
+  inline static std::optional<testing::TemporaryFolder> folder_;
+  inline static const testing::ToyWorld world_ = testing::two_rooms(3, false);
+  std::mutex mutex_;
+  std::vector<std::string> notes_;
+  FastPeer peer_;
+  std::optional<LocalisationNode> node_;
+  std::thread thread_;
+};
+
+TEST_F(LocalisationNodeOnTheWire, TellsAnotherVendorsProgramsWhereTheRobotIs) {
+  auto& tf = peer_.listen("rt/tf", "tf2_msgs::msg::dds_::TFMessage_");
+  auto& particles =
+      peer_.listen("rt/robot/panonav/particles", "geometry_msgs::msg::dds_::PoseArray_");
+  auto& best = peer_.listen("rt/robot/panonav/best_match/compressed",
+                            "sensor_msgs::msg::dds_::CompressedImage_");
+  auto& diagnostics =
+      peer_.listen("rt/diagnostics", "diagnostic_msgs::msg::dds_::DiagnosticArray_");
+  auto& odom = peer_.talk("rt/robot/odom", "nav_msgs::msg::dds_::Odometry_");
+  auto& image = peer_.talk("rt/camera/image_raw", "sensor_msgs::msg::dds_::Image_", false);
+  start({}, {.name_space = "/robot", .remappings = {{"image", "/camera/image_raw"}}});
+  for (auto* each : {&tf, &particles, &best, &diagnostics, &odom, &image}) {
+    ASSERT_TRUE(FastPeer::matched(*each, 10s));
+  }
+  const Pose2 truth = drive(odom, [&](std::int64_t ns, const Pose2& pose) {
+    EXPECT_TRUE(FastPeer::write(image, image_message(ns, picture(pose))));
+  });
+  ASSERT_TRUE(comes_true([&] { return node_->counts().pictures >= 20; }));
+  EXPECT_GE(node_->counts().localised, 10U);
+
+  // Who comes later hears the last pose, and the references.
+  auto& pose = peer_.listen("rt/robot/panonav/pose",
+                            "geometry_msgs::msg::dds_::PoseWithCovarianceStamped_", true, true);
+  auto& references = peer_.listen("rt/robot/panonav/references",
+                                  "sensor_msgs::msg::dds_::PointCloud2_", true, true);
+  const auto told = read<ros::PoseWithCovarianceStamped>(FastPeer::next(pose, 10s));
+  EXPECT_EQ(told.header.frame_id, "map");
+  const Pose2 found = ros::planar(told.pose.pose);
+  EXPECT_LT(distance(found.position(), truth.position()), 0.3);
+  EXPECT_LT(std::abs(angle_difference(found.heading_rad, truth.heading_rad)), 0.2);
+  for (const std::size_t i : {0U, 7U, 35U}) EXPECT_GT(told.pose.covariance[i], 0.0) << i;
+  for (const std::size_t i : {14U, 21U, 28U}) EXPECT_EQ(told.pose.covariance[i], 0.0) << i;
+  const auto cloud_bytes = FastPeer::next(references, 10s);
+  const auto cloud = read<ros::PointCloud2>(cloud_bytes);
+  EXPECT_EQ(cloud.header.frame_id, "map");
+  EXPECT_GT(cloud.width, 100U);
+  EXPECT_EQ(cloud.data.size(), 16U * cloud.width);
+
+  // map -> odom, dated ahead, with the odometry's own odom -> base_link where the robot is.
+  std::size_t transforms = 0;
+  ros::TFMessage last;
+  while (FastPeer::waiting(tf) > 0) {
+    const auto message = read<ros::TFMessage>(FastPeer::next(tf, 1s));
+    ASSERT_EQ(message.transforms.size(), 1U);
+    if (transforms++ > 0) {
+      EXPECT_GT(message.transforms[0].header.stamp_ns, last.transforms[0].header.stamp_ns);
+    }
+    last = message;
+  }
+  EXPECT_GT(transforms, 40U);  // many between two pictures
+  EXPECT_EQ(last.transforms[0].header.frame_id, "map");
+  EXPECT_EQ(last.transforms[0].child_frame_id, "odom");
+  EXPECT_GT(last.transforms[0].header.stamp_ns, now_ns());
+  EXPECT_LT(last.transforms[0].header.stamp_ns, now_ns() + 1'000'000'000);
+  const Pose2 by_tf = ros::planar(last.transforms[0].transform) * odometry(truth);
+  EXPECT_LT(distance(by_tf.position(), truth.position()), 0.3);
+
+  EXPECT_GT(read<ros::PoseArray>(FastPeer::next(particles, 1s)).poses.size(), 100U);
+  const auto best_bytes = FastPeer::next(best, 1s);
+  const auto match = read<ros::CompressedImage>(best_bytes);
+  EXPECT_GT(ros::picture_of(match, "best match").width(), 0);
+  std::map<std::string, std::string> values;
+  std::string state;
+  while (FastPeer::waiting(diagnostics) > 0) {
+    const auto message = read<ros::DiagnosticArray>(FastPeer::next(diagnostics, 1s));
+    for (const auto& [key, value] : message.status.at(0).values) values[key] = value;
+    state = message.status.at(0).level == 0 ? message.status.at(0).message : state;
+  }
+  EXPECT_EQ(state, "localised");
+  for (const char* key : {"probability", "correction_m", "correction_rad", "delay_ms"}) {
+    EXPECT_TRUE(values.contains(key)) << key;
+  }
+  stop();
+  EXPECT_TRUE(notes_.empty()) << notes_.front();
+}
+
+TEST_F(LocalisationNodeOnTheWire, TakesCompressedPicturesTransformsASimulatedClockAndAStart) {
+  auto& tf = peer_.talk("rt/tf", "tf2_msgs::msg::dds_::TFMessage_");
+  auto& heard = peer_.listen("rt/tf", "tf2_msgs::msg::dds_::TFMessage_");
+  auto& clock = peer_.talk("rt/clock", "rosgraph_msgs::msg::dds_::Clock_", false);
+  auto& imu = peer_.talk("rt/imu", "sensor_msgs::msg::dds_::Imu_");
+  auto& image = peer_.talk("rt/image/compressed", "sensor_msgs::msg::dds_::CompressedImage_");
+  auto& start_pose =
+      peer_.talk("rt/initialpose", "geometry_msgs::msg::dds_::PoseWithCovarianceStamped_");
+  auto& pose =
+      peer_.listen("rt/panonav/pose", "geometry_msgs::msg::dds_::PoseWithCovarianceStamped_");
+  start({.motion = MotionInput::tf,
+         .pictures = PictureInput::compressed,
+         .use_sim_time = true,
+         .tilt_from_imu = true});
+  for (auto* each : {&tf, &heard, &clock, &imu, &image, &start_pose, &pose}) {
+    ASSERT_TRUE(FastPeer::matched(*each, 10s));
+  }
+  const Pose2 first{0.6, 0.8, 0.0};
+  const auto step = [&](int i) {
+    const std::int64_t ns = 50'000'000LL * (i + 1);
+    const Pose2 at{first.x_m + 0.05 * i, first.y_m, 0.0};
+    FastPeer::write(clock, ros::write_message(ros::Clock{ns}));
+    FastPeer::write(tf, ros::write_message(ros::TFMessage{
+                            {{{ns, "odom"}, "base_footprint", ros::pose_of(odometry(at))},
+                             {{ns, "base_footprint"}, "base_link", {}}}}));
+    ros::Imu level;
+    level.header = {ns, "imu"};
+    FastPeer::write(imu, ros::write_message(level));
+    const Image seen = picture(at);
+    const auto png = encode_png(seen.view());
+    FastPeer::write(image, ros::write_message(ros::CompressedImage{{ns, "camera"}, "png", png}));
+    std::this_thread::sleep_for(50ms);
+  };
+  step(0);
+  ros::PoseWithCovarianceStamped begin{{0, "map"}, {ros::pose_of(first), {}}};
+  begin.pose.covariance[0] = begin.pose.covariance[7] = 0.01;
+  begin.pose.covariance[35] = 0.01;
+  FastPeer::write(start_pose, ros::write_message(begin));
+  std::this_thread::sleep_for(100ms);
+  for (int i = 1; i < 12 || (i < 40 && FastPeer::waiting(pose) == 0); ++i) step(i);
+  const auto told = FastPeer::next(pose, 10s);
+  ASSERT_FALSE(told.empty());
+  const auto told_pose = read<ros::PoseWithCovarianceStamped>(told);
+  EXPECT_LT(told_pose.header.stamp_ns, 3'000'000'000);  // of the simulation
+  const double truth_x_m =
+      first.x_m + 0.05 * (1e-9 * static_cast<double>(told_pose.header.stamp_ns) / 0.05 - 1);
+  EXPECT_NEAR(told_pose.pose.pose.position.x, truth_x_m, 0.3);
+  EXPECT_NEAR(told_pose.pose.pose.position.y, first.y_m, 0.3);
+  bool dated_ahead = false;
+  while (FastPeer::waiting(heard) > 0) {
+    const auto message = read<ros::TFMessage>(FastPeer::next(heard, 1s));
+    if (message.transforms.at(0).child_frame_id != "odom") continue;
+    dated_ahead = true;
+    EXPECT_GT(message.transforms[0].header.stamp_ns, 1'000'000'000);
+    EXPECT_LE(message.transforms[0].header.stamp_ns, 3'000'000'000);
+  }
+  EXPECT_TRUE(dated_ahead);
+  stop();
+  EXPECT_TRUE(notes_.empty()) << notes_.front();
+}
+
+TEST_F(LocalisationNodeOnTheWire, BadMessagesGetOneLineEachAndTheRobotIsFoundAllTheSame) {
+  auto& odom = peer_.talk("rt/odom", "nav_msgs::msg::dds_::Odometry_");
+  auto& image = peer_.talk("rt/image", "sensor_msgs::msg::dds_::Image_");
+  auto& start_pose =
+      peer_.talk("rt/initialpose", "geometry_msgs::msg::dds_::PoseWithCovarianceStamped_");
+  start();
+  for (auto* each : {&odom, &image, &start_pose}) ASSERT_TRUE(FastPeer::matched(*each, 10s));
+  auto& second = peer_.talk("rt/odom", "nav_msgs::msg::dds_::Odometry_");  // and says nothing
+  ASSERT_TRUE(FastPeer::matched(second, 10s));
+
+  int number = 0;
+  const std::int64_t begin_ns = now_ns();
+  // Not at once: what is written before both sides know of each other may be lost.
+  drive(odom, [&](std::int64_t ns, const Pose2& pose) {
+    const auto good = image_message(ns, picture(pose));
+    switch (++number) {
+      case 21: {  // half a message, nothing, noise
+        FastPeer::write(image, {good.begin(), good.begin() + 200});
+        FastPeer::write(image, {0, 1, 0, 0});
+        FastPeer::write(image, FastPeer::Bytes(64, 0xFF));
+        break;
+      }
+      case 22: {  // a picture of another size and one of no known encoding
+        const Image other(30, 20);
+        FastPeer::write(image, image_message(ns + 1, other));
+        std::this_thread::sleep_for(30ms);
+        ros::Image strange{{ns + 2, "camera"}, 1, 1, "rgb565", 0, 2, {}};
+        FastPeer::write(image, ros::write_message(strange));
+        break;
+      }
+      case 23: {  // odometry that is no number, of another robot, and late
+        auto bad = odometry_message(ns + 1, pose);
+        bad.pose.pose.position.x = std::numeric_limits<double>::quiet_NaN();
+        FastPeer::write(odom, ros::write_message(bad));
+        auto foreign = odometry_message(ns + 2, pose);
+        foreign.header.frame_id = "other_odom";
+        FastPeer::write(odom, ros::write_message(foreign));
+        FastPeer::write(odom, ros::write_message(odometry_message(ns - 1000, pose)));
+        break;
+      }
+      case 24: {
+        ros::PoseWithCovarianceStamped nowhere{{0, "moon"}, {}};
+        FastPeer::write(start_pose, ros::write_message(nowhere));
+        FastPeer::write(image, image_message(begin_ns - 10'000'000, picture(pose)));
+        break;
+      }
+      default:
+        FastPeer::write(image, good);
+    }
+  });
+  ASSERT_TRUE(comes_true([&] { return node_->counts().localised >= 10; }));
+  ASSERT_TRUE(comes_true([&] { return notes_with("publishers") > 0; }));
+  stop();
+  for (const char* words :
+       {"warning: image: sensor_msgs/Image message: ", "warning: odom: nav_msgs/Odometry message: ",
+        "2 publishers", "moon", "odom: a stamp is not after the one before it"}) {
+    EXPECT_EQ(notes_with(words), 1U) << words;
+  }
+  EXPECT_LE(notes_.size(), 9U);
+  EXPECT_GT(node_->counts().notes, notes_.size());  // the rest of each kind was kept back
+}
+
+TEST_F(LocalisationNodeOnTheWire, AFloodOfMessagesLeavesItLocalisedWithinItsMemory) {
+  auto& odom = peer_.talk("rt/odom", "nav_msgs::msg::dds_::Odometry_", false);
+  auto& image = peer_.talk("rt/image", "sensor_msgs::msg::dds_::Image_", false);
+  start();
+  for (auto* each : {&odom, &image}) ASSERT_TRUE(FastPeer::matched(*each, 10s));
+  const auto resident_pages = [] {
+    std::size_t total = 0;
+    std::size_t resident = 0;
+    std::ifstream("/proc/self/statm") >> total >> resident;
+    return resident;
+  };
+  const std::size_t before = resident_pages();
+  drive(odom, [&](std::int64_t ns, const Pose2& pose) {
+    const Image seen = picture(pose);
+    for (int i = 0; i < 50; ++i) {  // 1,000 a second
+      FastPeer::write(odom, ros::write_message(odometry_message(ns + i + 1, pose)));
+      FastPeer::write(image, image_message(ns + i, seen));
+    }
+  });
+  ASSERT_TRUE(comes_true([&] { return node_->counts().localised >= 3; }));
+  EXPECT_GT(node_->counts().dropped, 0U);
+  EXPECT_LT(resident_pages(), before + (64U << 20U) / 4096U);
+}
+
+}  // namespace
+}  // namespace panonav::ros2
