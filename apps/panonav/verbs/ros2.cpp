@@ -129,7 +129,7 @@ Verb ros2_verb() {
           "references, best match and diagnostics. Any ROS 2 distribution on the network sees the "
           "node (docs/ros2.md). Ends on Ctrl-C.",
           "  panonav ros2 office.panonav image:=/camera/image_raw\n"
-          "  panonav ros2 office.panonav --pictures compressed --use-sim-time",
+          "  panonav ros2 office.panonav --pictures compressed --use-sim-time true",
           declare_ros2};
 }
 
