@@ -422,7 +422,7 @@ struct LocalisationNode::Implementation {
     if (localised) poses.publish(pose_message(moment, stamp_ns, setup.frames.map));
     if (particles.subscribers() > 0) {
       moment.particles = even_sample(tracker.localiser().particles(), shown_particles);
-      particles.publish(particles_message(moment, stamp_ns, setup.frames.map));
+      particles.publish(poses_message(moment.particles, stamp_ns, setup.frames.map));
     }
     if (best_matches.subscribers() > 0) {
       const auto found = tracker.memory().search(view, {.top = 1});

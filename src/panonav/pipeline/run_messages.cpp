@@ -41,10 +41,10 @@ ros::PoseWithCovarianceStamped pose_message(const RunMoment& moment, std::int64_
   return message;
 }
 
-ros::PoseArray particles_message(const RunMoment& moment, std::int64_t stamp_ns,
-                                 const std::string& frame) {
+ros::PoseArray poses_message(const std::vector<Pose2>& poses, std::int64_t stamp_ns,
+                             const std::string& frame) {
   ros::PoseArray message{{stamp_ns, frame}, {}};
-  for (const Pose2& pose : moment.particles) message.poses.push_back(ros::pose_of(pose));
+  for (const Pose2& pose : poses) message.poses.push_back(ros::pose_of(pose));
   return message;
 }
 

@@ -17,8 +17,8 @@ namespace panonav {
 [[nodiscard]] ros::PoseWithCovarianceStamped pose_message(const RunMoment& moment,
                                                           std::int64_t stamp_ns,
                                                           const std::string& frame);
-[[nodiscard]] ros::PoseArray particles_message(const RunMoment& moment, std::int64_t stamp_ns,
-                                               const std::string& frame);
+[[nodiscard]] ros::PoseArray poses_message(const std::vector<Pose2>& poses, std::int64_t stamp_ns,
+                                           const std::string& frame);
 [[nodiscard]] ros::DiagnosticArray diagnostics_message(const RunMoment& moment,
                                                        std::int64_t stamp_ns);
 

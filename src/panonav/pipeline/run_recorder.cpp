@@ -17,34 +17,11 @@
 #include "panonav/geometry/positions.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/pipeline/internal/topic_writer.hpp"
+#include "panonav/pipeline/run_messages.hpp"
 
 namespace panonav {
 
 namespace {
-
-/// x, y, z and one more value of each point, as float32.
-struct Cloud {
-  std::vector<float> values;
-
-  void add(const Point2& point, double value) {
-    for (const double one : {point.x_m, point.y_m, 0.0, value}) {
-      values.push_back(static_cast<float>(one));
-    }
-  }
-  [[nodiscard]] ros::PointCloud2 message(std::int64_t stamp_ns, const std::string& fourth) const {
-    static_assert(std::endian::native == std::endian::little);
-    constexpr std::uint32_t step = 16;
-    ros::PointCloud2 cloud;
-    cloud.header = {stamp_ns, "map"};
-    cloud.width = static_cast<std::uint32_t>(values.size() / 4);
-    cloud.fields = {{"x", 0, 7, 1}, {"y", 4, 7, 1}, {"z", 8, 7, 1}, {fourth, 12, 7, 1}};
-    cloud.point_step = step;
-    cloud.row_step = step * cloud.width;
-    cloud.data = std::span(reinterpret_cast<const std::uint8_t*>(values.data()),
-                           values.size() * sizeof(float));
-    return cloud;
-  }
-};
 
 /// Free where a camera has stood, with as much around it; nothing is known of the rest. Empty where
 /// the references are too far apart for a grid.
@@ -82,23 +59,13 @@ std::optional<ros::OccupancyGrid> visited_grid(const std::vector<Point2>& positi
   return grid;
 }
 
-/// Rows and columns of x, y and heading within those of x, y, z and the three turns.
-ros::Covariance6 in_space(const std::array<double, 9>& planar) {
-  constexpr std::array<std::size_t, 3> at{0, 1, 5};
-  ros::Covariance6 covariance{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t j = 0; j < 3; ++j) covariance[6 * at[i] + at[j]] = planar[3 * i + j];
-  }
-  return covariance;
-}
-
 /// Points along the edges, near enough to look like lines, but not more than viewers take.
-Cloud edge_points(const std::vector<RunEdge>& edges) {
+PointValues edge_points(const std::vector<RunEdge>& edges) {
   constexpr double max_points = 1e5;
   double length_m = 0.0;
   for (const RunEdge& edge : edges) length_m += distance(edge.from, edge.to);
   const double step_m = std::max(0.05, length_m / max_points);
-  Cloud cloud;
+  PointValues cloud;
   for (const RunEdge& edge : edges) {
     const auto steps = static_cast<int>(std::ceil(distance(edge.from, edge.to) / step_m));
     for (int i = 0; i <= steps; ++i) {
@@ -204,29 +171,22 @@ struct RunRecorder::Implementation {
     write_transforms(moment, ns);
     write_references(moment.references, ns);
     if (!moment.edges.empty()) {
-      edges.write(log_ns, ns, edge_points(moment.edges).message(ns, "kind"));
+      edges.write(log_ns, ns, edge_points(moment.edges).message(ns, "map", "kind"));
     }
     write_plan(moment.plan, ns);
-    if (!moment.directions.empty()) directions.write(log_ns, ns, pose_array(moment.directions, ns));
+    if (!moment.directions.empty())
+      directions.write(log_ns, ns, poses_message(moment.directions, ns, "map"));
     if (moment.goal) goals.write(log_ns, ns, {{ns, "map"}, ros::pose_of(*moment.goal)});
     if (moment.pose) {
-      ros::PoseWithCovarianceStamped pose{{ns, "map"}, {ros::pose_of(*moment.pose), {}}};
-      if (moment.covariance) pose.pose.covariance = in_space(*moment.covariance);
-      poses.write(log_ns, ns, pose);
+      poses.write(log_ns, ns, pose_message(moment, ns, "map"));
       write_path(ns, *moment.pose);
     }
     if (!moment.particles.empty()) {
-      particles.write(log_ns, ns, cloud_of(moment.particles).message(ns, "heading"));
-      particle_poses.write(log_ns, ns, pose_array(moment.particles, ns));
+      particles.write(log_ns, ns, cloud_of(moment.particles).message(ns, "map", "heading"));
+      particle_poses.write(log_ns, ns, poses_message(moment.particles, ns, "map"));
     }
     if (moment.state.empty()) return;
-    ros::DiagnosticStatus status{.level = static_cast<std::uint8_t>(moment.sure ? 0 : 1),
-                                 .name = "panonav: localisation",
-                                 .message = moment.state,
-                                 .hardware_id = {},
-                                 .values = {}};
-    for (const auto& [key, value] : moment.values) status.values.push_back({key, value});
-    diagnostics.write(log_ns, ns, {{ns, ""}, {status}});
+    diagnostics.write(log_ns, ns, diagnostics_message(moment, ns));
   }
 
   /// Frames as REP 105 has them: map, odom where there is odometry, base_link.
@@ -244,22 +204,17 @@ struct RunRecorder::Implementation {
     transforms.write(log_ns, ns, tf);
   }
 
-  static Cloud cloud_of(const std::vector<Pose2>& poses) {
-    Cloud cloud;
+  static PointValues cloud_of(const std::vector<Pose2>& poses) {
+    PointValues cloud;
     for (const Pose2& pose : poses) cloud.add(pose.position(), pose.heading_rad);
     return cloud;
-  }
-  static ros::PoseArray pose_array(const std::vector<Pose2>& poses, std::int64_t ns) {
-    ros::PoseArray array{{ns, "map"}, {}};
-    for (const Pose2& pose : poses) array.poses.push_back(ros::pose_of(pose));
-    return array;
   }
   /// As PointCloud2 and as Path, whose poses have the stamp of their message.
   void write_plan(const std::vector<Pose2>& way, std::int64_t ns) {
     if (way.empty()) return;
     ros::Path message{{ns, "map"}, {}};
     for (const Pose2& pose : way) message.poses.push_back({{ns, "map"}, ros::pose_of(pose)});
-    plan_points.write(log_ns, ns, cloud_of(way).message(ns, "heading"));
+    plan_points.write(log_ns, ns, cloud_of(way).message(ns, "map", "heading"));
     plan.write(log_ns, ns, message);
   }
 
@@ -275,23 +230,23 @@ struct RunRecorder::Implementation {
         path_every *= 2;
       }
     }
-    Cloud cloud;
+    PointValues cloud;
     ros::Path message{{ns, "map"}, {}};
     for (const auto& [stamp_ns, at] : taken) {
       cloud.add(at.position(), at.heading_rad);
       message.poses.push_back({{stamp_ns, "map"}, ros::pose_of(at)});
     }
-    path_points.write(log_ns, ns, cloud.message(ns, "heading"));
+    path_points.write(log_ns, ns, cloud.message(ns, "map", "heading"));
     path.write(log_ns, ns, message);
   }
 
   void write_references(const std::vector<Point2>& positions, std::int64_t ns) {
     if (positions.empty()) return;
-    Cloud cloud;
+    PointValues cloud;
     for (std::size_t i = 0; i < positions.size(); ++i) {
       cloud.add(positions[i], static_cast<double>(i));
     }
-    references.write(log_ns, ns, cloud.message(ns, "number"));
+    references.write(log_ns, ns, cloud.message(ns, "map", "number"));
     if (const auto visited = visited_grid(positions, ns)) grid.write(log_ns, ns, *visited);
   }
 
