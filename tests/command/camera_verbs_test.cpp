@@ -109,6 +109,31 @@ TEST_F(CameraVerbs, UnwrapGivesTheCylinder) {
   EXPECT_EQ(read_image(out_ / "s.png").size(), (ImageSize{128, 20}));
 }
 
+TEST_F(CameraVerbs, RecordingsAreCalibratedAndUnwrappedAsTheirPicturesAre) {
+  const std::string run = *folder_ / "run";
+  const std::string recording = out_ / "run.mcap";
+  run_well({"convert", run, recording});
+  const auto calibrate = [&](const std::vector<std::string>& inputs) {
+    json said = answer_of(with(with({"calibrate"}, inputs), {"-o", out_ / "c.toml", "--json"}));
+    EXPECT_EQ(said["images"], 3);
+    return said;
+  };
+  const json by_pictures = calibrate({picture(0), picture(1), picture(2)});
+  EXPECT_EQ(calibrate({run}), by_pictures);
+  EXPECT_EQ(calibrate({recording}), by_pictures);
+
+  run_well({"unwrap", picture(1), "--camera", true_camera(), "-o", out_ / "one.png"});
+  const auto said = answer_of({"unwrap", run, "-o", out_ / "by_folder", "--json"});
+  EXPECT_EQ(said["pictures"], 3);
+  EXPECT_EQ(said["rows"], 80);
+  EXPECT_EQ(read_image(out_ / "by_folder/view_00001.png"), read_image(out_ / "one.png"));
+  run_well({"unwrap", recording, "--camera", true_camera(), "-o", out_ / "by_recording"});
+  EXPECT_EQ(read_image(out_ / "by_recording/1_000000000.png"), read_image(out_ / "one.png"));
+  EXPECT_TRUE(
+      contains(refusal({"unwrap", run, "-o", out_ / "by_folder"}), "allowed: a new folder"));
+  EXPECT_TRUE(contains(refusal({"unwrap", recording, "-o", out_ / "none"}), "--kind"));
+}
+
 TEST_F(CameraVerbs, UnwrapRefusesBadInput) {
   std::ofstream(out_ / "text.png") << "no picture";
   Image other(64, 48);

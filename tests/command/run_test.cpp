@@ -360,6 +360,35 @@ TEST_F(Walk, ARecordThatCannotBeWrittenDoesNotEndTheRun) {
   EXPECT_NE(full.err.find("full.mcap"), std::string::npos) << full.err;
 }
 
+TEST_F(Walk, RunRecordsARouteAndFollowsIt) {
+  const std::string memory = path("a.panonav");
+  run_well({"memorise", path("walk"), memory});
+  const std::vector<std::string> ask{"run", path("walk"), "--memory", memory, "--route", "round"};
+  EXPECT_NE(refusal(ask).find("route"), std::string::npos);  // there is none
+  const auto learnt = run_panonav(with(ask, {"--learn", "--quiet"}));
+  EXPECT_EQ(learnt.exit_code, 0) << learnt.err;
+  const auto route = MemoryFile::open(memory, Access::read_only).route("round");
+  ASSERT_TRUE(route);
+  EXPECT_EQ(route->size(), count);
+  EXPECT_NEAR(route->poses().back().x_m, poses_.back().x_m, 1e-3);
+  std::size_t right = 0;
+  const auto answers = answers_of(with(ask, {"--json"}));
+  for (std::size_t i = 0; i < count; ++i) {
+    const json& step = answers[i].at("route");
+    right += step.at("on_route").get<bool>() &&
+                     std::abs(step.at("pose").at("x_m").get<double>() - poses_[i].x_m) < 0.05
+                 ? 1
+                 : 0;
+  }
+  EXPECT_GE(right, count - 4);
+  // Without poses motion is read from the pictures, in a frame that cannot go on.
+  const std::vector<std::string> film{"run",     path("walk.mp4"), "--memory", memory,
+                                      "--route", "film",           "--learn",  "--quiet"};
+  run_well(film);
+  EXPECT_GE(MemoryFile::open(memory, Access::read_only).route("film").value().size(), 2U);
+  EXPECT_NE(refusal(film).find("a new name"), std::string::npos);
+}
+
 TEST_F(Walk, PicturesThatCannotBeReadAreCountedAndDoNotFlood) {
   run_well({"memorise", path("walk"), path("a.panonav")});
   fs::create_directories(folder / "bad");

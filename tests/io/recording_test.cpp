@@ -3,6 +3,7 @@
 #include "panonav/io/recording.hpp"
 
 #include <gtest/gtest.h>
+#include <zstd.h>
 
 #include <algorithm>
 #include <array>
@@ -237,12 +238,53 @@ TEST_F(RecordingTest, ReadsRecordingsOfRosbag2) {
   }
 }
 
+TEST_F(RecordingTest, FilesThatArePackedAsAWholeAreUnpacked) {
+  const auto packed = [](const fs::path& path) {
+    const std::string bytes = bytes_of(path);
+    std::string made(ZSTD_compressBound(bytes.size()), '\0');
+    made.resize(ZSTD_compress(made.data(), made.size(), bytes.data(), bytes.size(), 1));
+    return made;
+  };
+  folder.write("rosbag2_0.db3.zstd", packed(golden("rosbag2") / "rosbag2_0.db3"));
+  const std::string second = packed(golden("rosbag2") / "rosbag2_1.db3");
+  folder.write("rosbag2_1.db3.zstd", second);
+  folder.write("metadata.yaml",
+               "rosbag2_bagfile_information:\n  compression_mode: FILE\n  relative_file_paths:\n"
+               "    - rosbag2_0.db3.zstd\n    - rosbag2_1.db3.zstd\n");
+  const auto recording = Recording::open(folder.path());
+  EXPECT_EQ(in_sequence(*recording), golden_messages());
+  EXPECT_TRUE(recording->warnings().empty());
+  // One file alone, in two frames, of another kind.
+  std::string halves;
+  const std::string whole = bytes_of(golden("mcap_lz4.mcap"));
+  for (const std::string& half : {whole.substr(0, 700), whole.substr(700)}) {
+    halves += packed(folder.write("half", half));
+  }
+  const fs::path alone = folder.write("alone.mcap.zstd", halves);
+  EXPECT_TRUE(is_recording(alone));
+  EXPECT_EQ(in_sequence(*Recording::open(alone)), golden_messages());
+  // Cut off: what comes before is read, and the file that was given is named.
+  const fs::path cut = folder.write("cut.mcap.zstd", halves.substr(0, halves.size() - 20));
+  const auto rest = Recording::open(cut);
+  EXPECT_LT(in_sequence(*rest).size(), golden_messages().size());
+  ASSERT_FALSE(rest->warnings().empty());
+  for (const auto& warning : rest->warnings()) {
+    EXPECT_TRUE(warning.starts_with(cut.string() + ": ")) << warning;
+  }
+  const auto refused = [&](const fs::path& path, const RecordingLimits& limits) {
+    return message_of<FileError>([&] { (void)Recording::open(path, limits); });
+  };
+  EXPECT_TRUE(contains(refused(alone, {.file_bytes = 1000}), "unpacks to more than 1000 bytes"));
+  const fs::path other = folder.write("other.db3.zstd", packed(folder.write("t", "no recording")));
+  EXPECT_TRUE(contains(refused(other, {}), other.string() + ": is no recording"));
+}
+
 TEST_F(RecordingTest, AFolderOfRosbag2IsReadWithoutTheFilesThatAreMissing) {
   const auto metadata = [&](std::string_view files) {
     folder.write("metadata.yaml",
                  "rosbag2_bagfile_information:\n  relative_file_paths: " + std::string(files));
   };
-  metadata("[bag/one.mcap, ../none.db3, packed.db3.zstd]");
+  metadata("[bag/one.mcap, ../none.db3, lost.db3.zstd]");
   EXPECT_TRUE(contains(message_of<FileError>([&] { (void)Recording::open(folder.path()); }),
                        "has no file that can be read: "));
   fs::copy(golden("mcap_lz4.mcap"), folder / "one.mcap");
@@ -250,7 +292,7 @@ TEST_F(RecordingTest, AFolderOfRosbag2IsReadWithoutTheFilesThatAreMissing) {
   EXPECT_EQ(in_sequence(*recording), golden_messages());
   ASSERT_EQ(recording->warnings().size(), 2U);
   EXPECT_TRUE(contains(recording->warnings()[0], (folder / "none.db3").string() + ": is missing"));
-  EXPECT_TRUE(contains(recording->warnings()[1], "is packed as a whole"));
+  EXPECT_TRUE(contains(recording->warnings()[1], "lost.db3.zstd: is missing"));
   // The same file twice: what has one time comes in the order of the files.
   metadata("[one.mcap, one.mcap]");
   const auto twice = Recording::open(folder.path());

@@ -1,3 +1,4 @@
+#include <filesystem>
 #include <memory>
 
 #include "cli/arguments.hpp"
@@ -8,9 +9,13 @@
 #include "panonav/camera/mirror_camera.hpp"
 #include "panonav/camera/mirror_overlay.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/camera_file.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/io/live_pictures.hpp"
+#include "panonav/io/video_file.hpp"
+#include "verbs/recording.hpp"
 
 namespace panonav::command {
 
@@ -48,7 +53,8 @@ void visit_options(MirrorOptions& options, OptionVisitor& visitor) {
 }
 
 struct CalibrateArguments {
-  std::vector<std::string> images;
+  std::vector<std::string> inputs;
+  PictureArguments pictures;  // which ones
   std::string out;
   std::optional<std::string> overlay;
   std::optional<double> inner_radius_px;
@@ -56,18 +62,56 @@ struct CalibrateArguments {
   MirrorOptions mirror;
 };
 
-std::vector<Image> read_images(const std::vector<std::string>& paths, Session& session) {
+/// The pictures of one input; how they lie is what is asked for. Of a long recording some, evenly
+/// spread: as many as tell the mirror's circle well.
+std::vector<DatasetEntry> entries_of(const std::string& input, const CalibrateArguments& wanted,
+                                     Session& session) {
+  std::error_code ignored;
+  if (!std::filesystem::is_directory(input, ignored) && !is_recording(input) && !is_video(input) &&
+      !is_live(input)) {
+    DatasetEntry entry;
+    entry.file = input;
+    entry.path = input;
+    return {entry};
+  }
+  constexpr std::size_t max_pictures = 64;
+  PictureArguments pictures = wanted.pictures;
+  std::optional<PictureSource> any;
+  if (!std::filesystem::exists(std::filesystem::path(input) / "dataset.toml", ignored)) {
+    any.emplace();
+  }
+  std::vector<DatasetEntry> all = open_recording(input, pictures, any, session).entries;
+  if (all.size() <= max_pictures) return all;
+  session.note("of the " + std::to_string(all.size()) + " pictures of " + readable_line(input) +
+               " " + std::to_string(max_pictures) + " are taken, evenly spread");
+  std::vector<DatasetEntry> some;
+  for (std::size_t i = 0; i < max_pictures; ++i) {
+    some.push_back(all[i * (all.size() - 1) / (max_pictures - 1)]);
+  }
+  return some;
+}
+
+/// Sets `names`, too.
+std::vector<Image> read_images(const CalibrateArguments& wanted, std::vector<std::string>& names,
+                               Session& session) {
+  std::vector<DatasetEntry> entries;
+  for (const std::string& input : wanted.inputs) {
+    for (DatasetEntry& entry : entries_of(input, wanted, session)) {
+      entries.push_back(std::move(entry));
+    }
+  }
   std::vector<Image> images;
-  Progress progress(session, "reading", paths.size());
-  for (const auto& path : paths) {
-    images.push_back(read_image(path));
+  Progress progress(session, "reading", entries.size());
+  for (const DatasetEntry& entry : entries) {
+    names.push_back(entry.store ? entry.file : entry.path.string());
+    images.push_back(read_picture(entry));
     const auto size = images.back().size();
     const auto first = images.front().size();
     if (size != first) {
-      throw FileError(path, "size is " + std::to_string(size.width) + " x " +
-                                std::to_string(size.height) +
-                                "; allowed: " + std::to_string(first.width) + " x " +
-                                std::to_string(first.height) + ", as in " + paths.front());
+      throw FileError(names.back(), "size is " + std::to_string(size.width) + " x " +
+                                        std::to_string(size.height) +
+                                        "; allowed: " + std::to_string(first.width) + " x " +
+                                        std::to_string(first.height) + ", as in " + names.front());
     }
     progress.advance();
   }
@@ -88,9 +132,9 @@ CameraModel model_of(const MirrorOptions& options, double rim_radius_px) {
   }
 }
 
-ordered_json as_json(const CalibrateArguments& wanted, const MirrorCircle& mirror,
-                     const Camera& camera) {
-  ordered_json json{{"images", wanted.images.size()},
+ordered_json as_json(const CalibrateArguments& wanted, std::size_t images,
+                     const MirrorCircle& mirror, const Camera& camera) {
+  ordered_json json{{"images", images},
                     {"width_px", mirror.image_size.width},
                     {"height_px", mirror.image_size.height},
                     {"centre_u_px", mirror.centre.u_px},
@@ -111,7 +155,7 @@ ordered_json as_json(const CalibrateArguments& wanted, const MirrorCircle& mirro
   return json;
 }
 
-void print_text(const Arguments& arguments, const CalibrateArguments& wanted,
+void print_text(const Arguments& arguments, const CalibrateArguments& wanted, bool several,
                 const MirrorCircle& mirror, const Camera& camera, Session& session) {
   session.print(session.strong("mirror found") + ": centre " + fixed(mirror.centre.u_px, 1) + ", " +
                 fixed(mirror.centre.v_px, 1) + " px, rim radius " + fixed(mirror.rim_radius_px, 1) +
@@ -135,18 +179,19 @@ void print_text(const Arguments& arguments, const CalibrateArguments& wanted,
         short_number(wanted.mirror.rim_elevation_deg) +
         " at the rim. Say what you know with --profile, --rim-elevation-deg and their companions.");
   }
-  session.suggest(
-      {"panonav", "unwrap", wanted.images.front(), "--camera", wanted.out, "-o", "panorama.png"},
-      wanted.overlay ? "Next: look at " + *wanted.overlay + ", then" : "Next:");
+  session.suggest({"panonav", "unwrap", wanted.inputs.front(), "--camera", wanted.out, "-o",
+                   several ? "panoramas" : "panorama.png"},
+                  wanted.overlay ? "Next: look at " + *wanted.overlay + ", then" : "Next:");
 }
 
 ExitCode calibrate(const Arguments& arguments, const CalibrateArguments& wanted, Session& session) {
-  const auto images = read_images(wanted.images, session);
+  std::vector<std::string> names;
+  const auto images = read_images(wanted, names, session);
   std::vector<ImageView> views;
   for (const auto& image : images) views.push_back(image.view());
   const auto mirror = find_mirror(views, wanted.search);
   if (!mirror) {
-    return session.no_answer("panonav calibrate: no mirror found in " + wanted.images.front() +
+    return session.no_answer("panonav calibrate: no mirror found in " + names.front() +
                              (images.size() > 1 ? " and the others" : "") +
                              "; give more images, or allow a fainter rim with --min-quality");
   }
@@ -163,17 +208,20 @@ ExitCode calibrate(const Arguments& arguments, const CalibrateArguments& wanted,
   }
   write_camera(wanted.out, {camera, std::nullopt});
   if (session.json()) {
-    session.print(json_line(as_json(wanted, *mirror, camera)));
+    session.print(json_line(as_json(wanted, images.size(), *mirror, camera)));
   } else {
-    print_text(arguments, wanted, *mirror, camera, session);
+    print_text(arguments, wanted, images.size() > wanted.inputs.size(), *mirror, camera, session);
   }
   return ExitCode::done;
 }
 
 Run declare_calibrate(Arguments& arguments) {
   auto wanted = std::make_shared<CalibrateArguments>();
-  arguments.positionals("IMAGE", wanted->images,
-                        "Raw images of one mirror camera; more are better");
+  arguments.positionals("INPUT", wanted->inputs,
+                        "Raw images of one mirror camera; more are better. Or folders, videos or "
+                        "recordings of them, or - for JPEG pictures on standard input");
+  declare_topics(arguments, wanted->pictures.topics);
+  declare_part(arguments, wanted->pictures.part, true);
   arguments.required_option("-o,--out", wanted->out, "Camera file to write (camera.toml)");
   arguments.option("--overlay FILE", wanted->overlay,
                    "PNG picture to write: what was found, drawn over the first image");

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <memory>
@@ -6,13 +7,17 @@
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/pipeline/live_memory.hpp"
 #include "panonav/pipeline/observation_source.hpp"
+#include "panonav/pipeline/route_follower.hpp"
+#include "panonav/pipeline/route_recorder.hpp"
 #include "verbs/live_run.hpp"
 #include "verbs/localised_query.hpp"
 #include "verbs/memorising.hpp"
 #include "verbs/recording.hpp"
 #include "verbs/run_record.hpp"
+#include "verbs/tracked_run.hpp"
 
 namespace panonav::command {
 
@@ -28,19 +33,78 @@ struct RunArguments {
   std::optional<double> learn_interval_s;
   LiveArguments live;
   std::optional<std::string> record;
+  std::optional<std::string> route;
   SignatureOptions signature;
   PreprocessingOptions preprocessing;
 };
 
-std::string line_of(const Observation& seen, const LiveMemory::Answer& answer, Session& session) {
+/// Whose poses the lines of a route get.
+enum class RoutePoses { known, odometry, pictures };
+
+/// Remembers a route beside the views that are learnt, from the moment on when there is a memory.
+class RunRouteRecorder {
+ public:
+  RunRouteRecorder(std::string memory, PictureSource pictures, std::string name, RoutePoses poses)
+      : memory_(std::move(memory)), pictures_(std::move(pictures)), poses_(poses) {
+    options_.name = std::move(name);
+    options_.odometry = poses != RoutePoses::known;
+  }
+
+  void add(Observation seen, const LiveMemory& memory) {
+    const PlaceRecogniser* const recogniser = memory.recogniser();
+    if (recogniser == nullptr) return;
+    if (!recorder_) {
+      recorder_.emplace(MemoryFile::open(memory_, Access::read_write), pictures_, options_);
+    }
+    if (poses_ == RoutePoses::pictures) {
+      if (!odometry_) odometry_.emplace(visual_odometry(recogniser->memory()));
+      odometry_->add(OdometryView(recogniser->encoder().signature(seen)));
+      seen.odometry = odometry_->pose();
+    }
+    if (recorder_->add(seen)) ++lines_;
+  }
+  /// Lines that were recorded.
+  std::size_t finish() {
+    if (lines_ > 0) (void)recorder_->finish();
+    return lines_;
+  }
+
+ private:
+  std::string memory_;
+  PictureSource pictures_;
+  RoutePoses poses_;
+  RouteRecorderOptions options_;
+  std::optional<RouteRecorder> recorder_;
+  std::optional<VisualOdometry> odometry_;
+  std::size_t lines_ = 0;
+};
+
+ordered_json as_json(const RouteStep& step) {
+  if (!step.fix) return {{"on_route", false}};
+  return {{"on_route", true},
+          {"pose", pose_json(step.fix->fix.pose)},
+          {"along_m", step.fix->along_m},
+          {"lateral_m", step.fix->lateral_m},
+          {"correlation", step.fix->fix.correlation}};
+}
+
+std::string as_text(const RouteStep& step, Session& session) {
+  if (!step.fix) return session.bad("not on the route");
+  return session.good("on the route") + ", along " + fixed(step.fix->along_m, 2) + " m  beside " +
+         fixed(step.fix->lateral_m, 2) + " m";
+}
+
+std::string line_of(const Observation& seen, const LiveMemory::Answer& answer,
+                    const std::optional<RouteStep>& step, Session& session) {
   const LocalisedQuery query{seen.name, 0.0, answer.place.value_or(Place{}), seen.pose, ""};
   if (!session.json()) {
     return (answer.place ? as_text(query, session) : query.file + "  no memory yet") +
-           (answer.is_new ? "  learnt" : "");
+           (answer.is_new ? "  learnt" : "") + (step ? "  " + as_text(*step, session) : "");
   }
   auto json = as_json(query, false);
   json["stamp_s"] = or_null(seen.stamp_s);
   json["learnt"] = answer.is_new;
+  if (step) json["route"] = as_json(*step);
   return json_line(json);
 }
 
@@ -77,6 +141,23 @@ class RunMoments {
   std::size_t references_ = 0;  // that are in the record
 };
 
+RoutePoses route_poses(const Dataset& recording) {
+  const auto all = [&](const auto& has) { return std::ranges::all_of(recording.entries, has); };
+  if (all([](const DatasetEntry& e) { return e.pose && e.pose->heading_rad; })) {
+    return RoutePoses::known;
+  }
+  return all([](const DatasetEntry& e) { return e.odometry.has_value(); }) ? RoutePoses::odometry
+                                                                           : RoutePoses::pictures;
+}
+
+/// Motion that is read from pictures begins anew each time, and so does the frame of its poses.
+void refuse_to_go_on(const RunArguments& wanted, RoutePoses poses) {
+  if (poses != RoutePoses::pictures || !fs::exists(wanted.memory)) return;
+  if (!MemoryFile::open(wanted.memory, Access::read_only).route(*wanted.route)) return;
+  throw UsageError("--route is " + *wanted.route + ", which " + wanted.memory +
+                   " holds already; allowed without odometry: a new name");
+}
+
 ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& session) {
   const bool live = is_live(wanted.source);
   if (!live) refuse_live(arguments, wanted.source, false);
@@ -89,11 +170,22 @@ ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& se
     throw FileError(wanted.memory, "no such file; --learn makes it");
   }
   std::unique_ptr<ObservationSource> source;
+  RoutePoses poses = RoutePoses::pictures;
   if (live) {
     source = open_live(arguments, wanted.source, wanted.pictures, remembered, wanted.live);
   } else {
-    source = std::make_unique<DatasetObservations>(
-        open_recording(wanted.source, wanted.pictures, remembered, session), session.executor());
+    Dataset recording = open_recording(wanted.source, wanted.pictures, remembered, session);
+    poses = route_poses(recording);
+    source = std::make_unique<DatasetObservations>(std::move(recording), session.executor());
+  }
+  std::optional<RouteFollower> follower;
+  std::optional<RunRouteRecorder> route;
+  if (wanted.route && wanted.learn) {
+    refuse_to_go_on(wanted, poses);
+    route.emplace(wanted.memory, source->pictures(), *wanted.route, poses);
+  } else if (wanted.route) {
+    follower.emplace(MemoryFile::open(wanted.memory, Access::read_only), source->pictures(),
+                     RouteFollowerOptions{.name = wanted.route, .tracker = {}, .fit = {}});
   }
   LiveMemoryOptions options{.learn = wanted.learn,
                             .in_step = !live,
@@ -107,23 +199,28 @@ ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& se
   RunMoments moments(memory, wanted.memory);
   std::size_t known = 0;
   LiveMemory::Answer answer;
+  std::optional<RouteStep> step;
   LiveRun taking(*source, wanted.pictures.part, wanted.live, session);
   taking.take(
       [&](const Observation& seen) {
         answer = memory.answer(seen);
         if (answer.place && answer.place->known) ++known;
-        return line_of(seen, answer, session);
+        if (follower) step = follower->step(seen);
+        return line_of(seen, answer, step, session);
       },
       [&](Observation&& seen) {
+        if (route) route->add(seen, memory);
         if (record.wanted()) record.add(moments.of(seen, answer));
         if (answer.is_new) memory.learn(std::move(seen));
       });
   memory.finish();  // a reader of the lines may never go on
+  const std::size_t lines = route ? route->finish() : 0;
   record.close();
   const LiveCounts& counts = taking.finish();
   session.note(std::to_string(counts.pictures) + " pictures, " + std::to_string(known) +
                " of places of " + wanted.memory +
                (wanted.learn ? ", " + std::to_string(memory.learnt()) + " views learnt" : "") +
+               (route ? ", " + std::to_string(lines) + " lines of the route" : "") +
                events_text(counts, record.left_out()));
   return counts.pictures > 0 ? ExitCode::done : ExitCode::no_answer;
 }
@@ -138,6 +235,8 @@ Run declare_run(Arguments& arguments) {
   arguments.option("--learn-interval-s", wanted->learn_interval_s,
                    "Time between two views that are added, at least; default 0.5");
   declare_record(arguments, wanted->record);
+  arguments.option("--route NAME", wanted->route,
+                   "Follow this route of the memory; with --learn record it, a line each 0.1 m");
   declare_live(arguments, wanted->live);
   declare_pictures(arguments, wanted->pictures);
   arguments.options("signature", wanted->signature);
@@ -151,15 +250,18 @@ Run declare_run(Arguments& arguments) {
 }  // namespace
 
 Verb run_verb() {
-  return {"run", "Memorise and localise in one go on a live camera or a recording",
-          "Tells for each picture whether its place is known and where it is. With --learn, views "
-          "of places that the memory does not know are added; a new memory begins with 32 views. "
-          "Of a live source the newest picture is taken and those between are dropped. Ends with "
-          "the source, or on Ctrl-C with everything stored.",
-          "  panonav run /dev/video0 --memory walk.panonav --learn --kind equirectangular\n"
-          "  panonav run rtsp://192.0.2.7/live --memory walk.panonav --json\n"
-          "  panonav run office_run --memory office.panonav --learn",
-          declare_run};
+  return {
+      "run", "Memorise and localise in one go on a live camera or a recording",
+      "Tells for each picture whether its place is known and where it is. With --learn, views "
+      "of places that the memory does not know are added; a new memory begins with 32 views. "
+      "Of a live source the newest picture is taken and those between are dropped. --route tells "
+      "where the robot is beside a recorded route, or records one with the poses of the "
+      "recording, its odometry, or motion read from the pictures. Ends with the source, or on "
+      "Ctrl-C with everything stored.",
+      "  panonav run /dev/video0 --memory walk.panonav --learn --kind equirectangular\n"
+      "  panonav run rtsp://192.0.2.7/live --memory walk.panonav --json\n"
+      "  panonav run office_run --memory office.panonav --learn",
+      declare_run};
 }
 
 }  // namespace panonav::command

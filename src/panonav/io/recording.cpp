@@ -1,7 +1,10 @@
 #include "panonav/io/recording.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <fstream>
 #include <limits>
 #include <map>
@@ -216,7 +219,7 @@ class FilesRecording : public Recording {
   std::optional<TimeSpan> time_;
 };
 
-enum class FileKind { other, mcap, bag, old_bag, database };
+enum class FileKind { other, mcap, bag, old_bag, database, packed };
 
 FileKind kind_of(const fs::path& path) {
   std::array<char, 100> first{};
@@ -227,6 +230,7 @@ FileKind kind_of(const fs::path& path) {
   if (text.starts_with(mcap_magic)) return FileKind::mcap;
   if (text.starts_with(bag_magic)) return FileKind::bag;
   if (text.starts_with("#ROSBAG V") || text.starts_with("#ROSRECORD V")) return FileKind::old_bag;
+  if (text.starts_with("\x28\xB5\x2F\xFD") && path.extension() == ".zstd") return FileKind::packed;
   // Databases of other programs, such as memory files, carry the mark of their program.
   constexpr std::size_t mark_at = 68;
   if (text.starts_with(std::string_view("SQLite format 3\0", 16)) &&
@@ -236,8 +240,60 @@ FileKind kind_of(const fs::path& path) {
   return FileKind::other;
 }
 
-std::unique_ptr<const RecordingFile> open_file(const fs::path& path,
-                                               const RecordingLimits& limits) {
+std::unique_ptr<RecordingFile> open_file(const fs::path& path, const RecordingLimits& limits);
+
+/// A new empty file in the folder for temporary ones.
+class UnnamedFile {
+ public:
+  explicit UnnamedFile(const std::string& wanted_for) {
+    std::error_code error;
+    std::string name = (fs::temp_directory_path(error) / "panonav_XXXXXX").string();
+    const int descriptor = error ? -1 : mkstemp(name.data());
+    if (descriptor < 0) throw FileError(wanted_for, "cannot be unpacked: no temporary file");
+    close(descriptor);
+    path_ = name;
+  }
+  ~UnnamedFile() {
+    std::error_code ignored;
+    fs::remove(path_, ignored);
+  }
+  UnnamedFile(const UnnamedFile&) = delete;
+  UnnamedFile& operator=(const UnnamedFile&) = delete;
+  [[nodiscard]] const fs::path& path() const noexcept { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+/// What is open stays there when its name is gone, until it is closed.
+std::unique_ptr<RecordingFile> open_packed(const fs::path& path, const RecordingLimits& limits) {
+  const UnnamedFile copy(path.string());
+  std::error_code unknown;
+  const auto space = fs::space(copy.path().parent_path(), unknown);
+  const std::uint64_t most =
+      unknown ? limits.file_bytes : std::min<std::uint64_t>(limits.file_bytes, space.available / 2);
+  const UnpackedFile unpacked = unpack_file(path, copy.path(), most);
+  if (unpacked.too_long) {
+    throw FileError(path.string(), "unpacks to more than " + std::to_string(most) +
+                                       " bytes, as many as are allowed and half of what is free "
+                                       "in the folder for temporary files (TMPDIR)");
+  }
+  std::unique_ptr<RecordingFile> file;
+  try {
+    file = open_file(copy.path(), limits);
+  } catch (const FileError& error) {
+    const std::string what = error.what();
+    const std::string of_copy = copy.path().string() + ": ";
+    throw FileError(path.string(), what.starts_with(of_copy) ? what.substr(of_copy.size()) : what);
+  }
+  file->call(path);
+  if (!unpacked.whole) {
+    file->warn("is damaged or cut off: " + std::to_string(unpacked.bytes) + " bytes are unpacked");
+  }
+  return file;
+}
+
+std::unique_ptr<RecordingFile> open_file(const fs::path& path, const RecordingLimits& limits) {
   switch (kind_of(path)) {
     case FileKind::mcap:
       return open_mcap(path, limits);
@@ -247,6 +303,8 @@ std::unique_ptr<const RecordingFile> open_file(const fs::path& path,
       throw FileError(path.string(), "is a bag of an old version; allowed: 2.0 (rosbag migrate)");
     case FileKind::database:
       return open_rosbag2_database(path, limits);
+    case FileKind::packed:
+      return open_packed(path, limits);
     case FileKind::other:
       break;
   }
@@ -278,11 +336,6 @@ std::unique_ptr<const Recording> Recording::open(const fs::path& path,
     // The other files of a recording are there where one is not.
     for (const fs::path& file : read_rosbag2_folder(path)) {
       try {
-        if (file.extension() == ".zstd") {
-          throw FileError(file.string(),
-                          "is packed as a whole, which is not supported; unpack it and take the "
-                          "ending .zstd from its name in metadata.yaml");
-        }
         files.push_back(open_file(file, limits));
       } catch (const FileError& error) {
         warnings.emplace_back(error.what());

@@ -47,10 +47,14 @@ struct TimeSpan {
 struct RecordingLimits {
   std::size_t chunk_bytes = 256U << 20U;  ///< of a chunk or message unpacked; at most 4 GiB
   std::size_t messages = 50'000'000;      ///< that are listed at a time
+  /// Of a file that is packed as a whole, unpacked; never more than half of what is free in the
+  /// folder for temporary files (TMPDIR).
+  std::uint64_t file_bytes = std::uint64_t{32} << 30U;
 };
 
 /// Messages of topics with the times at which they were recorded: an MCAP file, a ROS 1 bag
-/// (version 2.0), a .db3 file of rosbag2, or a folder of rosbag2 with one or several files.
+/// (version 2.0), a .db3 file of rosbag2, or a folder of rosbag2 with one or several files. Files
+/// that are packed as a whole (.zstd) are unpacked into a temporary file.
 ///
 /// A file that was cut off or damaged gives what comes before the damage, and chunks whose checksum
 /// is wrong are left out; `warnings` says so.

@@ -42,7 +42,8 @@ std::optional<ros::OccupancyGrid> visited_grid(const std::vector<Point2>& positi
   grid.width = static_cast<std::uint32_t>(columns);
   grid.height = static_cast<std::uint32_t>(rows);
   const Point2 corner{low_x.x_m - (around + 0.5) * cell_m, low_y.y_m - (around + 0.5) * cell_m};
-  grid.origin.position = {corner.x_m, corner.y_m, 0.0};
+  // A little below the points, which viewers draw half under it otherwise.
+  grid.origin.position = {corner.x_m, corner.y_m, -0.05};
   grid.cells.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), -1);
   for (const Point2& position : positions) {
     const int column = static_cast<int>((position.x_m - corner.x_m) / cell_m);

@@ -283,9 +283,9 @@ class McapFile : public ChunkedFile {
 
 }  // namespace
 
-std::unique_ptr<const RecordingFile> open_mcap(const std::filesystem::path& path,
-                                               const RecordingLimits& limits) {
-  return std::make_unique<const McapFile>(path, limits);
+std::unique_ptr<RecordingFile> open_mcap(const std::filesystem::path& path,
+                                         const RecordingLimits& limits) {
+  return std::make_unique<McapFile>(path, limits);
 }
 
 }  // namespace panonav

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <fstream>
 #include <limits>
 #include <new>
 
@@ -125,6 +126,42 @@ Unpacked unpack_frame(std::span<const std::uint8_t> packed, std::size_t most) {
     if (!is_full || size == most || told <= most) return unpacked;
     size = std::min(most, 16 * size);
   }
+}
+
+UnpackedFile unpack_file(const std::filesystem::path& packed, const std::filesystem::path& to,
+                         std::uint64_t most) {
+  std::ifstream from(packed, std::ios::binary);
+  if (!from) throw FileError(packed.string(), "cannot be read");
+  std::ofstream file(to, std::ios::binary);
+  const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context(ZSTD_createDCtx(),
+                                                                     ZSTD_freeDCtx);
+  if (!context) throw std::bad_alloc();
+  ZSTD_DCtx_setParameter(context.get(), ZSTD_d_windowLogMax, 27);
+  std::vector<char> read(std::size_t{128} << 10U);
+  std::vector<char> made(read.size());
+  UnpackedFile done;
+  std::size_t left = 1;  // of a frame
+  while (from.read(read.data(), static_cast<std::streamsize>(read.size())), from.gcount() > 0) {
+    ZSTD_inBuffer in{read.data(), static_cast<std::size_t>(from.gcount()), 0};
+    bool is_full = true;
+    while (in.pos < in.size || is_full) {
+      ZSTD_outBuffer out{made.data(), made.size(), 0};
+      left = ZSTD_decompressStream(context.get(), &out, &in);
+      if (ZSTD_isError(left) != 0) return done;
+      is_full = out.pos == out.size;
+      if (done.bytes + out.pos > most) {
+        done.too_long = true;
+        return done;
+      }
+      file.write(made.data(), static_cast<std::streamsize>(out.pos));
+      done.bytes += out.pos;
+      if (left == 0 && in.pos == in.size) break;
+    }
+  }
+  file.close();
+  if (!file) throw FileError(packed.string(), "cannot be unpacked: the temporary folder is full");
+  done.whole = left == 0;
+  return done;
 }
 
 void pack(std::span<const std::uint8_t> bytes, Packing packing, std::vector<std::uint8_t>& packed) {

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <span>
@@ -38,6 +39,16 @@ struct Unpacked {
 
 /// A Zstandard frame of a size that is not known, of at most `most` bytes.
 [[nodiscard]] Unpacked unpack_frame(std::span<const std::uint8_t> packed, std::size_t most);
+
+/// Writes what the Zstandard frames of a file unpack to: at most `most` bytes. Memory: two buffers
+/// of 128 KiB and the frames' window, at most 128 MiB.
+struct UnpackedFile {
+  std::uint64_t bytes = 0;  ///< written
+  bool whole = false;       ///< else the packed file is damaged or cut off behind them
+  bool too_long = false;    ///< more than `most`
+};
+[[nodiscard]] UnpackedFile unpack_file(const std::filesystem::path& packed,
+                                       const std::filesystem::path& to, std::uint64_t most);
 
 /// Replaces `packed` by one LZ4 or Zstandard frame of the bytes, at the speed of a recorder.
 void pack(std::span<const std::uint8_t> bytes, Packing packing, std::vector<std::uint8_t>& packed);

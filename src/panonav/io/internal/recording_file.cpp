@@ -48,6 +48,14 @@ void RecordingFile::warn(std::string_view what) const {
   warn(FileError(path_.string(), what));
 }
 
+void RecordingFile::call(const std::filesystem::path& name) {
+  const std::string before = path_.string() + ": ";
+  for (std::string& warning : warnings_) {
+    if (warning.starts_with(before)) warning.replace(0, before.size() - 2, name.string());
+  }
+  path_ = name;
+}
+
 void RecordingFile::warn(const FileError& error) const {
   const std::string line = readable_line(error.what());
   const std::lock_guard lock(warnings_mutex_);

@@ -46,6 +46,8 @@ class RecordingFile {
   /// Adds the line "PATH: what" to the warnings, once.
   void warn(std::string_view what) const;
   void warn(const FileError& error) const;
+  /// Messages name this file instead: what was opened is a copy of it.
+  void call(const std::filesystem::path& name);
 
  protected:
   explicit RecordingFile(std::filesystem::path path) : path_(std::move(path)) {}
@@ -191,11 +193,11 @@ inline constexpr std::string_view mcap_magic = "\x89MCAP0\r\n";
 inline constexpr std::string_view bag_magic = "#ROSBAG V2.0\n";
 [[nodiscard]] bool begins_with(std::span<const std::uint8_t> bytes, std::string_view text) noexcept;
 
-[[nodiscard]] std::unique_ptr<const RecordingFile> open_mcap(const std::filesystem::path& path,
+[[nodiscard]] std::unique_ptr<RecordingFile> open_mcap(const std::filesystem::path& path,
                                                              const RecordingLimits& limits);
-[[nodiscard]] std::unique_ptr<const RecordingFile> open_ros1_bag(const std::filesystem::path& path,
+[[nodiscard]] std::unique_ptr<RecordingFile> open_ros1_bag(const std::filesystem::path& path,
                                                                  const RecordingLimits& limits);
-[[nodiscard]] std::unique_ptr<const RecordingFile> open_rosbag2_database(
+[[nodiscard]] std::unique_ptr<RecordingFile> open_rosbag2_database(
     const std::filesystem::path& path, const RecordingLimits& limits);
 
 }  // namespace panonav

@@ -266,9 +266,9 @@ class BagFile : public ChunkedFile {
 
 }  // namespace
 
-std::unique_ptr<const RecordingFile> open_ros1_bag(const std::filesystem::path& path,
-                                                   const RecordingLimits& limits) {
-  return std::make_unique<const BagFile>(path, limits);
+std::unique_ptr<RecordingFile> open_ros1_bag(const std::filesystem::path& path,
+                                             const RecordingLimits& limits) {
+  return std::make_unique<BagFile>(path, limits);
 }
 
 }  // namespace panonav

@@ -218,9 +218,9 @@ class DatabaseFile : public RecordingFile {
 
 }  // namespace
 
-std::unique_ptr<const RecordingFile> open_rosbag2_database(const fs::path& path,
-                                                           const RecordingLimits& limits) {
-  return std::make_unique<const DatabaseFile>(path, limits);
+std::unique_ptr<RecordingFile> open_rosbag2_database(const fs::path& path,
+                                                     const RecordingLimits& limits) {
+  return std::make_unique<DatabaseFile>(path, limits);
 }
 
 std::vector<fs::path> read_rosbag2_folder(const fs::path& folder) {
