@@ -136,6 +136,95 @@ TEST(InterpolatedPosition, PlacesThatLookAlikeWidenTheRadiusThereAndNowhereElse)
   EXPECT_GE(inside, 0.9 * asked);
 }
 
+// Errors beyond the outermost references are several times those between them; one radius for both
+// held 65 % at the edge of a hall.
+TEST(InterpolatedPosition, TheRadiusIsWiderAtTheEdgeOfWhatIsRemembered) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  struct Held {
+    int asked = 0;
+    int inside = 0;
+  };
+  Held between;
+  Held beyond;
+  for (std::uint64_t seed = 41; seed < 45; ++seed) {
+    const RememberedRoom place(seed, {8.0, 6.0, 4, 0.12}, 0.4);
+    constexpr double edge_m = 5.1;
+    VisualMemory memory = place.memory;
+    std::vector<Point2> kept;
+    for (const Point2 p : place.grid) {
+      if (p.x_m <= edge_m + 0.01) kept.push_back(p);
+    }
+    for (const ViewId view : place.memory.views()) {
+      if (memory.info(view).pose->x_m > edge_m + 0.01) memory.remove(view);
+    }
+    const ColumnRanking ranking(memory);
+    const PositionModel model = learn_position_model(ranking);
+    EXPECT_GT(model.edge_radius_m_per_deviation, 1.3 * model.radius_m_per_deviation);
+    Random random(seed, 3);
+    for (int i = 0; i < 80; ++i) {
+      Pose2 pose = place.room.between(kept, place.step_m, random);
+      const bool is_beyond = i % 2 == 0;
+      if (is_beyond) pose.x_m = edge_m + random.uniform(0.1, 0.9) * place.step_m;
+      if (!place.room.is_free(pose.position())) continue;
+      const auto found = ranked_matches(
+          memory, pack(compute_signature(place.room.see(pose, 16, 96, {1.0, 0.01}, random.next())),
+                       memory.full_scale()));
+      const auto estimate = interpolate_position(ranking, model, found);
+      ASSERT_TRUE(estimate && estimate->radius_m);
+      Held& held = is_beyond ? beyond : between;
+      ++held.asked;
+      held.inside += distance(estimate->position, pose.position()) <= *estimate->radius_m;
+    }
+  }
+  ASSERT_GE(beyond.asked, 100);
+  EXPECT_GE(between.inside, 0.9 * between.asked);
+  EXPECT_GE(beyond.inside, 0.8 * beyond.asked);
+}
+
+// Where each place has a double that differs in an eighth of its columns, a query tells the two
+// apart, but a view left out is nearer to its double than to its neighbours.
+TEST(InterpolatedPosition, ADoubleDoesNotWidenTheRadiusWhereQueriesTellItApart) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  const Room room(37, {5.0, 4.0, 6, 0.12});
+  constexpr double step_m = 0.3;
+  constexpr double away_m = 30.0;
+  Random random(37, 4);
+  const auto seen = [&](Point2 p) {
+    return room.see({p.x_m, p.y_m, 0.0}, 16, 96, {1.0, 0.01}, random.next());
+  };
+  std::vector<FourierSignature> signatures;
+  std::vector<std::optional<ReferencePose>> poses;
+  const std::vector<Point2> grid = room.grid(step_m);
+  for (const bool twin : {false, true}) {
+    for (const Point2 p : grid) {
+      Panorama view = seen(p);
+      for (int y = 0; twin && y < view.rows(); ++y) {
+        for (int x = 0; x < view.columns() / 8; ++x) {
+          view.at(y, x) = static_cast<float>((x + 3 * y) % 7) / 7.0F;
+        }
+      }
+      signatures.push_back(compute_signature(view));
+      poses.push_back(ReferencePose{p.x_m + (twin ? away_m : 0.0), p.y_m, 0.0});
+    }
+  }
+  const VisualMemory memory = make_memory(signatures, poses);
+  const ColumnRanking ranking(memory);
+  const PositionModel model = learn_position_model(ranking);
+  std::vector<double> radii;
+  int inside = 0;
+  for (int i = 0; i < 60; ++i) {
+    const Point2 p = room.between(grid, step_m, random).position();
+    const auto found =
+        ranked_matches(memory, pack(compute_signature(seen(p)), memory.full_scale()));
+    const auto estimate = interpolate_position(ranking, model, found);
+    ASSERT_TRUE(estimate && estimate->radius_m);
+    radii.push_back(*estimate->radius_m);
+    inside += distance(estimate->position, p) <= *estimate->radius_m;
+  }
+  EXPECT_LT(quantile(radii, 0.5), 2.0 * step_m);
+  EXPECT_GE(inside, 52);
+}
+
 TEST(PositionModel, OfFewOrUnposedViewsIsTheNearestReference) {
   const RememberedRoom place(23, {}, 0.5);
   std::vector<FourierSignature> views;

@@ -6,11 +6,14 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <utility>
 #include <vector>
 
 #include "panonav/core/statistics.hpp"
+#include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/voronoi.hpp"
+#include "panonav/localisation/neighbour_support.hpp"
 #include "panonav/localisation/sample.hpp"
 
 namespace panonav {
@@ -28,6 +31,10 @@ constexpr double min_variance = 0.1;
 constexpr double coverage = 0.95;
 // Farther than any neighbourhood of a place on a grid.
 constexpr double elsewhere_spacings = 3.0;
+// The neighbours on a grid, diagonal ones included.
+constexpr double beside_spacings = 1.5;
+// Found for a view left out, of which the doubles are taken away.
+constexpr int searched = 4 * PositionModel::candidates;
 // Half of what the radius may miss.
 constexpr double max_wrong = 0.5 * (1.0 - coverage);
 
@@ -83,6 +90,44 @@ double ratio_to_elsewhere(const Neighbours& n, double spacing_m) {
   }
   if (!(least < std::numeric_limits<double>::infinity())) return 0.0;
   return least > 0.0 ? std::sqrt(n.to_query(0) / least) : 1.0;
+}
+
+// Whether those of the references beside the nearest one that look like the query stand all around
+// it.
+bool is_surrounded(const Neighbours& n, double spacing_m) {
+  std::vector<double> directions;
+  for (const Point2& position : n.positions) {
+    const double distance_m = distance(position, n.positions[0]);
+    if (distance_m == 0.0 || distance_m > beside_spacings * spacing_m) continue;
+    directions.push_back(
+        std::atan2(position.y_m - n.positions[0].y_m, position.x_m - n.positions[0].x_m));
+  }
+  if (directions.empty()) return false;
+  std::ranges::sort(directions);
+  double gap = directions.front() + 2.0 * std::numbers::pi - directions.back();
+  for (std::size_t i = 1; i < directions.size(); ++i) {
+    gap = std::max(gap, directions[i] - directions[i - 1]);
+  }
+  return gap < std::numbers::pi - radians(1.0);  // a straight edge leaves half a turn
+}
+
+// Of what the search found for a view that was taken at `truth`, the best match of each other
+// place.
+std::vector<ViewId> doubles_of(const VisualMemory& memory, Point2 truth,
+                               std::span<const RankedMatch> ranked, double spacing_m) {
+  std::vector<Point2> places{truth};
+  std::vector<ViewId> doubles;
+  for (const RankedMatch& match : ranked) {
+    const auto& pose = memory.info(match.match.view).pose;
+    if (!pose || std::ranges::any_of(places, [&](Point2 place) {
+          return distance(pose->position(), place) <= elsewhere_spacings * spacing_m;
+        })) {
+      continue;
+    }
+    places.push_back(pose->position());
+    doubles.push_back(match.match.view);
+  }
+  return doubles;
 }
 
 struct Kriged {
@@ -165,19 +210,27 @@ PositionModel learn_position_model(const ColumnRanking& ranking,
 
   const std::vector<ViewId> sample =
       sample_views(posed, options.sampled_views, static_cast<std::uint64_t>(options.seed));
+  const NeighbourSupport support(ranking);
   std::vector<Neighbours> neighbours;
   std::vector<Point2> truths;
   std::vector<double> differences;
   for (const ViewId view : sample) {
-    const std::array excluded = {view};
-    const SearchResult found = memory.search(
-        memory.packed(view), {.top = PositionModel::candidates, .components = ranking.components()},
-        {.excluded_views = excluded, .allowed_rows = {}});
-    const std::vector<RankedMatch> ranked = ranking.rank(memory.packed(view), found.matches);
+    std::vector<ViewId> excluded{view};
+    const PackedSignature own = memory.packed(view);
+    const Point2 truth = memory.info(view).pose->position();
+    const SearchResult found =
+        memory.search(own, {.top = searched, .components = ranking.components()},
+                      {.excluded_views = excluded, .allowed_rows = {}});
+    std::vector<RankedMatch> ranked = ranking.rank(own, found.matches);
+    for (const ViewId other : doubles_of(memory, truth, ranked, spacing_m)) {
+      excluded.push_back(other);
+      std::erase_if(ranked, [&](const RankedMatch& match) { return match.match.view == other; });
+    }
+    support.put_best_supported_first(ranking.profiles(view), ranked, excluded);
     // As in an answer, the nearest view must have a pose.
     if (ranked.empty() || !memory.info(ranked[0].match.view).pose) continue;
     neighbours.push_back(gather(ranking, ranked));
-    truths.push_back(memory.info(view).pose->position());
+    truths.push_back(truth);
     differences.push_back(neighbours.back().to_query(0));
   }
   if (neighbours.size() < PositionModel::min_views) return model;
@@ -217,9 +270,13 @@ PositionModel learn_position_model(const ColumnRanking& ranking,
   if (best_errors.empty()) return model;  // no finite error
   model.variance_unit = quantile(best_variances, 0.5);
   std::vector<double> ratios;
+  std::vector<double> surrounded;
+  std::vector<double> at_edge;
   for (std::size_t i = 0; i < best_errors.size(); ++i) {
     const double variance = best_variances[i] + min_variance * model.variance_unit;
-    if (variance > 0.0 && is_near(i)) ratios.push_back(best_errors[i] / std::sqrt(variance));
+    if (!(variance > 0.0) || !is_near(i)) continue;
+    ratios.push_back(best_errors[i] / std::sqrt(variance));
+    (is_surrounded(neighbours[i], spacing_m) ? surrounded : at_edge).push_back(ratios.back());
   }
   model.median_error_m = quantile(best_errors, 0.5);
   model.error95_m = quantile(best_errors, coverage);
@@ -246,9 +303,15 @@ PositionModel learn_position_model(const ColumnRanking& ranking,
   // None near: then every answer is ambiguous.
   if (ratios.empty() && !ambiguous.empty()) ratios.push_back(0.0);
   if (ratios.empty()) return model;
-  // The quantile of a sample of n that a further draw stays below with at least this probability.
-  const double n = static_cast<double>(ratios.size());
-  model.radius_m_per_deviation = quantile(ratios, std::min(1.0, coverage * (n + 1.0) / n));
+  // The quantile of a sample of n that a further draw stays below with at least this probability;
+  // of all where there are few of a kind.
+  const auto bound = [&](const std::vector<double>& kind) {
+    const auto& of = kind.size() < PositionModel::min_views ? ratios : kind;
+    const double n = static_cast<double>(of.size());
+    return quantile(of, std::min(1.0, coverage * (n + 1.0) / n));
+  };
+  model.radius_m_per_deviation = bound(surrounded);
+  model.edge_radius_m_per_deviation = bound(at_edge);
   model.learnt = true;
   return model;
 }
@@ -269,8 +332,10 @@ std::optional<PositionEstimate> interpolate_position(const ColumnRanking& rankin
   const Kriged kriged =
       krige(neighbours, model.neighbourhood_m, model.exponent, model.difference_unit);
   estimate.position = kriged.position;
-  estimate.radius_m = model.radius_m_per_deviation *
-                      std::sqrt(kriged.variance + min_variance * model.variance_unit);
+  estimate.radius_m =
+      (is_surrounded(neighbours, model.spacing_m) ? model.radius_m_per_deviation
+                                                  : model.edge_radius_m_per_deviation) *
+      std::sqrt(kriged.variance + min_variance * model.variance_unit);
   if (model.ambiguous_from &&
       ratio_to_elsewhere(neighbours, model.spacing_m) >= *model.ambiguous_from) {
     estimate.radius_m = std::max(*estimate.radius_m, model.ambiguous_radius_m);

@@ -32,10 +32,14 @@ struct PositionModel {
   double neighbourhood_m = 0.0;  ///< references farther than this from the nearest one take no part
   double exponent =
       1.5;  ///< of the variogram: half the mean square distance ~ difference^(2 exponent)
-  double difference_unit = 1.0;         ///< median squared difference to the nearest view
-  double variance_unit = 0.0;           ///< median kriging variance
-  double radius_m_per_deviation = 0.0;  ///< radius that holds 95 % over the kriging deviation
-  double spacing_m = 0.0;               ///< of the posed views
+  double difference_unit = 1.0;  ///< median squared difference to the nearest view
+  double variance_unit = 0.0;    ///< median kriging variance
+  /// Radius that holds 95 % over the kriging deviation, where references that look alike surround
+  /// the nearest one: they leave no half of a turn free around it.
+  double radius_m_per_deviation = 0.0;
+  /// The same elsewhere: the place may lie beyond the outermost references.
+  double edge_radius_m_per_deviation = 0.0;
+  double spacing_m = 0.0;  ///< of the posed views
   /// From this ratio on, of the best match's difference to that of the best match elsewhere (more
   /// than 3 spacings from it), the wrong one of two places that look alike may have been taken;
   /// empty where that hardly happens. Then the radius is at least the other number.
@@ -50,9 +54,10 @@ struct PositionModel {
 /// left out in turn, and then how large a radius holds 95 % of the errors of those that were found
 /// near their place. Where more than 1 of 40 was found elsewhere, in a place that looks alike,
 /// those are told by how little better they match than elsewhere, and have a radius of their own.
-/// Views left out are farther from the other references than queries between the references are, so
-/// the radius rather holds too many than too few. Throws OptionError. Cost: `sampled_views`
-/// searches and about 1 ms for each.
+/// With a view its double at each place that looks alike is left out: a query is as far from the
+/// references there as from its own. Views left out are farther from the other references than
+/// queries between the references are, so the radius rather holds too many than too few. Throws
+/// OptionError. Cost: `sampled_views` searches and about 1 ms for each.
 [[nodiscard]] PositionModel learn_position_model(const ColumnRanking& ranking,
                                                  const PositionModelOptions& options = {});
 

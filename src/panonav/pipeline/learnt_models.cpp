@@ -19,7 +19,7 @@ namespace {
 
 constexpr const char* parameter_name = "learnt models";
 /// Counts up when what is learnt changes, so that models of an older version are not used.
-constexpr std::string_view learning_version = "3";
+constexpr std::string_view learning_version = "4";
 
 // The members of each model in the order in which they are kept.
 template <class Model, class Visit>
@@ -33,8 +33,8 @@ requires std::same_as<std::remove_const_t<Model>, PositionModel>
 void visit_members(Model& m, const Visit& visit) {
   visit(m.learnt), visit(m.components), visit(m.sampled_views), visit(m.neighbourhood_m);
   visit(m.exponent), visit(m.difference_unit), visit(m.variance_unit);
-  visit(m.radius_m_per_deviation), visit(m.spacing_m), visit(m.ambiguous_from);
-  visit(m.ambiguous_radius_m), visit(m.median_error_m), visit(m.error95_m);
+  visit(m.radius_m_per_deviation), visit(m.edge_radius_m_per_deviation), visit(m.spacing_m);
+  visit(m.ambiguous_from), visit(m.ambiguous_radius_m), visit(m.median_error_m), visit(m.error95_m);
 }
 template <class Model, class Visit>
 requires std::same_as<std::remove_const_t<Model>, ObservationModel>
