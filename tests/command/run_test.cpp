@@ -8,6 +8,7 @@
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <span>
 #include <sstream>
 
@@ -232,6 +233,22 @@ TEST_F(Walk, RunLearnsANewPlaceOnceAndKnowsItThen) {
   fs::copy_file(memory, path("copy.panonav"));
   EXPECT_EQ(run_panonav({"run", path("walk"), "--memory", memory, "--json"}).out,
             run_panonav({"run", path("walk"), "--memory", path("copy.panonav"), "--json"}).out);
+}
+
+TEST_F(Walk, ARecordOfAStreamHoldsItsJpegsToTheByte) {
+  run_well({"memorise", path("walk"), path("a.panonav")});
+  said_by_shell(shell_quoted(PANONAV_COMMAND) + " run - --memory " +
+                    shell_quoted(path("a.panonav")) + " --record " +
+                    shell_quoted(path("run.mcap")) + " < " + shell_quoted(path("walk.mjpeg")) +
+                    " 2> /dev/null",
+                folder.path());
+  std::size_t number = 0;
+  for_each_message<ros::CompressedImage>(
+      path("run.mcap"), "/camera/image/compressed", [&](const ros::CompressedImage& picture) {
+        EXPECT_EQ(picture.format, "jpeg");
+        EXPECT_EQ(std::string(picture.data.begin(), picture.data.end()), jpeg(++number));
+      });
+  EXPECT_EQ(number, count);
 }
 
 TEST_F(Walk, ARecordHoldsWhatWasSeenAndAnswered) {
@@ -503,6 +520,78 @@ TEST_F(Walk, AnInterruptedRunHasStoredWhatItLearnt) {
   EXPECT_GE(learnt, 5U);
   EXPECT_EQ(views(path("new.panonav")).size(), learnt);
   run_well({"verify", path("new.panonav")});
+}
+
+/// Ten minutes with PANONAV_SOAK_S=600, otherwise some seconds.
+TEST_F(Walk, ARunOutlivesLostCamerasAStalledReaderAndAClockThatIsSetBack) {
+  write_camera_pictures();
+  run_well({"memorise", path("walk"), path("a.panonav")});
+  const char* const wanted = std::getenv("PANONAV_SOAK_S");
+  const int seconds = wanted != nullptr ? std::atoi(wanted) : 8;
+  const int losses = wanted != nullptr ? 10 : 2;
+  constexpr int rate = 100;
+  const std::string script =
+      "mkfifo out\n"
+      "(sleep " +
+      std::to_string(seconds) +
+      "; cat) < out > lines &\n"
+      "V4L2_SHIM_RATE=" +
+      std::to_string(rate) +
+      " V4L2_SHIM_PICTURES=pictures"
+      " V4L2_SHIM_UNPLUG=" +
+      std::to_string(seconds * rate / (2 * losses)) +
+      " V4L2_SHIM_UNPLUGS=" + std::to_string(losses) +
+      " V4L2_SHIM_CLOCK_BACK=" + std::to_string(seconds * rate / 3) +
+      " V4L2_SHIM_TAKEN=taken LD_PRELOAD=" + shell_quoted(PANONAV_V4L2_SHIM) + " " +
+      shell_quoted(PANONAV_COMMAND) +
+      " run /dev/video7 --memory a.panonav --learn --record run.mcap --json > out 2> notes &\n"
+      "run=$!\n"
+      "resident() { grep VmRSS /proc/$run/status | tr -dc 0-9; }\n"
+      "sleep " +
+      std::to_string(seconds / 2) +
+      "; resident > early\n"
+      "sleep " +
+      std::to_string(seconds - seconds / 2 - 1) +
+      "; resident > late\n"
+      "kill -INT $run; wait $run; echo $? > code; wait\n";
+  write_file(folder / "script", std::string_view(script));
+  said_by_shell("cd " + shell_quoted(folder.path().string()) + " && bash script", folder.path());
+
+  const auto number_in = [&](const std::string& file) {
+    std::uint64_t number = 0;
+    EXPECT_TRUE(std::ifstream(path(file)) >> number) << file;
+    return number;
+  };
+  std::ostringstream notes;
+  notes << std::ifstream(path("notes")).rdbuf();
+  const std::string said = notes.str();
+  EXPECT_EQ(number_in("code"), 0U) << said;
+  const auto counted = [&](const std::string& what) {
+    std::smatch found;
+    const bool is_there = std::regex_search(said, found, std::regex("(\\d+) " + what));
+    return is_there ? std::stoull(found[1]) : 0ULL;
+  };
+  EXPECT_EQ(counted("interruptions of the source"), losses) << said;
+  std::uint64_t taken = 0;
+  std::ifstream(path("taken"), std::ios::binary).read(reinterpret_cast<char*>(&taken), 8);
+  const std::uint64_t pictures = counted("pictures, ");
+  const std::uint64_t accounted = pictures + counted("came too fast and were dropped");
+  // The last picture of all may still wait, and so may one at each loss.
+  EXPECT_LE(accounted, taken) << said;
+  EXPECT_GE(accounted + 1 + static_cast<std::uint64_t>(losses), taken) << said;
+  EXPECT_GT(pictures, taken / 4) << said;
+  EXPECT_EQ(objects(said_by_shell("cat " + shell_quoted(path("lines")), folder.path())).size() +
+                counted("lines were not printed for a slow reader"),
+            pictures)
+      << said;
+  EXPECT_GT(counted("lines were not printed for a slow reader"), 0U) << said;
+  constexpr std::uint64_t max_growth_kb = 8 * 1024;
+  EXPECT_LE(number_in("late"), number_in("early") + max_growth_kb);
+  const double delay_ms = std::stod(said.substr(said.find("from arrival to answer") + 23));
+  EXPECT_GT(delay_ms, 0.0) << said;
+  EXPECT_LT(delay_ms, 1000.0) << said;
+  run_well({"verify", path("a.panonav")});
+  EXPECT_FALSE(answer_of({"info", path("run.mcap"), "--json"}).at("topics").empty());
 }
 #endif
 

@@ -50,6 +50,7 @@ std::vector<bool> walk(const std::filesystem::path& memory, bool in_step, std::s
   recorder.close();
   left_out = recorder.left_out();
   live.finish();
+  EXPECT_EQ(MemoryFile::open(memory, Access::read_only).info().views, live.learnt());
   return known;
 }
 
@@ -67,17 +68,53 @@ TEST(LiveMemory, LearnsWhatIsNewAndKnowsItWhenItComesBack) {
   EXPECT_EQ(walk(folder / "b.panonav", true, left_out, folder / "b.mcap"), known);
 }
 
-TEST(LiveMemory, BesideTheAnswersItLearnsTheSameViewsAndLosesNoMoment) {
+TEST(LiveMemory, BesideTheAnswersItStoresAllThatItLearntAndLosesNoMoment) {
   const TemporaryFolder folder;
   std::size_t left_out = 0;
   const auto known = walk(folder / "a.panonav", false, left_out, folder / "a.mcap");
-  EXPECT_GE(MemoryFile::open(folder / "a.panonav", Access::read_only).info().views, 32U);
   const auto recording = Recording::open(folder / "a.mcap");
   for (const auto& topic : recording->topics()) {
     if (topic.name == "/tf") {
       EXPECT_EQ(topic.messages + left_out, known.size());
     }
   }
+}
+
+TEST(LiveMemory, TheAnsweredPanoramaIsKeptForWhoRecordsItAndIsWhatIsLearnt) {
+  const TemporaryFolder folder;
+  std::size_t left_out = 0;
+  walk(folder / "a.panonav", true, left_out, folder / "a.mcap");
+  LiveMemory live(folder / "a.panonav", {.learn = true,
+                                         .min_interval_s = 0.0,
+                                         .in_step = false,
+                                         .memoriser = {.source = panoramas()}});
+  const Observation elsewhere = seen_at(landmark_world(99), {0.3, 0.4, 0.5}, 1000);
+  const auto answer = live.answer(elsewhere);
+  ASSERT_TRUE(live.panorama());
+  EXPECT_TRUE(*live.panorama() == live.recogniser()->encoder().panorama(elsewhere));
+  ASSERT_TRUE(answer.is_new);
+  const PackedSignature signature = live.recogniser()->encoder().packed(elsewhere);
+  live.learn(elsewhere);
+  EXPECT_FALSE(live.panorama());
+  live.finish();
+  const auto file = MemoryFile::open(folder / "a.panonav", Access::read_only);
+  const auto view = file.find(elsewhere.name);
+  ASSERT_TRUE(view);
+  EXPECT_EQ(file.load().packed(*view), signature);
+}
+
+TEST(LiveMemory, AViewThatCannotBeStoredIsSaidAtTheLatestAtTheEnd) {
+  const TemporaryFolder folder;
+  std::size_t left_out = 0;
+  walk(folder / "a.panonav", true, left_out, folder / "a.mcap");
+  LiveMemory live(folder / "a.panonav", {.learn = true,
+                                         .min_interval_s = 0.0,
+                                         .in_step = false,
+                                         .memoriser = {.source = panoramas()}});
+  // Another program has stored another picture under the name.
+  Memoriser(folder / "a.panonav").add(seen_at(landmark_world(98), {0.2, 0.1, 0.0}, 1000));
+  live.learn(seen_at(landmark_world(99), {0.3, 0.4, 0.5}, 1000));
+  EXPECT_THROW(live.finish(), FileError);
 }
 
 TEST(LiveMemory, WithoutLearningThereMustBeAMemory) {

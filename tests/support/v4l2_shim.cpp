@@ -1,7 +1,9 @@
 // Stands between a program and the system (LD_PRELOAD) and plays the camera /dev/video7: JPEG
 // pictures from the file V4L2_SHIM_PICTURES, which holds each behind its length in four bytes, at
 // V4L2_SHIM_RATE a second. After V4L2_SHIM_UNPLUG of them the camera is gone, and back when it is
-// opened for the second time after that. Pictures begin anew at the end.
+// opened for the second time after that, V4L2_SHIM_UNPLUGS times (1). Pictures begin anew at the
+// end. The wall clock is set back by an hour after V4L2_SHIM_CLOCK_BACK pictures. How many were
+// taken is in the file V4L2_SHIM_TAKEN.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <linux/videodev2.h>
@@ -9,6 +11,7 @@
 #include <sys/timerfd.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
 #include <cstdarg>
 #include <cstdint>
@@ -28,14 +31,20 @@ struct Camera {
   int descriptor = -1;
   std::vector<std::string> pictures;
   unsigned sent = 0;
+  unsigned sent_since_open = 0;
+  std::uint64_t taken = 0;  // with those that nobody fetched in time
   unsigned sequence = 0;
+  long unplugs = 0;
   int failed_opens = 0;
   bool gone = false;
   unsigned queued = 0;
   unsigned next_buffer = 0;
   unsigned buffers = 0;
   unsigned char* memory = nullptr;
+  int taken_file = -1;
 };
+
+std::atomic<bool> clock_is_back = false;
 
 Camera& camera() {
   static Camera one;
@@ -67,8 +76,12 @@ int open_camera() {
   }
   self.gone = false;
   self.failed_opens = 0;
-  self.sequence = self.queued = self.next_buffer = 0;
-  if (self.pictures.empty()) read_pictures();
+  self.sequence = self.queued = self.next_buffer = self.sent_since_open = 0;
+  if (self.pictures.empty()) {
+    read_pictures();
+    const char* const taken = std::getenv("V4L2_SHIM_TAKEN");
+    if (taken != nullptr) self.taken_file = creat(taken, 0600);
+  }
   self.descriptor = timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC);
   return self.descriptor;
 }
@@ -81,10 +94,10 @@ int fail(int error) {
 int give_picture(v4l2_buffer& buffer) {
   Camera& self = camera();
   const long unplug = setting("V4L2_SHIM_UNPLUG", 0);
-  if (unplug > 0 && self.sent == static_cast<unsigned>(unplug) && !self.gone) {
+  if (unplug > 0 && self.sent_since_open == static_cast<unsigned>(unplug) && !self.gone &&
+      self.unplugs < setting("V4L2_SHIM_UNPLUGS", 1)) {
     self.gone = true;
-    ++self.sent;
-    return fail(ENODEV);
+    ++self.unplugs;
   }
   if (self.gone) return fail(ENODEV);
   std::uint64_t due = 0;
@@ -104,6 +117,11 @@ int give_picture(v4l2_buffer& buffer) {
   self.next_buffer = (self.next_buffer + 1) % self.buffers;
   --self.queued;
   ++self.sent;
+  self.taken += self.sent_since_open++ == 0 ? 1 : due;
+  if (static_cast<long>(self.sent) == setting("V4L2_SHIM_CLOCK_BACK", 0)) clock_is_back = true;
+  if (self.taken_file >= 0) {
+    (void)!pwrite(self.taken_file, &self.taken, sizeof(self.taken), 0);
+  }
   return 0;
 }
 
@@ -181,6 +199,12 @@ int open(const char* path, int flags, ...) {
   const unsigned mode = va_arg(rest, unsigned);
   va_end(rest);
   return original<int(const char*, int, ...)>("open")(path, flags, mode);
+}
+
+int clock_gettime(clockid_t clock, timespec* time) noexcept {
+  const int result = original<int(clockid_t, timespec*)>("clock_gettime")(clock, time);
+  if (clock == CLOCK_REALTIME && clock_is_back) time->tv_sec -= 3600;
+  return result;
 }
 
 int ioctl(int descriptor, unsigned long request, ...) noexcept {

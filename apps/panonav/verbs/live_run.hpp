@@ -37,7 +37,10 @@ struct LiveCounts {
   std::size_t pictures = 0;
   std::size_t skipped = 0;         ///< pictures that could not be read, or not be used
   std::size_t lines_left_out = 0;  ///< for a slow reader
-  std::vector<double> delays_ms;   ///< of a live source: from arrival to answer
+  /// Of the last pictures of a live source, which may never end: from arrival to answer, and the
+  /// part of it that decoding took.
+  std::vector<double> delays_ms;
+  std::vector<double> decoding_ms;
   LivePictures::Counts source;
 };
 

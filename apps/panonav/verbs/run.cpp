@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <filesystem>
 #include <memory>
 
@@ -117,7 +118,7 @@ class RunMoments {
   RunMoment of(const Observation& seen, const LiveMemory::Answer& answer) {
     RunMoment moment = moment_of(seen, number_++);
     const PlaceRecogniser* const recogniser = memory_.recogniser();
-    if (recogniser != nullptr) moment.panorama = recogniser->encoder().panorama(seen);
+    moment.panorama = memory_.panorama();
     if (!answer.place) {
       moment.state = "no memory yet";
       return moment;
@@ -198,6 +199,7 @@ ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& se
   RunRecord record(wanted.record, std::array{wanted.source, wanted.memory}, live, session);
   RunMoments moments(memory, wanted.memory);
   std::size_t known = 0;
+  std::chrono::duration<double, std::milli> unwrapping{};
   LiveMemory::Answer answer;
   std::optional<RouteStep> step;
   LiveRun taking(*source, wanted.pictures.part, wanted.live, session);
@@ -205,6 +207,7 @@ ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& se
       [&](const Observation& seen) {
         answer = memory.answer(seen);
         if (answer.place && answer.place->known) ++known;
+        unwrapping += answer.unwrapping;
         if (follower) step = follower->step(seen);
         return line_of(seen, answer, step, session);
       },
@@ -217,11 +220,14 @@ ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& se
   const std::size_t lines = route ? route->finish() : 0;
   record.close();
   const LiveCounts& counts = taking.finish();
+  const auto asked = static_cast<double>(counts.pictures);
   session.note(std::to_string(counts.pictures) + " pictures, " + std::to_string(known) +
                " of places of " + wanted.memory +
                (wanted.learn ? ", " + std::to_string(memory.learnt()) + " views learnt" : "") +
                (route ? ", " + std::to_string(lines) + " lines of the route" : "") +
-               events_text(counts, record.left_out()));
+               events_text(counts, record.left_out()) +
+               (live ? ", unwrapping " + fixed(unwrapping.count() / std::max(1.0, asked), 1) + " ms"
+                     : ""));
   return counts.pictures > 0 ? ExitCode::done : ExitCode::no_answer;
 }
 

@@ -31,6 +31,8 @@ bool is_camera(const std::string& address) {
   return address.starts_with("/dev/video");
 }
 
+using Steady = std::chrono::steady_clock;
+
 double now_s() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
@@ -39,6 +41,7 @@ double now_s() {
 struct Taken {
   std::variant<std::vector<std::uint8_t>, Image> picture;
   double stamp_s = 0.0;
+  Steady::time_point arrived{};
   std::uint64_t lost = 0;  ///< before it, where the source tells
 };
 
@@ -61,7 +64,8 @@ class StandardInput final : public Input {
 
   std::optional<Taken> take() override {
     while (true) {
-      if (auto picture = stream_.next()) return Taken{std::move(*picture), now_s(), 0};
+      if (auto picture = stream_.next())
+        return Taken{std::move(*picture), now_s(), Steady::now(), 0};
       std::array<pollfd, 2> waits{pollfd{STDIN_FILENO, POLLIN, 0}, pollfd{stop_, POLLIN, 0}};
       if (poll(waits.data(), waits.size(), -1) < 0) continue;
       if (waits[1].revents != 0) return std::nullopt;
@@ -84,7 +88,7 @@ class CameraInput final : public Input {
   std::optional<Taken> take() override {
     auto frame = camera_.next(stop_);
     if (!frame) return std::nullopt;
-    return Taken{std::move(frame->bytes), frame->stamp_s, frame->lost};
+    return Taken{std::move(frame->bytes), frame->stamp_s, frame->arrived, frame->lost};
   }
   Image decode(std::span<const std::uint8_t> bytes, const ImageLimits& limits) const override {
     return camera_.decode(bytes, limits);
@@ -104,7 +108,7 @@ class AddressInput final : public Input {
                "", address, limits) {}
   std::optional<Taken> take() override {
     auto frame = video_.next();
-    if (frame) return Taken{std::move(frame->picture), now_s(), 0};
+    if (frame) return Taken{std::move(frame->picture), now_s(), Steady::now(), 0};
     throw FileError(address_,
                     "has broken off" + (video_.trouble().empty() ? "" : ": " + video_.trouble()));
   }
@@ -114,6 +118,22 @@ class AddressInput final : public Input {
   std::string address_;
   DecodedVideo video_;
 };
+
+/// Not without Huffman tables, which cameras leave out and viewers need.
+bool is_whole_jpeg(std::span<const std::uint8_t> bytes) {
+  constexpr std::array<std::uint8_t, 2> begin{0xff, 0xd8};
+  constexpr std::array<std::uint8_t, 2> tables{0xff, 0xc4};
+  const auto is_at = [&](std::size_t at, const auto& marker) {
+    return std::equal(marker.begin(), marker.end(),
+                      bytes.begin() + static_cast<std::ptrdiff_t>(at));
+  };
+  if (bytes.size() < 4 || !is_at(0, begin)) return false;
+  for (std::size_t at = 2; at + 4 <= bytes.size() && bytes[at] == 0xff;) {
+    if (is_at(at, tables)) return true;
+    at += 2 + (static_cast<std::size_t>(bytes[at + 2]) << 8U) + bytes[at + 3];
+  }
+  return false;
+}
 
 }  // namespace
 
@@ -185,6 +205,7 @@ struct LivePictures::Implementation {
   std::shared_ptr<Input> input;
   std::optional<std::pair<Taken, std::shared_ptr<Input>>> newest;
   Counts counts;
+  bool asked = false;  // for the first picture
   std::atomic<bool> stopped = false;
   bool ended = false;
   std::thread thread;
@@ -236,6 +257,7 @@ std::optional<LivePicture> LivePictures::next() {
     std::optional<std::pair<Taken, std::shared_ptr<Input>>> taken;
     {
       std::unique_lock lock(self.mutex);
+      if (!std::exchange(self.asked, true)) self.counts.dropped = 0;
       self.came.wait(lock, [&] { return self.newest || self.ended || self.stopped; });
       if (self.stopped || !self.newest) return std::nullopt;
       taken = std::exchange(self.newest, std::nullopt);
@@ -243,12 +265,18 @@ std::optional<LivePicture> LivePictures::next() {
     }
     auto& [came, input] = *taken;
     if (auto* const picture = std::get_if<Image>(&came.picture)) {
-      return LivePicture{std::move(*picture), came.stamp_s};
+      return LivePicture{std::move(*picture), {}, came.stamp_s, came.arrived, {}};
     }
     try {
-      return LivePicture{
-          input->decode(std::get<std::vector<std::uint8_t>>(came.picture), self.options.limits),
-          came.stamp_s};
+      const auto before = Steady::now();
+      auto& bytes = std::get<std::vector<std::uint8_t>>(came.picture);
+      LivePicture decoded{input->decode(bytes, self.options.limits),
+                          {},
+                          came.stamp_s,
+                          came.arrived,
+                          Steady::now() - before};
+      if (is_whole_jpeg(bytes)) decoded.encoded = std::move(bytes);
+      return decoded;
     } catch (const Error&) {
       const std::lock_guard lock(self.mutex);
       ++self.counts.damaged;

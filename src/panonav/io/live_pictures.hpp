@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -19,8 +20,12 @@ namespace panonav {
 
 struct LivePicture {
   Image picture;
+  std::vector<std::uint8_t> encoded;  ///< the JPEG it was decoded from; empty where it was none
   /// When it arrived, seconds since 1970-01-01 UTC; of a camera: when it was taken.
   double stamp_s = 0.0;
+  /// The same moment by the clock that is never set.
+  std::chrono::steady_clock::time_point arrived{};
+  std::chrono::steady_clock::duration decoding{};  ///< how long it took, where we do it
 };
 
 struct LiveOptions {
@@ -51,7 +56,7 @@ class LivePictures {
   void stop() noexcept;
 
   struct Counts {
-    std::uint64_t dropped = 0;
+    std::uint64_t dropped = 0;  ///< since the first `next`
     std::uint64_t damaged = 0;
     std::uint64_t interruptions = 0;
     friend bool operator==(const Counts&, const Counts&) = default;

@@ -2,13 +2,104 @@
 
 #include <algorithm>
 #include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <exception>
 #include <future>
+#include <mutex>
+#include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/pipeline/internal/stand_back.hpp"
 
 namespace panonav {
+
+namespace {
+
+/// Stores views on a thread of its own.
+class Storer {
+ public:
+  explicit Storer(Memoriser& memoriser) : memoriser_(memoriser), thread_([this] { work(); }) {}
+  ~Storer() { join(); }
+  Storer(const Storer&) = delete;
+  Storer& operator=(const Storer&) = delete;
+
+  void add(Observation observation) {
+    const std::lock_guard lock(mutex_);
+    if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
+    waiting_.push_back(std::move(observation));
+    came_.notify_one();
+  }
+  [[nodiscard]] std::size_t waiting() const {
+    const std::lock_guard lock(mutex_);
+    return waiting_.size();
+  }
+  /// Whether the memory has a file by now.
+  [[nodiscard]] bool has_file() const {
+    const std::lock_guard lock(mutex_);
+    return has_file_;
+  }
+  /// Stores all that waits and ends. Rethrows what went wrong.
+  void finish() {
+    join();
+    if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
+  }
+
+ private:
+  void join() {
+    {
+      const std::lock_guard lock(mutex_);
+      over_ = true;
+    }
+    came_.notify_one();
+    if (thread_.joinable()) thread_.join();
+  }
+  void work() {
+    stand_back();
+    std::unique_lock lock(mutex_);
+    while (true) {
+      has_file_ = memoriser_.file() != nullptr;
+      came_.wait(lock, [this] { return over_ || !waiting_.empty(); });
+      if (waiting_.empty()) return;
+      Observation next = std::move(waiting_.front());
+      lock.unlock();
+      std::exception_ptr failure;
+      try {
+        memoriser_.add(std::move(next));
+      } catch (...) {
+        failure = std::current_exception();
+      }
+      lock.lock();
+      waiting_.pop_front();
+      if (failure && !failure_) failure_ = failure;
+    }
+  }
+
+  Memoriser& memoriser_;
+  mutable std::mutex mutex_;
+  std::condition_variable came_;
+  std::deque<Observation> waiting_;  // the first one is being stored
+  std::exception_ptr failure_;
+  bool has_file_ = false;
+  bool over_ = false;
+  std::thread thread_;
+};
+
+/// The same moment with its panorama, which is that of a level robot.
+Observation unwrapped(const Observation& observation, Panorama panorama) {
+  Observation same(std::move(panorama));
+  same.name = observation.name;
+  same.file = observation.file;
+  same.stamp_s = observation.stamp_s;
+  same.odometry = observation.odometry;
+  same.pose = observation.pose;
+  return same;
+}
+
+}  // namespace
 
 struct LiveMemory::Implementation {
   Implementation(std::filesystem::path memory, const LiveMemoryOptions& wanted)
@@ -16,6 +107,7 @@ struct LiveMemory::Implementation {
     const bool exists = std::filesystem::exists(path);
     if (options.learn) {
       memoriser.emplace(path, options.memoriser);
+      if (!options.in_step) storer.emplace(*memoriser);
     } else if (!exists) {
       throw FileError(path.string(), "is not there, and nothing is to be learnt");
     }
@@ -32,9 +124,11 @@ struct LiveMemory::Implementation {
     constexpr std::size_t min_new = 16;
     const std::size_t views = recogniser ? recogniser->memory().size() : 0;
     const bool due = !recogniser || added.size() >= std::max(min_new, views / 5);
-    if (due && !next.valid() && memoriser->file() != nullptr) {
-      next = std::async(options.in_step ? std::launch::deferred : std::launch::async,
-                        [this] { return make_recogniser(); });
+    if (due && !next.valid() && has_file()) {
+      next = std::async(options.in_step ? std::launch::deferred : std::launch::async, [this] {
+        if (!options.in_step) stand_back();
+        return make_recogniser();
+      });
     }
     if (!next.valid()) return;
     if (options.in_step) next.wait();
@@ -45,10 +139,17 @@ struct LiveMemory::Implementation {
     for (const auto& [info, signature] : added) recogniser->append(info, signature);
   }
 
+  [[nodiscard]] bool has_file() {
+    return storer ? storer->has_file() : memoriser->file() != nullptr;
+  }
+
   std::filesystem::path path;
   LiveMemoryOptions options;
-  std::optional<Memoriser> memoriser;
+  std::optional<Memoriser> memoriser;  // the thread of `storer` uses it, where there is one
+  std::optional<Storer> storer;
   std::unique_ptr<PlaceRecogniser> recogniser;
+  std::optional<Panorama> panorama;  // of the observation `answered`
+  std::string answered;
   /// Views that the recogniser has not learnt from.
   std::vector<std::pair<ReferenceInfo, PackedSignature>> added;
   std::optional<double> last_added_s;
@@ -66,12 +167,22 @@ LiveMemory::Answer LiveMemory::answer(const Observation& observation) {
   auto& self = *implementation_;
   if (self.options.learn) self.refresh();
   Answer answer;
-  if (self.recogniser) answer.place = self.recogniser->localise(observation);
+  self.panorama.reset();
+  if (self.recogniser) {
+    // Unwrapped once, for the answer and for what is learnt.
+    const auto before = std::chrono::steady_clock::now();
+    self.panorama = self.recogniser->encoder().panorama(observation);
+    answer.unwrapping = std::chrono::steady_clock::now() - before;
+    self.answered = observation.name;
+    answer.place = self.recogniser->localise(unwrapped(observation, *self.panorama));
+  }
   const bool due = !self.last_added_s || !observation.stamp_s ||
                    *observation.stamp_s - *self.last_added_s >= self.options.min_interval_s ||
                    *observation.stamp_s < *self.last_added_s;  // the clock was set back
   const bool stored = self.recogniser && self.recogniser->memory().find(observation.name);
-  answer.is_new = self.options.learn && due && !stored && !(answer.place && answer.place->known);
+  const bool full = self.storer && self.storer->waiting() >= max_waiting;
+  answer.is_new =
+      self.options.learn && due && !stored && !full && !(answer.place && answer.place->known);
   return answer;
 }
 
@@ -79,16 +190,31 @@ void LiveMemory::learn(Observation observation) {
   auto& self = *implementation_;
   if (!self.memoriser) throw ContractError("learn", "off", "on, to add views");
   self.last_added_s = observation.stamp_s;
+  const auto store = [&](Observation view) {
+    if (self.storer) {
+      self.storer->add(std::move(view));
+    } else {
+      self.memoriser->add(std::move(view));
+    }
+  };
   if (self.recogniser) {
+    const ViewEncoder& encoder = self.recogniser->encoder();
+    if (!self.panorama || self.answered != observation.name) {
+      self.panorama = encoder.panorama(observation);
+    }
     ReferenceInfo info{observation.name, observation.pose, observation.stamp_s};
-    PackedSignature signature = self.recogniser->encoder().packed(observation);
-    self.memoriser->add(std::move(observation));
+    PackedSignature signature = encoder.packed(*self.panorama);
+    store(unwrapped(observation, *std::exchange(self.panorama, std::nullopt)));
     self.recogniser->append(info, signature);
     self.added.emplace_back(std::move(info), std::move(signature));
   } else {
-    self.memoriser->add(std::move(observation));
+    store(std::move(observation));
   }
   ++self.learnt;
+}
+
+const std::optional<Panorama>& LiveMemory::panorama() const noexcept {
+  return implementation_->panorama;
 }
 
 const PlaceRecogniser* LiveMemory::recogniser() const noexcept {
@@ -106,6 +232,7 @@ std::size_t LiveMemory::learnt() const noexcept {
 void LiveMemory::finish() {
   auto& self = *implementation_;
   if (self.next.valid()) self.next.wait();
+  if (self.storer) self.storer->finish();
   if (self.learnt > 0) self.memoriser->finish();
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <filesystem>
 #include <memory>
@@ -16,8 +17,9 @@ struct LiveMemoryOptions {
   /// Between two views that are added: until the memory has learnt from a view, those after it look
   /// as new as it did. Of observations with stamps.
   double min_interval_s = 0.5;
-  /// Learn from the views that were added before the next observation is answered, so that the same
-  /// observations give the same bits; otherwise this happens beside the answers.
+  /// Store views, and learn from them, before the next observation is answered, so that the same
+  /// observations give the same bits; otherwise both happen beside the answers, on threads that
+  /// stand back for them.
   bool in_step = false;
   MemoriserOptions memoriser;  ///< of views that are added; its source serves for both
   LocaliserOptions localiser;
@@ -44,21 +46,27 @@ class LiveMemory {
     std::optional<Place> place;
     /// The place was new, and `learn` adds the observation as a view.
     bool is_new = false;
+    std::chrono::steady_clock::duration unwrapping{};  ///< how long it took
   };
   /// Does not write: what is to be added waits for `learn`. Throws as `PlaceRecogniser::localise`.
   [[nodiscard]] Answer answer(const Observation& observation);
-  /// Adds the observation that was answered last where its place was new. With an own name; a view
-  /// is on the disk when this returns, but for the first ones of a new file. Throws as
-  /// `Memoriser::add`.
+  /// Adds the observation that was answered last where its place was new. With an own name; in step
+  /// a view is on the disk when this returns, but for the first ones of a new file, and otherwise
+  /// soon after: while `max_waiting` views wait for a slow disk, no observation is new. Throws as
+  /// `Memoriser::add`, also about views of earlier calls.
   void learn(Observation observation);
+  static constexpr std::size_t max_waiting = 8;
+  /// Of the observation that was answered last, until it is learnt; empty as long as there is no
+  /// memory to ask.
+  [[nodiscard]] const std::optional<Panorama>& panorama() const noexcept;
 
   /// What answers now; null as long as there is no memory to ask. Valid until the next `answer`.
   [[nodiscard]] const PlaceRecogniser* recogniser() const noexcept;
   /// Views that can be found now, and those that were added.
   [[nodiscard]] std::size_t views() const noexcept;
   [[nodiscard]] std::size_t learnt() const noexcept;
-  /// Writes what still waits for a new file's full scale, and keeps what is learnt in the file.
-  /// Nothing where nothing was added.
+  /// Writes what still waits, and keeps what is learnt in the file. Nothing where nothing was
+  /// added. Throws as `learn`.
   void finish();
 
  private:

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
 #include <variant>
+#include <vector>
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/image.hpp"
@@ -26,6 +28,8 @@ struct Observation {
 
   /// As the camera delivered it, or a panoramic cylinder already.
   std::variant<Image, Panorama> picture;
+  /// The PNG or JPEG that a live picture was decoded from, for who passes it on; may be empty.
+  std::vector<std::uint8_t> encoded;
   std::string name;  ///< of the view that a memory keeps; messages name it
   /// Where the picture was read from; then errors about it are FileErrors that name the file.
   std::filesystem::path file;

@@ -47,7 +47,9 @@ std::optional<Observation> LiveObservations::next() {
   auto seen = live_.next();
   if (!seen) return std::nullopt;
   Observation observation(std::move(seen->picture));
+  observation.encoded = std::move(seen->encoded);
   observation.stamp_s = seen->stamp_s;
+  timing_ = {seen->arrived, seen->decoding};
   const auto whole_s = static_cast<std::time_t>(std::floor(seen->stamp_s));
   std::tm utc{};
   gmtime_r(&whole_s, &utc);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <exception>
 #include <optional>
@@ -67,10 +68,17 @@ class LiveObservations final : public ObservationSource {
   [[nodiscard]] const PictureSource& pictures() const noexcept override { return pictures_; }
   [[nodiscard]] std::optional<Observation> next() override;
   [[nodiscard]] LivePictures& live() noexcept { return live_; }
+  struct Timing {
+    std::chrono::steady_clock::time_point arrived{};
+    std::chrono::steady_clock::duration decoding{};
+  };
+  /// Of the last picture of `next`.
+  [[nodiscard]] const Timing& timing() const noexcept { return timing_; }
 
  private:
   PictureSource pictures_;
   LivePictures live_;
+  Timing timing_;
 };
 
 }  // namespace panonav

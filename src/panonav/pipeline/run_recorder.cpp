@@ -16,6 +16,7 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/positions.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/pipeline/internal/stand_back.hpp"
 #include "panonav/pipeline/internal/topic_writer.hpp"
 #include "panonav/pipeline/run_messages.hpp"
 
@@ -86,7 +87,9 @@ RunMoment moment_of(const Observation& seen, std::size_t number) {
                    .odometry = seen.odometry,
                    .tilt = seen.tilt,
                    .truth = seen.pose};
-  if (const auto* const picture = std::get_if<Image>(&seen.picture)) moment.picture = *picture;
+  moment.encoded_picture = seen.encoded;
+  const auto* const picture = std::get_if<Image>(&seen.picture);
+  if (picture != nullptr && seen.encoded.empty()) moment.picture = *picture;
   return moment;
 }
 
@@ -156,14 +159,19 @@ struct RunRecorder::Implementation {
 
   void write_picture(TopicWriter<ros::CompressedImage>& topic, std::int64_t ns,
                      std::span<const std::uint8_t> bytes) {
-    topic.write(log_ns, ns, {{ns, "camera"}, "png", bytes});
+    const bool is_png = image_format(bytes, "a picture of the run") == ImageFormat::png;
+    topic.write(log_ns, ns, {{ns, "camera"}, is_png ? "png" : "jpeg", bytes});
   }
 
   void write(const RunMoment& moment) {
     const std::int64_t ns = nanoseconds(moment.stamp_s);
     log_ns = std::max(log_ns, ns);  // the clock may have been set back
     robot.write(log_ns, ns, moment.odometry, moment.tilt, moment.truth);
-    if (moment.picture) write_picture(pictures, ns, encode_png(moment.picture->view()));
+    if (!moment.encoded_picture.empty()) {
+      write_picture(pictures, ns, moment.encoded_picture);
+    } else if (moment.picture) {
+      write_picture(pictures, ns, encode_png(moment.picture->view()));
+    }
     if (moment.panorama) {
       const Image picture = to_picture(*moment.panorama);
       write_picture(panoramas, ns, encode_png(picture.view()));
@@ -266,6 +274,7 @@ struct RunRecorder::Implementation {
   }
 
   void work() {
+    if (!options.wait) stand_back();
     std::unique_lock lock(mutex);
     while (true) {
       came.wait(lock, [this] { return closed || !waiting.empty(); });

@@ -33,7 +33,8 @@ struct RunEdge {
 /// Positions and poses are in the frame "map" unless said otherwise.
 struct RunMoment {
   double stamp_s = 0.0;
-  std::optional<Image> picture;  ///< as the camera delivered it
+  std::optional<Image> picture;               ///< as the camera delivered it
+  std::vector<std::uint8_t> encoded_picture;  ///< the same as PNG or JPEG; one of the two is enough
   std::optional<Panorama> panorama;
   std::vector<std::uint8_t> best_match;  ///< its thumbnail, PNG
   std::optional<Pose2> pose;             ///< of the robot

@@ -207,7 +207,7 @@ std::optional<V4l2Camera::Frame> V4l2Camera::next(int stop) {
     }
     if (buffer.index >= buffers_.size()) fail("names a buffer that is not there");
     const bool damaged = (buffer.flags & V4L2_BUF_FLAG_ERROR) != 0;
-    Frame frame{{}, 0.0, 0};
+    Frame frame;
     if (!damaged) {
       const auto* const data = static_cast<const std::uint8_t*>(buffers_[buffer.index].data);
       frame.bytes.assign(
@@ -219,6 +219,12 @@ std::optional<V4l2Camera::Frame> V4l2Camera::next(int stop) {
       timespec now{};
       clock_gettime(CLOCK_REALTIME, &now);
       frame.stamp_s = is_monotonic ? monotonic_s + wall_minus_monotonic_s() : seconds(now);
+      frame.arrived = std::chrono::steady_clock::now();
+      if (is_monotonic) {  // the steady clock is the monotonic one
+        frame.arrived = std::chrono::steady_clock::time_point(
+            std::chrono::seconds(buffer.timestamp.tv_sec) +
+            std::chrono::microseconds(buffer.timestamp.tv_usec));
+      }
       if (sequence_) frame.lost = buffer.sequence - *sequence_ - 1U;
       if (frame.lost > 1'000'000) frame.lost = 0;  // the driver began to count anew
       sequence_ = buffer.sequence;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -24,7 +25,8 @@ class V4l2Camera {
 
   struct Frame {
     std::vector<std::uint8_t> bytes;
-    double stamp_s;          ///< since 1970-01-01 UTC
+    double stamp_s = 0.0;  ///< since 1970-01-01 UTC
+    std::chrono::steady_clock::time_point arrived{};
     std::uint64_t lost = 0;  ///< by the driver since the frame before
   };
   /// The newest picture. Empty when `stop` becomes readable. Throws FileError when the camera is
