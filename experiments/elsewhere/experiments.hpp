@@ -33,6 +33,10 @@ struct RecordedGround {
 void reproduce_known_places(const ElsewhereReproductionOptions& options,
                             const std::vector<RecordedGround>& grounds, Executor& executor,
                             Reproduction& result);
+/// The covariance of the poses that tracking calls localised, on walks as memorised.
+void reproduce_tracked_poses(const ElsewhereReproductionOptions& options,
+                             const std::vector<RecordedGround>& grounds, Executor& executor,
+                             Reproduction& result);
 /// Home vectors between views of one ground, of two, and between noise.
 void reproduce_home_vectors(const ElsewhereReproductionOptions& options,
                             const std::vector<RecordedGround>& grounds, Executor& executor,

@@ -1,4 +1,4 @@
-// Own places, foreign places, and the radius that is stated.
+// Own places, foreign places, and the radius and covariance that are stated.
 
 #include <algorithm>
 #include <array>
@@ -6,9 +6,12 @@
 #include <utility>
 
 #include "experiments/elsewhere/experiments.hpp"
+#include "experiments/runs/make_each.hpp"
 #include "experiments/runs/place_experiment.hpp"
+#include "experiments/runs/tracking_filter.hpp"
 #include "experiments/runs/worlds.hpp"
 #include "panonav/core/statistics.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/simulation/scenes.hpp"
 
 namespace panonav {
@@ -141,6 +144,50 @@ void reproduce_known_places(const ElsewhereReproductionOptions& options,
   add_foreign("other", "places of other scenes and worlds taken for own", other, 0.01);
   add_foreign("variant", "places of another variant of the same scene taken for own", variant,
               0.05);
+}
+
+void reproduce_tracked_poses(const ElsewhereReproductionOptions& options,
+                             const std::vector<RecordedGround>& grounds, Executor& executor,
+                             Reproduction& result) {
+  // Of chi squared with two degrees of freedom.
+  constexpr double quantile_95 = 5.991;
+  constexpr double quantile_50 = 1.386;
+  for (const RecordedGround& ground : grounds) {
+    const PlaceRecording& place = ground.variants.front();
+    const auto remembered = remember_for_tracking(place, executor);
+    const auto walks = record_walks(
+        place, *remembered, clean_condition(),
+        {.variants = 1, .runs_each = std::max(1, options.runs / 8), .seed = options.seed},
+        executor);
+    const auto squares = make_each(executor, walks.size(), [&](std::size_t i) {
+      std::vector<double> found;
+      const auto observe = [&](std::size_t step, const MonteCarloLocaliser&,
+                               const MonteCarloEstimate& estimate) {
+        const TrackingStep& there = walks[i].steps[step];
+        if (estimate.state != LocalisationState::localised || !there.view) return;
+        const PoseMode& mode = estimate.modes.front();
+        const auto& c = mode.covariance;  // of three rows
+        const double x_m = there.truth.x_m - mode.mean.x_m;
+        const double y_m = there.truth.y_m - mode.mean.y_m;
+        found.push_back((c[4] * x_m * x_m - 2.0 * c[1] * x_m * y_m + c[0] * y_m * y_m) /
+                        (c[0] * c[4] - c[1] * c[1]));
+      };
+      static_cast<void>(track_run(*remembered, walks[i], {}, options.seed + i, observe));
+      return found;
+    });
+    std::vector<double> all;
+    for (const auto& some : squares) all.insert(all.end(), some.begin(), some.end());
+    if (all.empty()) continue;
+    const auto inside = static_cast<std::size_t>(
+        std::ranges::count_if(all, [](double square) { return square <= quantile_95; }));
+    const std::string id = "elsewhere.tracks." + ground.name;
+    add_rate(result, id + ".ellipse",
+             ground.name + ", walks: tracked poses within the 95 % ellipse of their covariance",
+             inside, all.size(), at_least(0.9));
+    result.rows.back().over += "; the median squared error is " +
+                               fixed(median(all) / quantile_50, 2) +
+                               " times that of a Gaussian with this covariance";
+  }
 }
 
 }  // namespace panonav

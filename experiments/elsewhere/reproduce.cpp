@@ -33,6 +33,8 @@ Reproduction reproduce_elsewhere(const ElsewhereReproductionOptions& options, Ex
   }
   stages.push_back({"places known and unknown", 100.0,
                     [&] { reproduce_known_places(options, grounds, executor, result); }});
+  stages.push_back({"tracked poses", 40.0,
+                    [&] { reproduce_tracked_poses(options, grounds, executor, result); }});
   stages.push_back(
       {"home vectors", 60.0, [&] { reproduce_home_vectors(options, grounds, executor, result); }});
   stages.push_back({"tilted robots", 60.0, [&] {

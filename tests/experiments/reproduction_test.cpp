@@ -92,7 +92,7 @@ TEST_F(Reproductions, ElsewhereIsTheSameOnOneAndTwoThreads) {
   for (const char* const id :
        {"elsewhere.places.office.clean.known", "elsewhere.places.lab.radius",
         "elsewhere.places.other", "elsewhere.places.variant", "elsewhere.home.foreign",
-        "elsewhere.home.noise_16", "elsewhere.tilt.lab.3"}) {
+        "elsewhere.home.noise_16", "elsewhere.tilt.lab.3", "elsewhere.tracks.office.ellipse"}) {
     EXPECT_TRUE(ids.contains(id)) << id;
   }
 }
