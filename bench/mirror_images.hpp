@@ -22,14 +22,29 @@ inline Camera mirror_camera() {
   return camera;
 }
 
+/// A 360 degree camera of two lenses, 190 degrees each, in a 1280 x 640 picture.
+inline Camera dual_fisheye_camera() {
+  DualFisheyeModel model;
+  for (int i = 0; i < 2; ++i) {
+    model.lenses[i].centre_u_px = 320.0 + 640.0 * i;
+    model.lenses[i].centre_v_px = 320.0;
+    model.lenses[i].focal_length_px = 180.0;
+    model.lenses[i].azimuth_rad = 3.14 * i;
+  }
+  Camera camera;
+  camera.model = model;
+  camera.image_size = {1280, 640};
+  return camera;
+}
+
 /// Several images, as a camera delivers them, so that none stays in the first-level cache.
-inline std::vector<Image> images() {
+inline std::vector<Image> images(ImageSize size = {640, 480}) {
   Random random(1);
   std::vector<Image> result;
   for (int i = 0; i < 8; ++i) {
-    Image image(640, 480);
-    for (int v = 0; v < 480; ++v) {
-      for (int u = 0; u < 640; ++u) {
+    Image image(size.width, size.height);
+    for (int v = 0; v < size.height; ++v) {
+      for (int u = 0; u < size.width; ++u) {
         const double value =
             120.0 + 60.0 * std::sin(0.02 * u + i) * std::cos(0.03 * v) + random.normal(0.0, 12.0);
         image.at(u, v) = static_cast<std::uint8_t>(std::fmax(0.0, std::fmin(255.0, value)));

@@ -52,9 +52,9 @@ BENCHMARK_CAPTURE(image_to_packed_signature, plain,
                   PreprocessingOptions{.remove_mean = false, .normalise_gain = false});
 BENCHMARK_CAPTURE(image_to_packed_signature, mean_and_gain, PreprocessingOptions{});
 
-void unwrap(benchmark::State& state) {
-  const auto views = images();
-  const Unwarper unwarper(mirror_camera(), {rows, columns});
+void unwrap(benchmark::State& state, const Camera& camera) {
+  const auto views = images(camera.image_size);
+  const Unwarper unwarper(camera, {rows, columns, visible_elevations(mirror_camera())});
   Unwarper::Workspace workspace;
   std::size_t next = 0;
   for (auto _ : state) {
@@ -66,7 +66,8 @@ void unwrap(benchmark::State& state) {
   }
   count_images(state);
 }
-BENCHMARK(unwrap);
+BENCHMARK_CAPTURE(unwrap, mirror, mirror_camera());
+BENCHMARK_CAPTURE(unwrap, two_lenses, dual_fisheye_camera());
 
 void level(benchmark::State& state) {
   const Unwarper unwarper(mirror_camera(), {rows, columns});

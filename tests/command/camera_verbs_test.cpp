@@ -7,6 +7,7 @@
 #include <optional>
 #include <set>
 
+#include "panonav/geometry/angles.hpp"
 #include "panonav/io/camera_file.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/simulation/mirror.hpp"
@@ -86,6 +87,58 @@ TEST_F(CameraVerbs, CalibrateRefusesBadInput) {
   EXPECT_TRUE(contains(refusal({"calibrate", picture(0)}), "--out is required"));
   EXPECT_TRUE(contains(refusal({"calibrate", picture(0), "-o", out_ / "text.png/camera.toml"}),
                        "text.png/camera.toml"));
+}
+
+TEST_F(CameraVerbs, TwoLensesAreCalibratedAndUnwrapped) {
+  std::ofstream(out_ / "turns.csv")
+      << "stamp_s,x_m,y_m,heading_deg\n0,2.5,1,0\n1,2.5,1,85\n2,2.5,1,-170\n";
+  run_well({"simulate", "office", out_ / "turned", "--trajectory", out_ / "turns.csv", "--kind",
+            "dual-fisheye", "--lens-seed", "4", "--rays-per-axis", "1"});
+  std::vector<std::string> arguments{"calibrate"};
+  for (int i = 0; i < 3; ++i) {
+    arguments.push_back(out_ / ("turned/view_0000" + std::to_string(i) + ".png"));
+  }
+  const auto with = [&](const std::vector<std::string>& more) {
+    auto all = arguments;
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  };
+  const auto said = answer_of(with({"--profile", "dual-fisheye", "-o", out_ / "found.toml",
+                                    "--overlay", out_ / "circles.png", "--json"}));
+  EXPECT_EQ(keys_of(said),
+            (std::set<std::string>{"images", "width_px", "height_px", "matches", "inlier_share",
+                                   "residual_deg", "azimuth_deviation_deg", "field_of_view_deg",
+                                   "turns_deg", "camera"}));
+  EXPECT_LT(said["azimuth_deviation_deg"], 0.1);
+  EXPECT_NEAR(said["turns_deg"][1], 85, 0.2);
+  EXPECT_EQ(read_image(out_ / "circles.png").size(), (ImageSize{1280, 640}));
+  // Stitched with what was found and with the lenses as they are: the same but for the left lens's
+  // azimuth, which no picture shows, and noise.
+  const Camera truth = read_camera(out_ / "turned/camera.toml").camera;
+  Camera found = read_camera(out_ / "found.toml").camera;
+  const double off = std::get<DualFisheyeModel>(truth.model).lenses[0].azimuth_rad;
+  for (FisheyeLens& lens : std::get<DualFisheyeModel>(found.model).lenses) lens.azimuth_rad += off;
+  double worst = 0;
+  for (int i = 0; i < 360; ++i) {
+    const auto d = Direction3::from_angles(radians(i), 0);
+    const auto again = unproject(found, project(truth, d).value());
+    ASSERT_TRUE(again);
+    worst = std::max(worst, std::abs(angle_difference(again->azimuth_rad(), d.azimuth_rad())));
+  }
+  EXPECT_LT(degrees(worst), 0.2);
+  const auto unwrapped =
+      answer_of({"unwrap", arguments[1], "--camera", out_ / "found.toml", "--elevation-deg", "-40",
+                 "40", "-o", out_ / "p.png", "--json"});
+  EXPECT_EQ(unwrapped["columns"], 512);
+
+  EXPECT_TRUE(
+      contains(refusal(with({"--left-roll-deg", "90", "-o", out_ / "no.toml"})), "dual-fisheye"));
+  const auto one =
+      run_panonav({"calibrate", arguments[1], "--profile", "dual-fisheye", "-o", out_ / "no.toml"});
+  EXPECT_EQ(one.exit_code, 1);
+  EXPECT_EQ(lines(one.err).size(), 1U) << one.err;
+  EXPECT_TRUE(contains(one.err, "uncertain"));
+  EXPECT_FALSE(fs::exists(out_ / "no.toml"));
 }
 
 TEST_F(CameraVerbs, UnwrapGivesTheCylinder) {

@@ -8,6 +8,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/io/trajectory_file.hpp"
 #include "support/temporary_folder.hpp"
+#include "support/test_cameras.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -47,13 +48,16 @@ TEST_F(CameraFiles, EveryModelReadsBackTheSame) {
     ++models;
   }
   EXPECT_EQ(models, 4);
+  const CameraFile dual{dual_fisheye_camera(), std::nullopt};
+  write_camera(path, dual);
+  EXPECT_EQ(read_camera(path).camera, dual.camera);
 }
 
 TEST_F(CameraFiles, FaultsNameFieldValueAndRange) {
   const fs::path path = folder / "camera.toml";
   write_camera(path, {mirror_camera(HyperboloidalModel{}), std::nullopt});
   std::ifstream in(path);
-  const std::string good((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  std::string good((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
   const auto with = [&](const std::string& from, const std::string& to) {
     std::string text = good;
     const auto at = text.find(from);
@@ -68,6 +72,15 @@ TEST_F(CameraFiles, FaultsNameFieldValueAndRange) {
   EXPECT_TRUE(contains(with("centre_u_px", ""), "centre_u_px is missing"));
   EXPECT_TRUE(contains(with("columns", "colums = \"clockwise\""), "colums is not a known field"));
   EXPECT_NE(error_of(folder / "no_such_camera.toml"), "no error");
+
+  write_camera(path, {dual_fisheye_camera(), std::nullopt});
+  std::ifstream dual(path);
+  good.assign((std::istreambuf_iterator<char>(dual)), std::istreambuf_iterator<char>());
+  EXPECT_TRUE(contains(with("lens1_gain", "lens1_gain = -1"), "lens1_gain is -1"));
+  EXPECT_TRUE(contains(with("lens0_k3", "lens0_k3 = nan"), "lens0_k3"));
+  EXPECT_TRUE(contains(with("lens0_centre_u_px", "lens0_centre_u_px = 500"), "0 .. 320"));
+  EXPECT_TRUE(contains(with("lens1_roll_rad", ""), "lens1_roll_rad is missing"));
+  EXPECT_TRUE(contains(with("baseline_m", "rim_radius_px = 3\nbaseline_m = 0"), "rim_radius_px"));
 }
 
 using TrajectoryFile = InTemporaryFolder;

@@ -260,6 +260,32 @@ TEST(Unwarper, EquirectangularCamerasWrapRound) {
   EXPECT_LT(worst, 0.005);
 }
 
+TEST(Unwarper, TwoLensesAreOnePictureWithoutASeam) {
+  const Camera camera = dual_fisheye_camera();
+  const auto world = [](double azimuth, double elevation) {  // smooth at the poles, too
+    return 0.5 + std::pow(std::cos(elevation), 4) * (smooth_world(azimuth, elevation) - 0.5);
+  };
+  const Image image = render(camera, world);
+  // Coarse, fine (each value a tap of the picture itself) and a band.
+  for (const UnwarperOptions& options :
+       {UnwarperOptions{.rows = 40, .columns = 128}, UnwarperOptions{.rows = 300, .columns = 1200},
+        UnwarperOptions{.rows = 30, .columns = 256, .elevations = ElevationBand{-0.6, 0.7}}}) {
+    const Unwarper unwarper(camera, options);
+    const Panorama view = unwarper.unwrap(image.view());
+    double worst = 0.0;
+    for (int y = 0; y < view.rows(); ++y) {
+      for (int c = 0; c < view.columns(); ++c) {
+        EXPECT_TRUE(unwarper.is_seen(y, c));
+        // As bright as the darker lens, whichever of them sees it.
+        const double expected = 0.85 * world(view.azimuth_rad(c), view.elevation_rad(y));
+        worst = std::max(worst, std::abs(view.at(y, c) - expected));
+      }
+    }
+    // One grey level of the picture, and seven bits of weights.
+    EXPECT_LT(worst, 0.012) << options.rows << " rows";
+  }
+}
+
 TEST(Unwarper, RefusesBadInput) {
   const Camera camera = mirror_camera();
   const Unwarper unwarper(camera, {.rows = 4, .columns = 16});

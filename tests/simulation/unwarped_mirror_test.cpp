@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <string>
@@ -48,20 +49,22 @@ struct Case {
 
 class UnwarpedMirror : public ::testing::TestWithParam<Case> {};
 
-TEST_P(UnwarpedMirror, AgreesWithThePanorama) {
-  const Scene scene = make_scene(GetParam().scene, {.seed = 3});
+/// `brightness`: of the camera's pictures.
+void expect_agreement(const Case& place, const Camera& camera, const UnwarperOptions& options,
+                      float brightness) {
+  const Scene scene = make_scene(place.scene, {.seed = 3});
   Executor executor(2);
   const Renderer renderer(scene, {.shadows = false});
-  const Viewpoint viewpoint{.pose = GetParam().pose, .height_m = scene.camera_height_m};
-  const Camera camera = simulated_mirror_camera();
-  const Unwarper unwarper(camera, {.rows = 80, .columns = 512});
+  const Viewpoint viewpoint{.pose = place.pose, .height_m = scene.camera_height_m};
+  const Unwarper unwarper(camera, options);
   const Panorama direct = renderer.render_panorama(
       viewpoint,
       {.rows = 80, .columns = 512, .elevations = unwarper.elevations(), .rays_per_axis = 3},
       executor);
   const Radiance rendered = renderer.render_image(viewpoint, camera, 2, executor);
   const Image image = to_image(rendered);
-  const Panorama unwarped = unwarper.unwrap(image.view());
+  Panorama unwarped = unwarper.unwrap(image.view());
+  for (float& value : unwarped.values()) value /= brightness;
 
   const auto reading = compass(compute_signature(unwarped, 64), compute_signature(direct, 64));
   ASSERT_TRUE(reading.has_value());
@@ -77,6 +80,18 @@ TEST_P(UnwarpedMirror, AgreesWithThePanorama) {
   }
   const double noise = mean_difference(apply_sensor(direct, {}, 1), direct);
   EXPECT_LT(mean_difference(unwarped, direct), 1.5 * noise);
+}
+
+TEST_P(UnwarpedMirror, AgreesWithThePanorama) {
+  expect_agreement(GetParam(), simulated_mirror_camera(), {}, 1.0F);
+}
+
+TEST_P(UnwarpedMirror, AndSoDoTwoLenses) {
+  const Camera camera = simulated_dual_fisheye(3);
+  const auto& lenses = std::get<DualFisheyeModel>(camera.model).lenses;
+  EXPECT_NE(lenses[0].gain, lenses[1].gain);
+  expect_agreement(GetParam(), camera, {.elevations = ElevationBand{-0.5, 0.7}},
+                   static_cast<float>(std::min(lenses[0].gain, lenses[1].gain)));
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, UnwarpedMirror,

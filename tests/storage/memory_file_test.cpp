@@ -10,6 +10,7 @@
 #include "panonav/core/error.hpp"
 #include "support/memory_samples.hpp"
 #include "support/temporary_folder.hpp"
+#include "support/test_cameras.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -36,6 +37,9 @@ TEST_F(MemoryFileContent, HeadersComeBack) {
     headers.back().source.camera->model = model;
     headers.back().source.mask.reset();
   }
+  headers.push_back(mirror_header());
+  headers.back().source.camera = dual_fisheye_camera();
+  headers.back().source.mask.reset();
   int number = 0;
   for (const MemoryHeader& header : headers) {
     const auto path = folder / ("m" + std::to_string(number++) + ".panonav");

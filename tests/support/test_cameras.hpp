@@ -23,14 +23,29 @@ inline Camera mirror_camera() {
   return camera;
 }
 
+/// Two lenses of 640 x 320 together, nothing of them alike: each 100 degrees to any side, turned by
+/// 90 degrees in the picture and one of them darker.
+inline Camera dual_fisheye_camera() {
+  Camera camera;
+  camera.image_size = {640, 320};
+  camera.model = DualFisheyeModel{
+      {FisheyeLens{158.7, 161.2, 88.0, 0.004, -0.001, radians(100), 0.02, 0.03, 1.6, 1.0},
+       FisheyeLens{482.1, 158.4, 87.0, 0.0, 0.001, radians(99), 3.13, -0.02, -1.55, 0.85}},
+      0.0};
+  return camera;
+}
+
 /// The image of a world whose grey level (0 .. 1) depends on the direction; black where the mirror
-/// ends. Each pixel is the mean of samples x samples points.
+/// ends; times the gain of a lens. Each pixel is the mean of samples x samples points.
 inline Image render(const Camera& camera, const std::function<double(double, double)>& world,
                     int samples = 2) {
   Image image(camera.image_size.width, camera.image_size.height);
+  const auto* const dual = std::get_if<DualFisheyeModel>(&camera.model);
   for (int v = 0; v < image.height(); ++v) {
     for (int u = 0; u < image.width(); ++u) {
       double sum = 0.0;
+      const int lens = lens_at(camera, {u + 0.5, v + 0.5});
+      const double gain = dual ? dual->lenses[static_cast<std::size_t>(lens)].gain : 1.0;
       for (int i = 0; i < samples; ++i) {
         for (int j = 0; j < samples; ++j) {
           const auto direction =
@@ -38,7 +53,8 @@ inline Image render(const Camera& camera, const std::function<double(double, dou
           if (direction) sum += world(direction->azimuth_rad(), direction->elevation_rad());
         }
       }
-      image.at(u, v) = static_cast<std::uint8_t>(std::lround(255.0 * sum / (samples * samples)));
+      image.at(u, v) =
+          static_cast<std::uint8_t>(std::lround(255.0 * gain * sum / (samples * samples)));
     }
   }
   return image;

@@ -1,10 +1,13 @@
+#include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <span>
 
 #include "cli/arguments.hpp"
 #include "cli/json.hpp"
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
+#include "panonav/camera/calibrate_dual_fisheye.hpp"
 #include "panonav/camera/find_mirror.hpp"
 #include "panonav/camera/mirror_camera.hpp"
 #include "panonav/camera/mirror_overlay.hpp"
@@ -36,7 +39,8 @@ struct MirrorOptions {
 void visit_options(MirrorOptions& options, OptionVisitor& visitor) {
   using T = MirrorOptions;
   constexpr OptionTable table{
-      choice<&T::profile>("Shape of the mirror", "equiangular", "hyperboloidal", "unified"),
+      choice<&T::profile>("Shape of the mirror, or two fisheye lenses side by side in one picture",
+                          "equiangular", "hyperboloidal", "unified", "dual-fisheye"),
       option<&T::inner_elevation_deg>("Elevation seen at the inner radius (equiangular)", -90, 90),
       option<&T::rim_elevation_deg>("Elevation seen at the mirror's rim", -90, 90),
       option<&T::mirror_a_mm>("a of the hyperboloid [Y03 eq. 1]", above(0)),
@@ -44,10 +48,41 @@ void visit_options(MirrorOptions& options, OptionVisitor& visitor) {
       option<&T::xi>("Mirror parameter of the unified model", 0, 10),
       choice<&T::direction>(
           "How a turn to the left runs in the picture: clockwise where the camera looks up into "
-          "the mirror, counter-clockwise where it looks down",
+          "the mirror, counter-clockwise where it looks down; dual-fisheye: counter-clockwise "
+          "where "
+          "the picture is mirrored",
           "clockwise", "counter-clockwise"),
       option<&T::forward_angle_deg>(
           "Where the robot's forward direction lies in the picture: 0 right, 90 up", -360, 360),
+  };
+  table.visit(options, visitor);
+}
+
+constexpr int dual_fisheye_profile = 3;
+
+/// What is known of a camera of two fisheye lenses.
+struct LensesOptions {
+  double left_roll_deg = 0.0;
+  double right_roll_deg = 0.0;
+  double left_azimuth_deg = 0.0;
+  double field_of_view_deg = 0.0;
+  double turn_deg = 0.0;
+};
+
+void visit_options(LensesOptions& options, OptionVisitor& visitor) {
+  using T = LensesOptions;
+  constexpr OptionTable table{
+      option<&T::left_roll_deg>(
+          "How what is above lies in the left circle: 0 at the top, 90 at its left, -90 right",
+          -360, 360),
+      option<&T::right_roll_deg>("The same of the right circle", -360, 360),
+      option<&T::left_azimuth_deg>(
+          "Where the left lens looks, counter-clockwise from the robot's forward direction", -360,
+          360),
+      option<&T::field_of_view_deg>("Field of view of each lens; 0: found, 185 to 220", 0, 300),
+      option<&T::turn_deg>(
+          "How far the camera was turned to the left from each picture to the next; 0: found", -360,
+          360),
   };
   table.visit(options, visitor);
 }
@@ -60,6 +95,7 @@ struct CalibrateArguments {
   std::optional<double> inner_radius_px;
   MirrorSearchOptions search;
   MirrorOptions mirror;
+  LensesOptions lenses;
 };
 
 /// The pictures of one input; how they lie is what is asked for. Of a long recording some, evenly
@@ -184,11 +220,91 @@ void print_text(const Arguments& arguments, const CalibrateArguments& wanted, bo
                   wanted.overlay ? "Next: look at " + *wanted.overlay + ", then" : "Next:");
 }
 
+/// The two circles, as draw_mirror draws one.
+Image draw_lenses(ImageView picture, const Camera& camera) {
+  const auto draw = [&camera](ImageView on, int lens) {
+    const ImageCircle circle = image_circle(camera, lens);
+    MirrorCircle drawn;
+    drawn.image_size = camera.image_size;
+    drawn.centre = circle.centre;
+    drawn.rim_radius_px = circle.rim_radius_px;
+    return draw_mirror(on, drawn);
+  };
+  const Image with_left = draw(picture, 0);
+  return draw(with_left.view(), 1);
+}
+
+ExitCode calibrate_lenses(const CalibrateArguments& wanted, const std::vector<std::string>& names,
+                          const std::vector<ImageView>& all, Session& session) {
+  // Of a turn in a video some, evenly spread: more cost time and memory, and tell little.
+  constexpr std::size_t max_pictures = 12;
+  const std::size_t count = std::min(all.size(), max_pictures);
+  std::vector<ImageView> views;
+  for (std::size_t i = 0; i < count; ++i) views.push_back(all[i * all.size() / count]);
+  if (wanted.lenses.turn_deg != 0 && all.size() > count) {
+    throw UsageError("--turn-deg is the same between up to 12 pictures; there are " +
+                     std::to_string(all.size()));
+  }
+  const LensesOptions& options = wanted.lenses;
+  DualFisheyeKnowledge known;
+  known.left_roll_rad = radians(options.left_roll_deg);
+  known.right_roll_rad = radians(options.right_roll_deg);
+  known.left_azimuth_rad = radians(options.left_azimuth_deg);
+  if (options.field_of_view_deg > 0) known.field_of_view_rad = radians(options.field_of_view_deg);
+  if (options.turn_deg != 0) known.turn_rad = radians(options.turn_deg);
+  if (wanted.mirror.direction != 0) known.direction = ColumnDirection::counter_clockwise;
+  const auto answer = calibrate_dual_fisheye(views, known, session.executor());
+  if (const auto* refusal = std::get_if<DualFisheyeRefusal>(&answer)) {
+    return session.no_answer("panonav calibrate: " + names.front() +
+                             (views.size() > 1 ? " and the others: " : ": ") + refusal->reason);
+  }
+  const auto& found = std::get<DualFisheyeCalibration>(answer);
+  if (wanted.overlay) {
+    const Image overlay = draw_lenses(views.front(), found.camera);
+    write_png(*wanted.overlay, overlay.view());
+  }
+  write_camera(wanted.out, {found.camera, std::nullopt});
+  const auto& lenses = std::get<DualFisheyeModel>(found.camera.model).lenses;
+  if (session.json()) {
+    ordered_json json{{"images", views.size()},
+                      {"width_px", found.camera.image_size.width},
+                      {"height_px", found.camera.image_size.height},
+                      {"matches", found.matches},
+                      {"inlier_share", found.inlier_share},
+                      {"residual_deg", degrees(found.residual_rad)},
+                      {"azimuth_deviation_deg", degrees(found.azimuth_deviation_rad)},
+                      {"field_of_view_deg", ordered_json::array()},
+                      {"turns_deg", ordered_json::array()},
+                      {"camera", wanted.out}};
+    for (const FisheyeLens& lens : lenses) {
+      json["field_of_view_deg"].push_back(degrees(2 * lens.max_angle_rad));
+    }
+    for (const double turn : found.turns_rad) json["turns_deg"].push_back(degrees(turn));
+    session.print(json_line(json));
+    return ExitCode::done;
+  }
+  session.print(session.strong("two lenses found") + ": " +
+                fixed(degrees(2 * lenses[0].max_angle_rad), 1) + " and " +
+                fixed(degrees(2 * lenses[1].max_angle_rad), 1) + " degrees, brightness 1 to " +
+                fixed(lenses[1].gain / lenses[0].gain, 2));
+  session.print(std::to_string(found.matches) + " patches found again, " +
+                fixed(100 * found.inlier_share, 0) + " % of those with structure, within " +
+                fixed(degrees(found.residual_rad), 3) + " degrees");
+  session.print("azimuths are uncertain by " + fixed(degrees(found.azimuth_deviation_rad), 3) +
+                " degrees (standard deviation, far things)");
+  session.suggest({"panonav", "unwrap", wanted.inputs.front(), "--camera", wanted.out,
+                   "--elevation-deg", "-40", "40", "-o", "panorama.png"});
+  return ExitCode::done;
+}
+
 ExitCode calibrate(const Arguments& arguments, const CalibrateArguments& wanted, Session& session) {
   std::vector<std::string> names;
   const auto images = read_images(wanted, names, session);
   std::vector<ImageView> views;
   for (const auto& image : images) views.push_back(image.view());
+  if (wanted.mirror.profile == dual_fisheye_profile) {
+    return calibrate_lenses(wanted, names, views, session);
+  }
   const auto mirror = find_mirror(views, wanted.search);
   if (!mirror) {
     return session.no_answer("panonav calibrate: no mirror found in " + names.front() +
@@ -218,7 +334,8 @@ ExitCode calibrate(const Arguments& arguments, const CalibrateArguments& wanted,
 Run declare_calibrate(Arguments& arguments) {
   auto wanted = std::make_shared<CalibrateArguments>();
   arguments.positionals("INPUT", wanted->inputs,
-                        "Raw images of one mirror camera; more are better. Or folders, videos or "
+                        "Raw images of one mirror camera, more are better; or of a camera of two "
+                        "fisheye lenses turned round at one place. Or folders, videos or "
                         "recordings of them, or - for JPEG pictures on standard input");
   declare_topics(arguments, wanted->pictures.topics);
   declare_part(arguments, wanted->pictures.part, true);
@@ -228,6 +345,7 @@ Run declare_calibrate(Arguments& arguments) {
   arguments.option("--inner-radius-px", wanted->inner_radius_px,
                    "Radius that the camera's own reflection covers, instead of the one found");
   arguments.options("mirror", wanted->mirror);
+  arguments.options("lenses", wanted->lenses);
   arguments.options("mirror_search", wanted->search);
   arguments.common({"--profile", "--inner-elevation-deg", "--rim-elevation-deg", "--direction",
                     "--forward-angle-deg"});
@@ -238,6 +356,10 @@ Run declare_calibrate(Arguments& arguments) {
   arguments.used_only({"--mirror-a-mm", "--mirror-b-mm"}, shaped(1),
                       "without --profile hyperboloidal");
   arguments.used_only({"--xi"}, shaped(2), "without --profile unified");
+  arguments.used_only({"[lenses]"}, shaped(dual_fisheye_profile), "without --profile dual-fisheye");
+  arguments.used_only(
+      {"--rim-elevation-deg", "--forward-angle-deg", "--inner-radius-px", "[mirror_search]"},
+      [shaped] { return !shaped(dual_fisheye_profile)(); }, "with --profile dual-fisheye");
   return [wanted, &arguments](Session& session) { return calibrate(arguments, *wanted, session); };
 }
 
@@ -245,10 +367,15 @@ Run declare_calibrate(Arguments& arguments) {
 
 Verb calibrate_verb() {
   return {
-      "calibrate", "Find centre, rim and inner radius of a mirror in raw images",
-      "The exit code is 1 when no image shows a mirror's rim. Look at the overlay before you trust "
-      "the file.",
-      "  panonav calibrate mirror1.jpg mirror2.jpg -o camera.toml --overlay overlay.png",
+      "calibrate", "Find a mirror, or the two lenses of a 360 degree camera, in raw images",
+      "The exit code is 1 when no image shows a mirror's rim, or the images do not determine two "
+      "lenses. Those are calibrated from one place with much around: three or four pictures, the "
+      "camera turned on its stand by about 90 degrees from each to the next. Look at the overlay "
+      "before you trust the file.",
+      "  panonav calibrate mirror1.jpg mirror2.jpg -o camera.toml --overlay overlay.png\n"
+      "  panonav calibrate turned?.jpg --profile dual-fisheye -o camera.toml\n"
+      "  panonav calibrate theta?.jpg --profile dual-fisheye --left-roll-deg 90 "
+      "--right-roll-deg -90 -o camera.toml",
       declare_calibrate};
 }
 

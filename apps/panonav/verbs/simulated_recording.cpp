@@ -180,11 +180,17 @@ void visit_options(SceneOptions& options, OptionVisitor& visitor) {
 void visit_options(SimulationOptions& options, OptionVisitor& visitor) {
   using T = SimulationOptions;
   constexpr OptionTable table{
-      choice<&T::kind>("what the camera writes", "mirror", "panorama"),
+      choice<&T::kind>("what the camera writes: dual-fisheye is the picture of a 360 degree camera "
+                       "before it is stitched",
+                       "mirror", "panorama", "dual-fisheye"),
       option<&T::rows>("rows of panoramas", 1, 4096),
       option<&T::columns>("columns of panoramas", 4, 16384),
       option<&T::elevation_low_deg>("lower edge of panoramas", -90, 90),
       option<&T::elevation_high_deg>("upper edge of panoramas", -90, 90),
+      option<&T::lens_seed>("seed of how the two lenses are misaligned and differ; 0: not at all",
+                            0),
+      option<&T::lens_distance_m>("distance of the two lenses, which gives near things a parallax",
+                                  0, 1),
       options_of<&T::scene>(),
   };
   table.visit(options, visitor);
@@ -203,7 +209,10 @@ void declare_simulation(Arguments& arguments, SimulationArguments& wanted) {
       {"--rows", "--columns", "--elevation-low-deg", "--elevation-high-deg"},
       [&simulation] { return simulation.kind == 1; }, "without --kind panorama");
   arguments.used_only(
-      {"--vignetting"}, [&simulation] { return simulation.kind == 0; }, "with --kind panorama");
+      {"--vignetting"}, [&simulation] { return simulation.kind != 1; }, "with --kind panorama");
+  arguments.used_only(
+      {"--lens-seed", "--lens-distance-m"}, [&simulation] { return simulation.kind == 2; },
+      "without --kind dual-fisheye");
 }
 
 void require_effects(Arguments& arguments, const SimulationArguments& wanted) {
@@ -255,6 +264,10 @@ SimulatedWorld SimulatedWorld::with(const RecordingOptions& recording, int seed)
 RecordingCamera SimulatedWorld::camera() const {
   const auto& simulation = wanted_.simulation;
   if (simulation.kind == 0) return wanted_.mirror.value_or(simulated_mirror_camera());
+  if (simulation.kind == 2) {
+    return simulated_dual_fisheye(static_cast<std::uint64_t>(simulation.lens_seed),
+                                  simulation.lens_distance_m);
+  }
   return PanoramaRendering{
       .rows = simulation.rows,
       .columns = simulation.columns,

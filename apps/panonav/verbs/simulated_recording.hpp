@@ -30,11 +30,13 @@ void visit_options(SceneOptions& options, OptionVisitor& visitor);
 
 /// The simulated camera and the scene.
 struct SimulationOptions {
-  int kind = 0;  ///< mirror, panorama
+  int kind = 0;  ///< mirror, panorama, dual-fisheye
   int rows = 80;
   int columns = 512;
   double elevation_low_deg = -30.0;
   double elevation_high_deg = 40.0;
+  int lens_seed = 1;  ///< see `simulated_dual_fisheye`
+  double lens_distance_m = 0.0;
   SceneOptions scene;
 };
 void visit_options(SimulationOptions& options, OptionVisitor& visitor);

@@ -50,6 +50,7 @@ std::optional<double> elevation_at(const Camera& camera, double radius_px) {
                                                 camera.rim_radius_px);
                  },
                  [](const EquirectangularModel&) -> std::optional<double> { return std::nullopt; },
+                 [](const DualFisheyeModel&) -> std::optional<double> { return std::nullopt; },
                  [&](const auto& model) { return panonav::elevation_at(model, *r); }},
       camera.model);
 }
@@ -64,6 +65,7 @@ std::optional<double> radius_at(const Camera& camera, double elevation_rad) {
                    return panonav::radius_at(model, elevation_rad, inner_px, rim_px);
                  },
                  [](const EquirectangularModel&) -> std::optional<double> { return std::nullopt; },
+                 [](const DualFisheyeModel&) -> std::optional<double> { return std::nullopt; },
                  [&](const PolynomialModel& model) {
                    return panonav::radius_at(model, elevation_rad,
                                              std::max(0.0, inner_px - slack_px), rim_px + slack_px);
@@ -102,6 +104,63 @@ void validate_mirror(const Camera& camera) {
           camera.rim_radius_px, "within the valid domain of the camera's model");
 }
 
+void validate_dual(const Camera& camera, const DualFisheyeModel& model) {
+  validate(model);
+  const auto [width, height] = camera.image_size;
+  for (int i = 0; i < 2; ++i) {
+    const FisheyeLens& lens = model.lenses[static_cast<std::size_t>(i)];
+    const double left = 0.5 * width * i;
+    const std::string name = "lens" + std::to_string(i);
+    require(lens.centre_u_px >= left && lens.centre_u_px <= left + 0.5 * width,
+            name + "_centre_u_px", lens.centre_u_px,
+            to_text(left) + " .. " + to_text(left + 0.5 * width));
+    require(lens.centre_v_px >= 0 && lens.centre_v_px <= height, name + "_centre_v_px",
+            lens.centre_v_px, "0 .. " + to_text(height));
+  }
+}
+
+/// How far right in the lens's picture lies right in the image as shown.
+double mirror_sign(const Camera& camera) {
+  return camera.direction == ColumnDirection::clockwise ? 1.0 : -1.0;
+}
+
+struct SeenByLens {
+  PixelPoint pixel;
+  double margin_rad = 0.0;
+};
+std::optional<SeenByLens> see(const Camera& camera, const DualFisheyeModel& model, int index,
+                              const Direction3& direction) {
+  const FisheyeLens& lens = model.lenses[static_cast<std::size_t>(index)];
+  const auto point = project(lens, LensRotation(lens).lens_from_robot(direction));
+  if (!point) return std::nullopt;
+  const auto pixel = within_image(camera, {lens.centre_u_px + mirror_sign(camera) * point->right_px,
+                                           lens.centre_v_px - point->up_px});
+  if (!pixel || lens_at(camera, *pixel) != index) return std::nullopt;
+  return SeenByLens{*pixel, point->margin_rad};
+}
+
+/// The band about the horizon in which no direction of a grid is missing, borders included.
+ElevationBand visible_elevations_of_lenses(const Camera& camera) {
+  constexpr int azimuths = 180;
+  constexpr int elevations = 90;
+  const auto all_round = [&](double elevation_rad) {
+    for (int i = 0; i < azimuths; ++i) {
+      const auto direction =
+          Direction3::from_angles(2 * std::numbers::pi * i / azimuths, elevation_rad);
+      if (!project(camera, direction)) return false;
+    }
+    return true;
+  };
+  require(all_round(0), "elevation seen at every azimuth", 0.0,
+          "seen by one of the lenses; max_angle_rad is too small or the frame cuts the circles");
+  const double step = std::numbers::pi / 2 / elevations;
+  ElevationBand band;
+  for (int i = 1; i <= elevations && all_round(i * step); ++i) band.top_rad = i * step;
+  for (int i = 1; i <= elevations && all_round(-i * step); ++i) band.bottom_rad = -i * step;
+  require(band.top_rad > band.bottom_rad, "elevations seen at every azimuth", 0.0, "a band");
+  return band;
+}
+
 void validate_equirectangular(const Camera& camera, const EquirectangularModel& model) {
   require(std::abs(model.elevation_bottom_rad) <= std::numbers::pi / 2, "elevation_bottom_rad",
           model.elevation_bottom_rad, "-pi/2 .. pi/2");
@@ -120,6 +179,8 @@ void validate(const Camera& camera) {
           "at least 1");
   if (const auto* model = std::get_if<EquirectangularModel>(&camera.model)) {
     validate_equirectangular(camera, *model);
+  } else if (const auto* dual = std::get_if<DualFisheyeModel>(&camera.model)) {
+    validate_dual(camera, *dual);
   } else {
     validate_mirror(camera);
   }
@@ -142,6 +203,11 @@ std::optional<PixelPoint> project(const Camera& camera, const Direction3& direct
     const double u_px = turns * width;
     return PixelPoint{u_px < width ? u_px : 0.0, *v};
   }
+  if (lens_count(camera) == 2) {
+    const auto [first, second] = project_all(camera, direction);
+    if (!first && !second) return std::nullopt;
+    return second && (!first || second->weight > first->weight) ? second->pixel : first->pixel;
+  }
   const auto radius_px = radius_at(camera, elevation_rad);
   if (!radius_px) return std::nullopt;
   const double angle_rad = camera.forward_angle_rad + turn_sign(camera) * azimuth_rad;
@@ -159,6 +225,13 @@ std::optional<Direction3> unproject(const Camera& camera, PixelPoint pixel) {
     const double turns = inside->u_px / camera.image_size.width - camera.forward_column;
     return Direction3::from_angles(turn_sign(camera) * turns * 2 * std::numbers::pi, elevation_rad);
   }
+  if (const auto* model = std::get_if<DualFisheyeModel>(&camera.model)) {
+    const FisheyeLens& lens = model->lenses[static_cast<std::size_t>(lens_at(camera, *inside))];
+    const auto in_lens = unproject(lens, mirror_sign(camera) * (inside->u_px - lens.centre_u_px),
+                                   lens.centre_v_px - inside->v_px);
+    if (!in_lens) return std::nullopt;
+    return LensRotation(lens).robot_from_lens(*in_lens);
+  }
   const double right_px = inside->u_px - camera.centre.u_px;
   const double up_px = camera.centre.v_px - inside->v_px;
   const auto elevation_rad = elevation_at(camera, std::hypot(right_px, up_px));
@@ -168,10 +241,41 @@ std::optional<Direction3> unproject(const Camera& camera, PixelPoint pixel) {
                                  *elevation_rad);
 }
 
+std::array<std::optional<WeightedPixel>, 2> project_all(const Camera& camera,
+                                                        const Direction3& direction) {
+  std::array<std::optional<WeightedPixel>, 2> result;
+  const auto* model = std::get_if<DualFisheyeModel>(&camera.model);
+  if (model == nullptr) {
+    if (const auto pixel = project(camera, direction)) result[0] = WeightedPixel{*pixel, 1.0};
+    return result;
+  }
+  const double length = std::hypot(direction.x, direction.y, direction.z);
+  if (!std::isfinite(length) || length == 0) return result;
+  const auto first = see(camera, *model, 0, direction);
+  const auto second = see(camera, *model, 1, direction);
+  const double share = !second  ? 1.0
+                       : !first ? 0.0
+                                : blend_share(first->margin_rad, second->margin_rad);
+  if (first) result[0] = WeightedPixel{first->pixel, share};
+  if (second) result[1] = WeightedPixel{second->pixel, 1.0 - share};
+  return result;
+}
+
+ImageCircle image_circle(const Camera& camera, int lens) {
+  if (std::holds_alternative<EquirectangularModel>(camera.model)) return {};
+  if (const auto* model = std::get_if<DualFisheyeModel>(&camera.model)) {
+    const FisheyeLens& seen_by = model->lenses[static_cast<std::size_t>(lens)];
+    return {
+        {seen_by.centre_u_px, seen_by.centre_v_px}, 0.0, radius_at(seen_by, seen_by.max_angle_rad)};
+  }
+  return {camera.centre, camera.inner_radius_px, camera.rim_radius_px};
+}
+
 ElevationBand visible_elevations(const Camera& camera) {
   if (const auto* model = std::get_if<EquirectangularModel>(&camera.model)) {
     return {model->elevation_bottom_rad, model->elevation_top_rad};
   }
+  if (lens_count(camera) == 2) return visible_elevations_of_lenses(camera);
   const auto [width, height] = camera.image_size;
   const double outer_px =
       std::min({camera.rim_radius_px, camera.centre.u_px, width - camera.centre.u_px,

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <array>
 #include <optional>
 #include <variant>
 
+#include "panonav/camera/dual_fisheye_model.hpp"
 #include "panonav/camera/equiangular_model.hpp"
 #include "panonav/camera/hyperboloidal_model.hpp"
 #include "panonav/camera/polynomial_model.hpp"
@@ -28,24 +30,25 @@ struct EquirectangularModel {
 };
 
 using CameraModel = std::variant<HyperboloidalModel, PolynomialModel, UnifiedModel,
-                                 EquiangularModel, EquirectangularModel>;
+                                 EquiangularModel, EquirectangularModel, DualFisheyeModel>;
 
 enum class ColumnDirection { clockwise, counter_clockwise };
 
 /// A camera that sees all azimuths: how its pixels and the directions in the robot frame belong
-/// together. The mirror's axis is vertical. Invariant checked by `validate(const Camera&)`; the
+/// together. The axis of a mirror is vertical. Invariant checked by `validate(const Camera&)`; the
 /// functions below expect a valid camera.
 struct Camera {
   CameraModel model;
   ImageSize image_size;
-  // Mirror cameras (all models but equirectangular):
+  // Mirror cameras (all models but equirectangular and dual fisheye):
   PixelPoint centre;             ///< inside the image
   double rim_radius_px = 0.0;    ///< nothing is seen beyond
   double inner_radius_px = 0.0;  ///< nothing is seen within (the camera's own reflection)
   /// How azimuth runs in the picture as it is shown (u right, v down). Equirectangular: clockwise
   /// means that the columns, left to right, follow a turn to the right seen from above. A camera
   /// that looks up, at a mirror or through a fisheye lens, sees the world from below: clockwise,
-  /// unless its driver mirrors the picture. So do most 360 degree pictures.
+  /// unless its driver mirrors the picture. So do most 360 degree pictures. Dual fisheye: clockwise
+  /// means that right in a lens's picture is right in the world, and not mirrored.
   ColumnDirection direction = ColumnDirection::clockwise;
   /// Mirror: image angle of the robot's forward direction, counter-clockwise as shown, from +u.
   double forward_angle_rad = 0.0;
@@ -69,14 +72,42 @@ void validate(const Camera& camera);
 /// The unit direction that a point of the image shows; empty outside the same domain.
 [[nodiscard]] std::optional<Direction3> unproject(const Camera& camera, PixelPoint pixel);
 
+/// Where a direction is seen, and how much it counts there in a blended picture.
+struct WeightedPixel {
+  PixelPoint pixel;
+  double weight = 1.0;  ///< shares of the lenses that see a direction; they add up to 1
+};
+/// As `project`, for each lens: two of a dual fisheye camera, in order, one of any other (the
+/// second is empty). `project` gives the one that counts most. See `blend_share`.
+[[nodiscard]] std::array<std::optional<WeightedPixel>, 2> project_all(const Camera& camera,
+                                                                      const Direction3& direction);
+[[nodiscard]] inline int lens_count(const Camera& camera) {
+  return std::holds_alternative<DualFisheyeModel>(camera.model) ? 2 : 1;
+}
+/// The lens of a dual fisheye camera in whose half of the picture a point lies; 0 of any other.
+[[nodiscard]] inline int lens_at(const Camera& camera, PixelPoint pixel) {
+  return lens_count(camera) == 2 && pixel.u_px >= 0.5 * camera.image_size.width ? 1 : 0;
+}
+
+/// What a mirror or a lens covers of the picture.
+struct ImageCircle {
+  PixelPoint centre;
+  double inner_radius_px = 0.0;
+  double rim_radius_px = 0.0;
+};
+/// Of the mirror, or of that lens of a dual fisheye camera. Of an equirectangular one: all zero.
+[[nodiscard]] ImageCircle image_circle(const Camera& camera, int lens);
+
 /// Lowest and highest elevation that is seen at every azimuth, in radians.
 struct ElevationBand {
   double bottom_rad = 0.0;
   double top_rad = 0.0;
   friend bool operator==(const ElevationBand&, const ElevationBand&) = default;
 };
-/// Where the frame cuts the mirror, the band ends where the cut begins. Throws ContractError when
-/// no elevation is seen at every azimuth (the frame cuts even the inner radius).
+/// Where the frame cuts the mirror, the band ends where the cut begins. Of a dual fisheye camera:
+/// the band about the horizon, to a degree (its lenses see the whole sphere where nothing is cut).
+/// Throws ContractError when no elevation is seen at every azimuth (the frame cuts even the inner
+/// radius, or lenses leave a gap at the horizon).
 [[nodiscard]] ElevationBand visible_elevations(const Camera& camera);
 
 }  // namespace panonav

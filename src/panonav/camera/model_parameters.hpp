@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <type_traits>
 #include <utility>
@@ -14,7 +15,7 @@ namespace panonav {
 
 /// The name of each alternative of CameraModel, in its order; files use these.
 inline constexpr std::array<std::string_view, std::variant_size_v<CameraModel>> camera_model_names{
-    "hyperboloidal", "polynomial", "unified", "equiangular", "equirectangular"};
+    "hyperboloidal", "polynomial", "unified", "equiangular", "equirectangular", "dual-fisheye"};
 
 [[nodiscard]] inline std::string_view model_name(const CameraModel& model) {
   return camera_model_names[model.index()];
@@ -50,10 +51,26 @@ void visit_parameters(Model& model, Visit&& visit) {
         } else if constexpr (std::is_same_v<Kind, EquiangularModel>) {
           visit("elevation_at_inner_rad", m.elevation_at_inner_rad);
           visit("elevation_at_rim_rad", m.elevation_at_rim_rad);
-        } else {
-          static_assert(std::is_same_v<Kind, EquirectangularModel>);
+        } else if constexpr (std::is_same_v<Kind, EquirectangularModel>) {
           visit("elevation_bottom_rad", m.elevation_bottom_rad);
           visit("elevation_top_rad", m.elevation_top_rad);
+        } else {
+          static_assert(std::is_same_v<Kind, DualFisheyeModel>);
+          for (std::size_t i = 0; i < m.lenses.size(); ++i) {
+            auto& lens = m.lenses[i];
+            const std::string name = "lens" + std::to_string(i) + "_";
+            visit(name + "centre_u_px", lens.centre_u_px);
+            visit(name + "centre_v_px", lens.centre_v_px);
+            visit(name + "focal_length_px", lens.focal_length_px);
+            visit(name + "k3", lens.k3);
+            visit(name + "k5", lens.k5);
+            visit(name + "max_angle_rad", lens.max_angle_rad);
+            visit(name + "azimuth_rad", lens.azimuth_rad);
+            visit(name + "elevation_rad", lens.elevation_rad);
+            visit(name + "roll_rad", lens.roll_rad);
+            visit(name + "gain", lens.gain);
+          }
+          visit("baseline_m", m.baseline_m);
         }
       },
       model);

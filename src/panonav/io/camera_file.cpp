@@ -52,7 +52,7 @@ CameraFile read_camera(const std::filesystem::path& path) {
   camera.image_size = {whole(fields, "width_px"), whole(fields, "height_px")};
   if (std::holds_alternative<EquirectangularModel>(camera.model)) {
     camera.forward_column = fields.number("forward_column").value_or(0.5);
-  } else {
+  } else if (lens_count(camera) == 1) {
     camera.centre = {fields.required_number("centre_u_px"), fields.required_number("centre_v_px")};
     camera.rim_radius_px = fields.required_number("rim_radius_px");
     camera.inner_radius_px = fields.required_number("inner_radius_px");
@@ -107,7 +107,7 @@ void write_camera(const std::filesystem::path& path, const CameraFile& file) {
   number("height_px", camera.image_size.height);
   if (std::holds_alternative<EquirectangularModel>(camera.model)) {
     number("forward_column", camera.forward_column);
-  } else {
+  } else if (lens_count(camera) == 1) {
     number("centre_u_px", camera.centre.u_px);
     number("centre_v_px", camera.centre.v_px);
     number("rim_radius_px", camera.rim_radius_px);

@@ -49,8 +49,13 @@ std::vector<std::uint8_t> values_hidden_by(ImageView mask, const Unwarper& unwar
   const Panorama share_seen = unwarper.unwrap(seen.view());
   std::vector<std::uint8_t> hidden;
   hidden.reserve(share_seen.values().size());
+  // Two lenses are made equally bright: what all pixels give is 1 for the darker one only.
+  std::ranges::fill(seen.pixels(), std::uint8_t{255});
+  const Panorama all = unwarper.unwrap(seen.view());
   // A thousandth is less than half a grey level of the picture.
-  for (const float share : share_seen.values()) hidden.push_back(share < 0.999F ? 1 : 0);
+  for (std::size_t i = 0; i < all.values().size(); ++i) {
+    hidden.push_back(share_seen.values()[i] < 0.999F * all.values()[i] ? 1 : 0);
+  }
   if (std::ranges::count(hidden, std::uint8_t{0}) == 0) {
     throw ContractError("mask", "hides everything", "something is seen");
   }

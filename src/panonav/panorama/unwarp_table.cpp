@@ -24,20 +24,20 @@ struct Tap {
   [[nodiscard]] bool is_seen() const { return u >= 0; }
 };
 
-/// Taps of one row: tap t of column c at t * columns + c.
+/// Taps of one row: tap t of column c at t * columns + c. With two lenses, the taps of both for one
+/// direction follow each other.
 using Taps = std::vector<Tap>;
 
-/// Four weights that add up to kernels::tap_weight_sum exactly; what rounding leaves goes where it
-/// cut off most.
-std::uint32_t pack_weights(double fraction_u, double fraction_v) {
+/// Four weights that add up to `sum` exactly; what rounding leaves goes where it cut off most.
+std::uint32_t pack_weights(double fraction_u, double fraction_v, int sum) {
   const std::array<double, 4> exact = {(1 - fraction_u) * (1 - fraction_v),
                                        (1 - fraction_u) * fraction_v, fraction_u * (1 - fraction_v),
                                        fraction_u * fraction_v};
   std::array<std::uint32_t, 4> weights{};
   std::array<double, 4> cut_off{};
-  int left = kernels::tap_weight_sum;
+  int left = sum;
   for (std::size_t i = 0; i < 4; ++i) {
-    const double scaled = exact[i] * kernels::tap_weight_sum;
+    const double scaled = exact[i] * sum;
     weights[i] = static_cast<std::uint32_t>(scaled);
     cut_off[i] = scaled - weights[i];
     left -= static_cast<int>(weights[i]);
@@ -62,7 +62,14 @@ class RowSampler {
         columns_(columns),
         top_rad_(band.top_rad),
         column_rad_(2.0 * std::numbers::pi / columns),
-        row_rad_((band.top_rad - band.bottom_rad) / rows) {}
+        row_rad_((band.top_rad - band.bottom_rad) / rows),
+        lenses_(lens_count(camera)) {
+    if (const auto* model = std::get_if<DualFisheyeModel>(&camera.model)) {
+      // Both lenses as bright as the darker one, so that no weight is above its share.
+      const double darker = std::min(model->lenses[0].gain, model->lenses[1].gain);
+      for (int i = 0; i < 2; ++i) brightness_[i] = darker / model->lenses[i].gain;
+    }
+  }
 
   [[nodiscard]] Taps sample(int row) const {
     const double elevation_rad = top_rad_ - row_rad_ * (row + 0.5);
@@ -99,12 +106,12 @@ class RowSampler {
 
   /// Distances from the centre at which all four pixels of a tap lie within the mirror, corners
   /// included. An inner radius of 0 is no border.
-  [[nodiscard]] RadiusRange usable_radii(double pixel) const {
+  [[nodiscard]] static RadiusRange usable_radii(const ImageCircle& circle, double pixel) {
     const double reach_px = 1.5 * std::numbers::sqrt2 * pixel;
-    const double inner_px = camera_.inner_radius_px;
-    const double middle_px = 0.5 * (inner_px + camera_.rim_radius_px);
+    const double inner_px = circle.inner_radius_px;
+    const double middle_px = 0.5 * (inner_px + circle.rim_radius_px);
     return {inner_px > 0.0 ? std::min(inner_px + reach_px, middle_px) : 0.0,
-            std::max(camera_.rim_radius_px - reach_px, middle_px)};
+            std::max(circle.rim_radius_px - reach_px, middle_px)};
   }
 
   /// Means over some azimuths; 0 where nothing is seen.
@@ -135,58 +142,88 @@ class RowSampler {
     const double pixel = 1 << level;
     const int across = std::max(1, static_cast<int>(std::lround(spacing.across_px / pixel)));
     const int down = std::max(1, static_cast<int>(std::lround(spacing.down_px / pixel)));
-    const int width = camera_.image_size.width >> level;
-    const int height = camera_.image_size.height >> level;
-    const RadiusRange range = usable_radii(pixel);
     Placement placement;
-    placement.taps.resize(static_cast<std::size_t>(across) * down * columns_);
+    placement.taps.resize(static_cast<std::size_t>(across) * down * lenses_ * columns_);
+    const std::array<ImageCircle, 2> circles{image_circle(camera_, 0),
+                                             image_circle(camera_, lenses_ - 1)};
     auto tap = placement.taps.begin();
     for (int i = 0; i < down; ++i) {
       const double tap_elevation_rad = elevation_rad + row_rad_ * (0.5 - (i + 0.5) / down);
-      for (int j = 0; j < across; ++j) {
-        for (int c = 0; c < columns_; ++c, ++tap) {
-          auto point = look(column_rad_ * (c + (j + 0.5) / across - 0.5), tap_elevation_rad);
-          if (!point) continue;
-          const double radius_px = distance_px(*point, camera_.centre);
-          const double usable_px = std::clamp(radius_px, range.low_px, range.high_px);
-          placement.crosses_border |= usable_px != radius_px;
-          if (usable_px != radius_px) {
-            const double inward = usable_px / radius_px;
-            point->u_px = camera_.centre.u_px + inward * (point->u_px - camera_.centre.u_px);
-            point->v_px = camera_.centre.v_px + inward * (point->v_px - camera_.centre.v_px);
+      for (int j = 0; j < across; ++j, tap += static_cast<std::ptrdiff_t>(lenses_) * columns_) {
+        for (int c = 0; c < columns_; ++c) {
+          const double azimuth_rad = column_rad_ * (c + (j + 0.5) / across - 0.5);
+          const auto points =
+              project_all(camera_, Direction3::from_angles(azimuth_rad, tap_elevation_rad));
+          // The sum over both lenses is what is rounded: equal shares add up to the whole.
+          double share = 0.0;
+          int given = 0;
+          for (int lens = 0; lens < lenses_; ++lens) {
+            if (!points[lens] || points[lens]->weight == 0.0) continue;
+            share += points[lens]->weight * brightness_[lens];
+            const int sum = static_cast<int>(std::lround(share * kernels::tap_weight_sum)) - given;
+            given += sum;
+            Tap& placed = tap[static_cast<std::ptrdiff_t>(lens) * columns_ + c];
+            placed =
+                tap_at(points[lens]->pixel, sum, circles[lens], level, placement.crosses_border);
           }
-          const double u = std::clamp(point->u_px / pixel - 0.5, 0.0, width - 1.0);
-          const double v = std::clamp(point->v_px / pixel - 0.5, 0.0, height - 1.0);
-          tap->level = level;
-          tap->u = std::min(static_cast<int>(u), width - 2);
-          tap->v = std::min(static_cast<int>(v), height - 2);
-          tap->weights = pack_weights(u - tap->u, v - tap->v);
+          if (lenses_ == 1) continue;
+          // What one lens shows alone costs the other a tap without weight.
+          Tap& first = tap[c];
+          Tap& second = tap[columns_ + c];
+          if (first.is_seen() == second.is_seen()) continue;
+          Tap& unseen = first.is_seen() ? second : first;
+          unseen = first.is_seen() ? first : second;
+          unseen.weights = 0;
         }
       }
     }
     return placement;
   }
 
+  [[nodiscard]] Tap tap_at(PixelPoint point, int sum, const ImageCircle& circle, int level,
+                           bool& crosses_border) const {
+    const double pixel = 1 << level;
+    const int width = camera_.image_size.width >> level;
+    const int height = camera_.image_size.height >> level;
+    const RadiusRange range = usable_radii(circle, pixel);
+    const double radius_px = distance_px(point, circle.centre);
+    const double usable_px = std::clamp(radius_px, range.low_px, range.high_px);
+    crosses_border |= usable_px != radius_px;
+    if (usable_px != radius_px) {
+      const double inward = usable_px / radius_px;
+      point.u_px = circle.centre.u_px + inward * (point.u_px - circle.centre.u_px);
+      point.v_px = circle.centre.v_px + inward * (point.v_px - circle.centre.v_px);
+    }
+    const double u = std::clamp(point.u_px / pixel - 0.5, 0.0, width - 1.0);
+    const double v = std::clamp(point.v_px / pixel - 0.5, 0.0, height - 1.0);
+    Tap tap;
+    tap.level = level;
+    tap.u = std::min(static_cast<int>(u), width - 2);
+    tap.v = std::min(static_cast<int>(v), height - 2);
+    tap.weights = pack_weights(u - tap.u, v - tap.v, sum);
+    return tap;
+  }
+
   const Camera& camera_;
   int columns_;
   double top_rad_, column_rad_, row_rad_;
+  int lenses_;
+  std::array<double, 2> brightness_{1.0, 1.0};
 };
 
-/// Values of which some taps are seen take those for the others. Returns which columns are seen.
-std::vector<std::uint8_t> complete_columns(Taps& taps, int columns) {
+/// Values of which some taps are seen take those for the others; taps of several lenses go
+/// together. Returns which columns are seen.
+std::vector<std::uint8_t> complete_columns(Taps& taps, int columns, int lenses) {
   std::vector<std::uint8_t> seen(static_cast<std::size_t>(columns), 0);
   const int count = static_cast<int>(taps.size()) / columns;
   for (int c = 0; c < columns; ++c) {
-    std::optional<Tap> instead;
-    for (int t = 0; t < count && !instead; ++t) {
-      const Tap& tap = taps[static_cast<std::size_t>(t) * columns + c];
-      if (tap.is_seen()) instead = tap;
-    }
-    if (!instead) continue;
+    const auto tap = [&](int t) -> Tap& { return taps[static_cast<std::size_t>(t) * columns + c]; };
+    int instead = 0;
+    while (instead < count && !tap(instead).is_seen()) instead += lenses;
+    if (instead == count) continue;
     seen[c] = 1;
     for (int t = 0; t < count; ++t) {
-      Tap& tap = taps[static_cast<std::size_t>(t) * columns + c];
-      if (!tap.is_seen()) tap = *instead;
+      if (!tap(t).is_seen()) tap(t) = tap(instead + t % lenses);
     }
   }
   return seen;
@@ -295,7 +332,7 @@ UnwarpTable make_unwarp_table(const Camera& camera, int rows, int columns,
   std::vector<std::vector<std::uint8_t>> seen;
   for (int y = 0; y < rows; ++y) {
     taps_of_rows.push_back(sampler.sample(y));
-    seen.push_back(complete_columns(taps_of_rows.back(), columns));
+    seen.push_back(complete_columns(taps_of_rows.back(), columns, lens_count(camera)));
   }
   fill_unseen(taps_of_rows, seen, columns);
 

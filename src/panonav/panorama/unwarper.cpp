@@ -111,7 +111,9 @@ void Unwarper::look_up(std::span<const std::uint16_t> pairs, int row,
                        std::span<float> values) const {
   const UnwarpTable::Row& entry = table_.rows[static_cast<std::size_t>(row)];
   const std::size_t count = static_cast<std::size_t>(entry.taps) * columns_;
-  const float scale = 1.0F / static_cast<float>(255 * kernels::tap_weight_sum * entry.taps);
+  // The taps of two lenses share the weight of one.
+  const int full_taps = entry.taps / lens_count(camera_);
+  const float scale = 1.0F / static_cast<float>(255 * kernels::tap_weight_sum * full_taps);
   kernels::remap(pairs, std::span(table_.positions).subspan(entry.first_entry, count),
                  std::span(table_.weights).subspan(entry.first_entry, count), entry.taps, scale,
                  values, kernels::chosen_instructions());

@@ -40,6 +40,9 @@ void visit_options(UnwarperOptions& options, OptionVisitor& visitor);
 /// are looked up at the nearest row seen in the same column, and columns in which nothing is seen
 /// at the nearest column: no edge appears that is not in the world.
 ///
+/// Pictures of a dual fisheye camera are blended across the seam (`blend_share`), the brighter lens
+/// made as dark as the other one.
+///
 /// Images of an equirectangular camera go through `panorama_from_picture`.
 ///
 /// Immutable after construction; several threads may use one at a time, each with its own

@@ -1,8 +1,11 @@
 #include "panonav/simulation/mirror.hpp"
 
 #include <cmath>
+#include <numbers>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/geometry/angles.hpp"
 
 namespace panonav {
 
@@ -88,6 +91,30 @@ Camera simulated_mirror_camera() {
   camera.centre = {320.0, 240.0};
   camera.rim_radius_px = 228.0;
   camera.inner_radius_px = 40.0;
+  return camera;
+}
+
+Camera simulated_dual_fisheye(std::uint64_t lens_seed, double baseline_m) {
+  Camera camera;
+  camera.image_size = {1280, 640};
+  DualFisheyeModel model;
+  model.baseline_m = baseline_m;
+  Random random(lens_seed);
+  const double size = lens_seed == 0 ? 0.0 : 1.0;
+  const auto error = [&](double largest) { return size * random.uniform(-largest, largest); };
+  for (int i = 0; i < 2; ++i) {
+    FisheyeLens& lens = model.lenses[static_cast<std::size_t>(i)];
+    lens.centre_u_px = 320.0 + 640.0 * i + error(5.0);
+    lens.centre_v_px = 320.0 + error(5.0);
+    lens.focal_length_px = 180.0 * (1.0 + error(0.025));
+    lens.k3 = error(0.01);
+    lens.k5 = error(0.002);
+    lens.azimuth_rad = std::numbers::pi * i + error(radians(2.0));
+    lens.elevation_rad = error(radians(2.0));
+    lens.roll_rad = error(radians(2.0));
+  }
+  model.lenses[random.index(2)].gain = 1.0 - std::abs(error(0.2));
+  camera.model = model;
   return camera;
 }
 

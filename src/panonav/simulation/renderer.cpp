@@ -297,10 +297,19 @@ Radiance Renderer::render_image(const Viewpoint& viewpoint, const Camera& camera
   // The angle between pixels varies little over a picture; the one at two thirds of the rim, about
   // the horizon, stands for all.
   const bool flat = std::holds_alternative<EquirectangularModel>(camera.model);
-  const double around_px =
-      flat ? camera.image_size.width : 2.0 * std::numbers::pi * camera.rim_radius_px * 2.0 / 3.0;
+  const auto* const dual = std::get_if<DualFisheyeModel>(&camera.model);
+  const double around_px = flat   ? camera.image_size.width
+                           : dual ? 2.0 * std::numbers::pi * dual->lenses[0].focal_length_px
+                                  : 2.0 * std::numbers::pi * camera.rim_radius_px * 2.0 / 3.0;
   const auto spread_rad = static_cast<float>(2.0 * std::numbers::pi / around_px / n);
   const RayMaker make_ray(viewpoint);
+
+  std::array<Vector3, 2> viewpoints{};
+  for (std::size_t i = 0; dual && i < 2; ++i) {
+    const double half_m = 0.5 * dual->baseline_m;
+    const Direction3 axis = LensRotation(dual->lenses[i]).robot_from_lens({1.0, 0.0, 0.0});
+    viewpoints[i] = {half_m * axis.x, half_m * axis.y, half_m * axis.z};
+  }
 
   const auto draw_rows = [&](std::size_t begin, std::size_t end, std::size_t) {
     std::vector<Ray> rays;
@@ -308,8 +317,11 @@ Radiance Renderer::render_image(const Viewpoint& viewpoint, const Camera& camera
     std::vector<RayHit> hits;
     std::array<float, 3> colour{};
     const auto add = [&](std::size_t pixel, const float* values) {
+      const PixelPoint at{static_cast<double>(pixel % width), 0.0};
+      const float share =
+          dual ? weight * static_cast<float>(dual->lenses[lens_at(camera, at)].gain) : weight;
       for (std::size_t c = 0; c < channels; ++c) {
-        image.values[pixel * channels + c] += weight * values[c];
+        image.values[pixel * channels + c] += share * values[c];
       }
     };
     for (std::size_t line = begin * n; line < end * n; ++line) {
@@ -322,7 +334,8 @@ Radiance Renderer::render_image(const Viewpoint& viewpoint, const Camera& camera
         const std::size_t pixel = line / n * width + i / n;
         if (!mirror) {
           if (const auto direction = unproject(camera, point)) {
-            rays.push_back(make_ray(*direction));
+            rays.push_back(dual ? make_ray(viewpoints[lens_at(camera, point)], *direction)
+                                : make_ray(*direction));
             pixel_of.push_back(pixel);
           }
           continue;

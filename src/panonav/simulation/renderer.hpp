@@ -83,7 +83,8 @@ class Renderer {
 
   /// What the camera sees. A hyperboloidal mirror is traced as the thing it is, with the camera's
   /// body in the middle and dark housing beyond the rim (see HyperboloidalMirror); every other
-  /// camera by `unproject`, 0 where it sees nothing. Throws ContractError unless the camera is
+  /// camera by `unproject`, 0 where it sees nothing; the lenses of a dual fisheye camera from their
+  /// own viewpoints, times their gain. Throws ContractError unless the camera is
   /// valid and rays_per_axis is 1 .. 8.
   [[nodiscard]] Radiance render_image(const Viewpoint& viewpoint, const Camera& camera,
                                       int rays_per_axis, Executor& executor) const;

@@ -132,7 +132,8 @@ Image apply_sensor(const Radiance& view, const Camera& camera, const SensorOptio
           "that of the camera's image");
   const Occluders occluders(options, seed);
   const ElevationBand band = visible_elevations(camera);
-  const bool has_rim = !std::holds_alternative<EquirectangularModel>(camera.model);
+  const std::array<ImageCircle, 2> circles{image_circle(camera, 0),
+                                           image_circle(camera, lens_count(camera) - 1)};
   // Directions cost time: they are looked up only if something depends on them.
   const bool directions = options.directional_light > 0.0 || !occluders.none();
   Pixel pixel(options, seed);
@@ -150,10 +151,11 @@ Image apply_sensor(const Radiance& view, const Camera& camera, const SensorOptio
         hidden = occluders.at(azimuth, (direction->elevation_rad() - band.bottom_rad) /
                                            (band.top_rad - band.bottom_rad));
       }
-      if (has_rim) {
+      const ImageCircle& circle = circles[static_cast<std::size_t>(lens_at(camera, point))];
+      if (circle.rim_radius_px > 0.0) {
         const double radius =
-            std::hypot(point.u_px - camera.centre.u_px, point.v_px - camera.centre.v_px) /
-            camera.rim_radius_px;
+            std::hypot(point.u_px - circle.centre.u_px, point.v_px - circle.centre.v_px) /
+            circle.rim_radius_px;
         factor *= 1.0 - options.vignetting * std::min(1.0, radius * radius);
       }
       for (int c = 0; c < view.channels; ++c, ++i) {
