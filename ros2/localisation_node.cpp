@@ -15,6 +15,8 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/pipeline/memoriser.hpp"
+#include "panonav/pipeline/named_view.hpp"
 #include "panonav/pipeline/run_messages.hpp"
 #include "ros2/motion_history.hpp"
 
@@ -46,6 +48,8 @@ void visit_options(LocalisationNodeOptions& options, OptionVisitor& visitor) {
       option<&T::transform_rate_hz>("how often the transform is sent", above(0), 1000),
       option<&T::use_sim_time>("time is what the topic /clock says"),
       option<&T::tilt_from_imu>("level pictures by the orientation on the topic imu"),
+      option<&T::command_timeout_s>("without a picture for so long a robot that is driven stops",
+                                    above(0), 60),
   };
   table.visit(options, visitor);
 }
@@ -103,7 +107,11 @@ struct LocalisationNode::Implementation {
         particles(participant, "~/particles"),
         references(participant, "~/references", {.depth = 1, .transient_local = true}),
         best_matches(participant, "~/best_match/compressed"),
-        diagnostics(participant, "/diagnostics") {
+        diagnostics(participant, "/diagnostics"),
+        velocities(participant, "cmd_vel", {.depth = 1}),
+        feedback(participant, "~/goal/feedback"),
+        results(participant, "~/goal/result"),
+        answers(participant, "~/command/result") {
     validate(options);
     publish_references();
     subscribe();
@@ -152,6 +160,13 @@ struct LocalisationNode::Implementation {
     listen<ros::PoseWithCovarianceStamped>(
         "initialpose", {},
         [this](const ros::PoseWithCovarianceStamped& pose, auto&&) { start_at(pose); });
+    listen<ros::PoseStamped>("goal_pose", {}, [this](const ros::PoseStamped& goal, auto&&) {
+      require_frame("goal_pose", goal.header.frame_id, setup.frames.map);
+      add_job([this, goal = ros::planar(goal.pose)] { go_to(goal); });
+    });
+    listen<ros::String>("~/command", {}, [this](const ros::String& message, auto&&) {
+      add_job([this, words = message.data] { answer(words); });
+    });
   }
 
   [[nodiscard]] std::string picture_topic() const {
@@ -315,6 +330,7 @@ struct LocalisationNode::Implementation {
       next = std::max(next + period, now);
       try {
         send_transform();
+        watch_command();
         if (now < next_watch) continue;
         next_watch = now + 1s;
         watch();
@@ -327,6 +343,7 @@ struct LocalisationNode::Implementation {
     }
     changed.notify_all();
     worker.join();
+    end_way("the node ends");
   }
 
   // What looks at pictures, on a thread of its own.
@@ -399,6 +416,8 @@ struct LocalisationNode::Implementation {
       const std::lock_guard lock(mutex);
       seen.tilt = tilt;
     }
+    seen.odometry = moved->path_from_base;
+    seen.stamp_s = 1e-9 * static_cast<double>(stamp_ns);
     tracker.move_to(moved->path_from_base);
     const PackedSignature view = tracker.encoder().packed(seen);
     const MonteCarloEstimate estimate = tracker.observe(view);
@@ -406,6 +425,8 @@ struct LocalisationNode::Implementation {
     RunMoment moment;
     describe(moment, estimate);
     const bool localised = moment.sure && estimate.pose;
+    last_pose = localised ? estimate.pose : std::nullopt;
+    drive(seen);
     if (localised) {
       const Pose2 corrected = *estimate.pose * inverse(moved->path_from_base);
       const std::lock_guard lock(mutex);
@@ -419,6 +440,7 @@ struct LocalisationNode::Implementation {
       }
       map_from_path = corrected;
     }
+    last_seen = std::move(seen);
     if (localised) poses.publish(pose_message(moment, stamp_ns, setup.frames.map));
     if (particles.subscribers() > 0) {
       moment.particles = even_sample(tracker.localiser().particles(), shown_particles);
@@ -442,6 +464,170 @@ struct LocalisationNode::Implementation {
     diagnostics.publish(diagnostics_message(moment, stamp_ns));
   }
 
+  // Ways to a goal, on the same thread.
+
+  /// There is one: no tracker is made of a memory without positions.
+  [[nodiscard]] ViewId nearest_view(Point2 place) const {
+    const VisualMemory& memory = tracker.memory();
+    std::optional<std::pair<double, ViewId>> nearest;
+    for (const ViewId view : memory.views()) {
+      const auto& pose = memory.info(view).pose;
+      if (!pose) continue;
+      const double off_m = distance(pose->position(), place);
+      if (!nearest || off_m < nearest->first) nearest.emplace(off_m, view);
+    }
+    return nearest.value().second;
+  }
+
+  void go_to(const Pose2& goal) {
+    end_way("another goal");
+    const std::string name = tracker.memory().info(nearest_view(goal.position())).name;
+    try {
+      if (navigator) {
+        navigator->set_goal(name);
+      } else {
+        navigator.emplace(setup.memory, name, setup.navigator);
+      }
+    } catch (const Error& error) {
+      results.publish(way_message(2, std::string("refused: ") + error.what(), {}));
+      throw;
+    }
+    const std::lock_guard lock(command_mutex);
+    driving = true;
+    last_command = Steady::now();
+  }
+
+  [[nodiscard]] ros::DiagnosticArray way_message(std::uint8_t level, const std::string& state,
+                                                 std::vector<ros::KeyValue> values) const {
+    return {{now_ns(), setup.frames.map},
+            {{level, "panonav: goal", readable_line(state), {}, std::move(values)}}};
+  }
+
+  /// The robot stands, and whoever sent it hears why. Nothing where it is not under way.
+  void end_way(const std::string& why, std::uint8_t level = 1) {
+    {
+      const std::lock_guard lock(command_mutex);
+      if (!driving) return;
+      driving = false;
+      velocities.publish({});
+    }
+    results.publish(way_message(level, why, {}));
+  }
+
+  void drive(const Observation& seen) {
+    if (!is_driving()) return;
+    RobotReport report;
+    if (last_pose) report.estimate = nearest_view(last_pose->position());
+    const NavigationStep step = navigator->step(seen, report);
+    const NavigationDecision& decision = step.decision;
+    if (decision.state != NavigationState::moving) {
+      end_way(std::string(name_of(decision.state)),
+              decision.state == NavigationState::arrived ? 0 : 2);
+      return;
+    }
+    {
+      const std::lock_guard lock(command_mutex);
+      velocities.publish({{step.velocity.forward_m_s, step.velocity.left_m_s, 0.0},
+                          {0.0, 0.0, step.velocity.turn_rad_s}});
+      last_command = Steady::now();
+    }
+    if (!step.decided) return;
+    feedback.publish(way_message(
+        0, std::string(name_of(decision.state)),
+        {{"way", fixed(decision.way, 3)},
+         {"probability", fixed(decision.probability, 4)},
+         {"nearest", decision.nearest ? navigator->info(*decision.nearest).name : std::string()}}));
+  }
+
+  [[nodiscard]] bool is_driving() const {
+    const std::lock_guard lock(command_mutex);
+    return driving;
+  }
+
+  /// The dead man's handle, on the thread of `run`: whatever holds up pictures, the robot stops.
+  void watch_command() {
+    const std::lock_guard lock(command_mutex);
+    if (!driving ||
+        Steady::now() - last_command < std::chrono::duration<double>(options.command_timeout_s)) {
+      return;
+    }
+    velocities.publish({});
+    last_command = Steady::now();
+    notes.say("command", "no picture for " + fixed(options.command_timeout_s, 2) +
+                             " s; the robot is stopped until one comes");
+  }
+
+  // What users ask for, on the thread that looks.
+
+  void answer(const std::string& words) {
+    const std::size_t blank = words.find(' ');
+    const std::string word = words.substr(0, blank);
+    const std::string rest = blank == std::string::npos ? "" : words.substr(blank + 1);
+    std::string said = word + " done";
+    try {
+      if (word == "relocalise") {
+        tracker.start_anywhere();
+      } else if (word == "cancel") {
+        end_way("cancelled");
+      } else if (word == "learn" && !rest.empty()) {
+        learn(rest);
+      } else if (word == "forget" && !rest.empty()) {
+        forget(rest);
+      } else if (word == "load" && !rest.empty()) {
+        load(rest);
+      } else {
+        throw ContractError("command", "'" + readable_line(shortened(words, 80)) + "'",
+                            "relocalise, cancel, learn NAME, forget NAME, load FILE");
+      }
+    } catch (const Error& error) {
+      said = "refused: " + readable_line(error.what());
+    }
+    answers.publish({said});
+  }
+
+  void learn(const std::string& name) {
+    if (!last_seen || !last_pose) {
+      throw Error("the robot is not localised, so a view of this place has no position");
+    }
+    last_seen->pose = ReferencePose{last_pose->x_m, last_pose->y_m, last_pose->heading_rad};
+    Memoriser memoriser(setup.memory, {.source = setup.tracker.source});
+    last_seen->name = name;
+    memoriser.add(*last_seen);
+    memoriser.finish();
+    reload(setup.memory, last_pose);
+  }
+
+  void forget(const std::string& name) {
+    MemoryFile writable = MemoryFile::open(setup.memory, Access::read_write);
+    const ViewId view = named_view(writable, name);
+    writable.remove({&view, 1});
+    reload(setup.memory, last_pose);
+  }
+
+  void load(const std::string& path) {
+    reload(path, std::nullopt);
+    const std::lock_guard lock(mutex);
+    map_from_path.reset();  // of the other memory's frame
+  }
+
+  /// The memory that counts until now stays if this throws.
+  void reload(const std::filesystem::path& path, const std::optional<Pose2> here) {
+    MemoryFile opened = MemoryFile::open(path, Access::read_only);
+    Tracker made(opened, setup.tracker);
+    end_way("another memory");
+    navigator.reset();
+    file = std::move(opened);
+    tracker = std::move(made);
+    setup.memory = path;
+    last_seen.reset();
+    last_pose.reset();
+    if (here) {
+      const double spacing_m = tracker.localiser().model().spacing_m;
+      tracker.start_at(*here, 0.5 * spacing_m, 0.1);
+    }
+    publish_references();
+  }
+
   void publish_references() {
     PointValues cloud;
     for (const ViewId view : tracker.memory().views()) {
@@ -463,6 +649,12 @@ struct LocalisationNode::Implementation {
   Publisher<ros::PointCloud2> references;
   Publisher<ros::CompressedImage> best_matches;
   Publisher<ros::DiagnosticArray> diagnostics;
+  Publisher<ros::Twist> velocities;
+  Publisher<ros::DiagnosticArray> feedback, results;
+  Publisher<ros::String> answers;
+  std::optional<RobotNavigator> navigator;  // of the thread that looks, as the next
+  std::optional<Observation> last_seen;
+  std::optional<Pose2> last_pose;  // where it was seen; empty: not localised then
   std::atomic<bool> stopped = false;
   std::atomic<std::int64_t> sim_ns = 0;
   FrameTree frames;  // of the thread of `run`, as the next two
@@ -479,6 +671,10 @@ struct LocalisationNode::Implementation {
   std::optional<Bytes> picture;  // the newest
   std::deque<Job> jobs;
   Counts counts;
+
+  mutable std::mutex command_mutex;  // of these, and of the order of velocities
+  bool driving = false;
+  Steady::time_point last_command;
 };
 
 LocalisationNode::LocalisationNode(const LocalisationNodeSetup& setup, RareNotes::Note note)

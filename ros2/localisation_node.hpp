@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "panonav/core/options.hpp"
+#include "panonav/pipeline/robot_navigator.hpp"
 #include "panonav/pipeline/tracker.hpp"
 #include "ros2/participant.hpp"
 
@@ -26,6 +27,7 @@ struct LocalisationNodeOptions {
   double transform_rate_hz = 50.0;
   bool use_sim_time = false;
   bool tilt_from_imu = false;
+  double command_timeout_s = 0.5;
 };
 void visit_options(LocalisationNodeOptions& options, OptionVisitor& visitor);
 
@@ -42,6 +44,7 @@ struct LocalisationNodeSetup {
   FrameNames frames;
   LocalisationNodeOptions node;
   TrackerOptions tracker;
+  RobotNavigatorOptions navigator;  ///< of ways to a goal
 };
 
 /// Says lines, at most one of a kind in ten seconds, with how often it would have been said.
@@ -62,8 +65,9 @@ class RareNotes {
 
 /// Localises a robot for ROS 2 by its pictures and odometry and a memory (`Tracker`), as AMCL does
 /// by laser scans: the transform from map to odom, which a picture corrects and odometry carries on
-/// meanwhile, pose, particles, references, best match and diagnostics (docs/ros2.md has the
-/// topics). One thread takes and sends messages, another one looks at pictures, always the newest.
+/// meanwhile, pose, particles, references, best match and diagnostics. Sent to a goal, it drives
+/// the robot to the remembered view next to it (`RobotNavigator`). docs/ros2.md has the topics. One
+/// thread takes and sends messages, another one looks at pictures, always the newest.
 class LocalisationNode {
  public:
   /// `note` hears warnings, a line each, from any thread. Throws as `Tracker` and `Participant`.

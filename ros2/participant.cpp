@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <memory>
+#include <mutex>
 #include <utility>
 #include <vector>
 
@@ -103,6 +105,47 @@ class CdrWriter {
   std::vector<std::uint8_t> bytes{0, 1, 0, 0};
 };
 
+/// What a process tells DDS of a domain holds for all its participants in it.
+class Domain {
+ public:
+  Domain(int number, const std::optional<bool>& localhost_only) {
+    const bool local = localhost_only.value_or(environment("ROS_LOCALHOST_ONLY") == "1");
+    const std::string alone =
+        "<General><Interfaces><NetworkInterface address=\"127.0.0.1\"/></Interfaces></General>"
+        "<Discovery><ParticipantIndex>auto</ParticipantIndex>"
+        "<Peers><Peer address=\"127.0.0.1\"/></Peers></Discovery>";
+    std::string configuration = "<CycloneDDS><Domain>" + (local ? alone : std::string()) +
+                                "<Discovery><MaxAutoParticipantIndex>64</MaxAutoParticipantIndex>"
+                                "</Discovery></Domain></CycloneDDS>";
+    const std::string of_user = environment("CYCLONEDDS_URI");
+    if (!of_user.empty()) configuration += "," + of_user;
+    entity_ = dds_create_domain(static_cast<dds_domainid_t>(number), configuration.c_str());
+    if (entity_ < 0) {
+      throw Error("DDS: domain " + std::to_string(number) +
+                  " cannot begin; allowed: a network interface that is up, and a CYCLONEDDS_URI "
+                  "that Cyclone DDS understands");
+    }
+  }
+  ~Domain() { dds_delete(entity_); }
+  Domain(const Domain&) = delete;
+  Domain& operator=(const Domain&) = delete;
+
+ private:
+  dds_entity_t entity_ = 0;
+};
+
+std::shared_ptr<const Domain> domain_in_use(int number, const std::optional<bool>& localhost_only) {
+  static std::mutex mutex;
+  static std::map<int, std::weak_ptr<const Domain>> domains;
+  const std::lock_guard lock(mutex);
+  auto domain = domains[number].lock();
+  if (!domain) {
+    domain = std::make_shared<const Domain>(number, localhost_only);
+    domains[number] = domain;
+  }
+  return domain;
+}
+
 }  // namespace
 
 std::string full_name(std::string_view name, const ParticipantOptions& options) {
@@ -150,22 +193,7 @@ struct Participant::Implementation {
       : options(wanted), note(std::move(hears)) {
     (void)full_name("~/name", options);  // node and namespace are names
     const int number = domain_of(options);
-    const bool local = options.localhost_only.value_or(environment("ROS_LOCALHOST_ONLY") == "1");
-    const std::string alone =
-        "<General><Interfaces><NetworkInterface address=\"127.0.0.1\"/></Interfaces></General>"
-        "<Discovery><ParticipantIndex>auto</ParticipantIndex>"
-        "<Peers><Peer address=\"127.0.0.1\"/></Peers></Discovery>";
-    std::string configuration = "<CycloneDDS><Domain>" + (local ? alone : std::string()) +
-                                "<Discovery><MaxAutoParticipantIndex>64</MaxAutoParticipantIndex>"
-                                "</Discovery></Domain></CycloneDDS>";
-    const std::string of_user = environment("CYCLONEDDS_URI");
-    if (!of_user.empty()) configuration += "," + of_user;
-    domain = dds_create_domain(static_cast<dds_domainid_t>(number), configuration.c_str());
-    if (domain < 0 && domain != DDS_RETCODE_PRECONDITION_NOT_MET) {
-      throw Error("DDS: domain " + std::to_string(number) +
-                  " cannot begin; allowed: a network interface that is up, and a CYCLONEDDS_URI "
-                  "that Cyclone DDS understands");
-    }
+    domain = domain_in_use(number, options.localhost_only);
     const DdsQos qos(dds_create_qos());
     const std::string enclave = "enclave=/;";
     dds_qset_userdata(qos.get(), enclave.data(), enclave.size());
@@ -189,7 +217,6 @@ struct Participant::Implementation {
 
   void end() const {
     if (participant > 0) dds_delete(participant);
-    if (domain > 0) dds_delete(domain);
   }
 
   [[nodiscard]] dds_entity_t topic_of(const std::string& name, std::string_view type) const {
@@ -277,7 +304,7 @@ struct Participant::Implementation {
 
   ParticipantOptions options;
   Note note;
-  dds_entity_t domain = 0;
+  std::shared_ptr<const Domain> domain;
   dds_entity_t participant = 0;
   dds_entity_t waitset = 0;
   dds_entity_t guard = 0;

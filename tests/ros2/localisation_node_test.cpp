@@ -11,6 +11,7 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/pipeline/memoriser.hpp"
+#include "ros2/simulated_robot.hpp"
 #include "support/fast_peer.hpp"
 #include "support/remembered_worlds.hpp"
 #include "support/temporary_folder.hpp"
@@ -355,6 +356,153 @@ TEST_F(LocalisationNodeOnTheWire, AFloodOfMessagesLeavesItLocalisedWithinItsMemo
   ASSERT_TRUE(comes_true([&] { return node_->counts().localised >= 3; }));
   EXPECT_GT(node_->counts().dropped, 0U);
   EXPECT_LT(resident_pages(), before + (64U << 20U) / 4096U);
+}
+
+/// In the first of the two rooms, at twice the speed of life.
+class DrivenRobot {
+ public:
+  explicit DrivenRobot(const testing::ToyWorld& world,
+                       std::function<Image(const Pose2& pose)> picture)
+      : robot_({.node = "robot"}, {.time_factor = 2.0},
+               {{0.8, 0.8, 0.3},
+                [&world](Point2 place) { return testing::robot_fits(world, place); },
+                [picture](const Pose2& pose, std::uint64_t) { return picture(pose); }},
+               {}, 1, [](const std::string& line) { ADD_FAILURE() << line; }),
+        thread_([this] { robot_.run(); }) {}
+  ~DrivenRobot() {
+    robot_.stop();
+    thread_.join();
+  }
+
+ private:
+  SimulatedRobot robot_;
+  std::thread thread_;
+};
+
+TEST_F(LocalisationNodeOnTheWire, DrivesASimulatedRobotToAGoalFindsItKidnappedAndStopsIt) {
+  auto& goal = peer_.talk("rt/goal_pose", "geometry_msgs::msg::dds_::PoseStamped_");
+  auto& set_pose = peer_.talk("rt/set_pose", "geometry_msgs::msg::dds_::PoseStamped_");
+  auto& result =
+      peer_.listen("rt/panonav/goal/result", "diagnostic_msgs::msg::dds_::DiagnosticArray_");
+  auto& feedback =
+      peer_.listen("rt/panonav/goal/feedback", "diagnostic_msgs::msg::dds_::DiagnosticArray_");
+  auto& velocity = peer_.listen("rt/cmd_vel", "geometry_msgs::msg::dds_::Twist_");
+  auto& truth = peer_.listen("rt/ground_truth", "geometry_msgs::msg::dds_::PoseStamped_", false);
+  std::optional<DrivenRobot> robot;
+  robot.emplace(world_, picture);
+  start({.use_sim_time = true});
+  for (auto* each : {&goal, &set_pose, &result, &feedback, &velocity, &truth}) {
+    ASSERT_TRUE(FastPeer::matched(*each, 10s));
+  }
+  const auto robot_is = [&] {
+    FastPeer::Bytes last;
+    while (FastPeer::waiting(truth) > 0) last = FastPeer::next(truth, 1s);
+    if (last.empty()) last = FastPeer::next(truth, 10s);
+    return ros::planar(read<ros::PoseStamped>(last).pose);
+  };
+  const auto state_of = [](const FastPeer::Bytes& cdr) {
+    return cdr.empty() ? std::string("nothing")
+                       : read<ros::DiagnosticArray>(cdr).status.at(0).message;
+  };
+  ASSERT_TRUE(comes_true([&] { return node_->counts().localised >= 3; }));
+
+  // Who writes before both sides know of each other may have to say it again.
+  const auto send_to = [&](Point2 place) {
+    for (int i = 0; i < 10; ++i) {
+      FastPeer::write(goal, ros::write_message(ros::PoseStamped{
+                                {0, "map"}, ros::pose_of({place.x_m, place.y_m, 0.0})}));
+      const auto told = FastPeer::next(feedback, 5s);
+      if (!told.empty()) return state_of(told);
+    }
+    return std::string("nothing");
+  };
+  const Point2 there{2.8, 2.8};
+  EXPECT_EQ(send_to(there), "moving");
+  EXPECT_EQ(state_of(FastPeer::next(result, 60s)), "arrived");
+  EXPECT_LT(distance(robot_is().position(), there), 0.3);
+
+  Point2 elsewhere{5.2, 2.0};
+  while (world_.clearance_m(elsewhere) < 0.5) elsewhere.x_m += 0.1;
+  // Carried to the other room, it is found there, and sent back it comes.
+  const std::size_t before = node_->counts().pictures;
+  FastPeer::write(set_pose, ros::write_message(ros::PoseStamped{
+                                {0, "map"}, ros::pose_of({elsewhere.x_m, elsewhere.y_m, 2.0})}));
+  auto& pose =
+      peer_.listen("rt/panonav/pose", "geometry_msgs::msg::dds_::PoseWithCovarianceStamped_");
+  EXPECT_TRUE(comes_true([&] {
+    const auto told = FastPeer::next(pose, 1s);
+    return !told.empty() && node_->counts().pictures > before &&
+           distance(ros::planar(read<ros::PoseWithCovarianceStamped>(told).pose.pose).position(),
+                    elsewhere) < 0.3;
+  }));
+
+  // Its pictures end in the middle of the way: so does its motion.
+  while (FastPeer::waiting(velocity) > 0) (void)FastPeer::next(velocity, 1s);
+  while (FastPeer::waiting(feedback) > 0) (void)FastPeer::next(feedback, 1s);
+  EXPECT_EQ(send_to({elsewhere.x_m + 1.5, elsewhere.y_m}), "moving");
+  bool moved = false;
+  for (int i = 0; i < 200 && !moved; ++i) {
+    const auto cdr = FastPeer::next(velocity, 5s);
+    ASSERT_FALSE(cdr.empty()) << state_of(FastPeer::next(result, 100ms));
+    const auto twist = read<ros::Twist>(cdr);
+    moved = twist.linear.x != 0.0 || twist.angular.z != 0.0;
+  }
+  EXPECT_TRUE(moved);
+  robot.reset();
+  bool stands = false;
+  for (int i = 0; i < 200 && !stands; ++i) {
+    const auto cdr = FastPeer::next(velocity, 5s);
+    ASSERT_FALSE(cdr.empty());
+    const auto twist = read<ros::Twist>(cdr);
+    stands = twist.linear.x == 0.0 && twist.angular.z == 0.0;
+  }
+  EXPECT_TRUE(stands);
+  EXPECT_TRUE(comes_true([&] { return notes_with("the robot is stopped") == 1; }));
+  stop();
+  EXPECT_EQ(state_of(FastPeer::next(result, 5s)), "the node ends");
+}
+
+TEST_F(LocalisationNodeOnTheWire, DoesWhatUsersAskForAndSaysSo) {
+  auto& command = peer_.talk("rt/panonav/command", "std_msgs::msg::dds_::String_");
+  auto& answer = peer_.listen("rt/panonav/command/result", "std_msgs::msg::dds_::String_");
+  auto& odom = peer_.talk("rt/odom", "nav_msgs::msg::dds_::Odometry_");
+  auto& image = peer_.talk("rt/image", "sensor_msgs::msg::dds_::Image_");
+  const fs::path own = *folder_ / "own.panonav";
+  fs::copy_file(memory(), own);
+  start();
+  for (auto* each : {&command, &answer, &odom, &image}) {
+    ASSERT_TRUE(FastPeer::matched(*each, 10s));
+  }
+  const auto ask = [&](const std::string& words) {
+    for (int i = 0; i < 5;
+         ++i) {  // what is written before both sides know of each other may be lost
+      FastPeer::write(command, ros::write_message(ros::String{words}));
+      const auto cdr = FastPeer::next(answer, 5s);
+      if (!cdr.empty()) return read<ros::String>(cdr).data;
+    }
+    return std::string("nothing");
+  };
+  EXPECT_EQ(ask("dance").find("refused: command is 'dance'; allowed: relocalise, "), 0U);
+  EXPECT_NE(ask("learn here").find("refused: the robot is not localised"), std::string::npos);
+  EXPECT_NE(ask("load /nowhere.panonav").find("refused: /nowhere.panonav"), std::string::npos);
+  EXPECT_EQ(ask("load " + own.string()), "load done");
+  const auto see = [&](std::int64_t ns, const Pose2& pose) {
+    FastPeer::write(image, image_message(ns, picture(pose)));
+  };
+  drive(odom, see);
+  ASSERT_TRUE(comes_true([&] { return node_->counts().localised >= 5; }));
+  EXPECT_EQ(ask("learn corner"), "learn done");
+  {
+    const auto file = MemoryFile::open(own, Access::read_only);
+    ASSERT_TRUE(file.find("corner"));
+    EXPECT_TRUE(file.load().info(*file.find("corner")).pose);
+  }
+  EXPECT_EQ(ask("forget corner"), "forget done");
+  EXPECT_FALSE(MemoryFile::open(own, Access::read_only).find("corner"));
+  EXPECT_EQ(ask("relocalise"), "relocalise done");
+  const std::size_t localised = node_->counts().localised;
+  drive(odom, see);
+  EXPECT_TRUE(comes_true([&] { return node_->counts().localised > localised; }));
 }
 
 }  // namespace

@@ -1,18 +1,14 @@
 #include "verbs/live_run.hpp"
 
-#include <fcntl.h>
-#include <unistd.h>
-
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
-#include <csignal>
 #include <deque>
 #include <mutex>
 #include <thread>
 #include <utility>
 
+#include "cli/stop_signals.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/core/text.hpp"
@@ -20,51 +16,6 @@
 namespace panonav::command {
 
 namespace {
-
-volatile std::sig_atomic_t signal_pipe = -1;  // what a handler may use is static
-
-/// Calls `stop` on another thread when the user or the system asks the program to end; a second
-/// time ends it at once.
-class StopSignals {
- public:
-  explicit StopSignals(std::function<void()> stop) : stop_(std::move(stop)) {
-    if (pipe2(pipe_.data(), O_CLOEXEC) != 0) throw Error("no pipe can be made");
-    signal_pipe = pipe_[1];
-    struct sigaction action {};
-    action.sa_handler = [](int) {
-      const char asked = 's';
-      (void)!write(signal_pipe, &asked, 1);
-    };
-    action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
-    sigaction(SIGINT, &action, &interrupt_);
-    sigaction(SIGTERM, &action, &terminate_);
-    waiting_ = std::thread([this] {
-      char asked = 0;
-      while (read(pipe_[0], &asked, 1) < 0) {
-      }
-      if (asked == 's') stop_();
-    });
-  }
-  ~StopSignals() {
-    sigaction(SIGINT, &interrupt_, nullptr);
-    sigaction(SIGTERM, &terminate_, nullptr);
-    const char over = 'o';
-    (void)!write(pipe_[1], &over, 1);
-    waiting_.join();
-    signal_pipe = -1;
-    close(pipe_[0]);
-    close(pipe_[1]);
-  }
-  StopSignals(const StopSignals&) = delete;
-  StopSignals& operator=(const StopSignals&) = delete;
-
- private:
-  std::function<void()> stop_;
-  std::array<int, 2> pipe_{-1, -1};
-  struct sigaction interrupt_ {};
-  struct sigaction terminate_ {};
-  std::thread waiting_;
-};
 
 /// Prints lines on a thread of its own. A reader that is slow does not hold up the robot: beyond
 /// `max_waiting` lines the oldest are left out and counted.

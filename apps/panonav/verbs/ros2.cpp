@@ -1,12 +1,9 @@
-#include <csignal>
-#include <ctime>
-
 #include <atomic>
 #include <memory>
-#include <thread>
 
 #include "cli/arguments.hpp"
 #include "cli/session.hpp"
+#include "cli/stop_signals.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
@@ -27,51 +24,26 @@ struct Ros2Arguments {
   ros2::LocalisationNodeSetup setup;
 };
 
-/// Calls `stop` once when the user or the system asks the program to end. To be made before other
-/// threads are: they leave the signals to it.
-class StopOnSignal {
- public:
-  explicit StopOnSignal(std::function<void()> stop) {
-    sigemptyset(&signals_);
-    sigaddset(&signals_, SIGINT);
-    sigaddset(&signals_, SIGTERM);
-    pthread_sigmask(SIG_BLOCK, &signals_, &before_);
-    waiting_ = std::thread([this, stop = std::move(stop)] {
-      const timespec little{0, 50'000'000};
-      while (!over_) {
-        if (sigtimedwait(&signals_, nullptr, &little) > 0) return stop();
-      }
-    });
+std::map<std::string, std::string> remappings_of(const std::vector<std::string>& words) {
+  std::map<std::string, std::string> remappings;
+  for (const std::string& text : words) {
+    const std::size_t at = text.find(":=");
+    if (at == 0 || at == std::string::npos || at + 2 == text.size()) {
+      throw UsageError("'" + readable_line(text) +
+                       "' is no remapping; allowed: FROM:=TO, as image:=/camera/image");
+    }
+    remappings.insert_or_assign(text.substr(0, at), text.substr(at + 2));
   }
-  ~StopOnSignal() {
-    over_ = true;
-    waiting_.join();
-    pthread_sigmask(SIG_SETMASK, &before_, nullptr);
-  }
-  StopOnSignal(const StopOnSignal&) = delete;
-  StopOnSignal& operator=(const StopOnSignal&) = delete;
-
- private:
-  sigset_t signals_{};
-  sigset_t before_{};
-  std::atomic<bool> over_ = false;
-  std::thread waiting_;
-};
+  return remappings;
+}
 
 ExitCode run_node(Ros2Arguments& wanted, Session& session) {
   wanted.setup.memory = wanted.memory;
   wanted.setup.participant.domain = wanted.domain;
-  for (const std::string& text : wanted.remappings) {
-    const std::size_t at = text.find(":=");
-    if (at == 0 || at == std::string::npos || at + 2 == text.size()) {
-      throw UsageError("'" + text +
-                       "' is no remapping; allowed: FROM:=TO, as image:=/camera/image");
-    }
-    wanted.setup.participant.remappings.insert_or_assign(text.substr(0, at), text.substr(at + 2));
-  }
+  wanted.setup.participant.remappings = remappings_of(wanted.remappings);
   std::atomic<bool> stopped = false;
   std::atomic<ros2::LocalisationNode*> running = nullptr;
-  const StopOnSignal signals([&] {
+  const StopSignals signals([&] {
     stopped = true;
     if (auto* const node = running.load()) node->stop();
   });
@@ -104,6 +76,7 @@ Run declare_ros2(Arguments& arguments) {
   arguments.options("ros2", setup.node);
   arguments.options("monte_carlo", setup.tracker.filter);
   arguments.options("odometry", setup.tracker.odometry, "odometry");
+  arguments.options("base", setup.navigator.base);
   arguments.common({"--motion", "--pictures", "--use-sim-time"});
   return [wanted](Session& session) { return run_node(*wanted, session); };
 }
@@ -125,8 +98,9 @@ Run declare_ros2(Arguments& arguments) {
 
 Verb ros2_verb() {
   return {"ros2", "Localise a robot as a ROS 2 node, without an installed ROS",
-          "Listens to image, odom and initialpose; sends map -> odom on /tf, and pose, particles, "
-          "references, best match and diagnostics. Any ROS 2 distribution on the network sees the "
+          "Listens to image, odom, initialpose and goal_pose; sends map -> odom on /tf, and pose, "
+          "particles, references, best match and diagnostics, on the way to a goal cmd_vel. Any "
+          "ROS 2 distribution on the network sees the "
           "node (docs/ros2.md). Ends on Ctrl-C.",
           "  panonav ros2 office.panonav image:=/camera/image_raw\n"
           "  panonav ros2 office.panonav --pictures compressed --use-sim-time true",

@@ -1,14 +1,20 @@
+#include <cmath>
 #include <filesystem>
 #include <memory>
 
 #include "cli/json.hpp"
 #include "cli/session.hpp"
+#include "cli/stop_signals.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/io/panorama_reader.hpp"
 #include "panonav/io/trajectory_file.hpp"
 #include "verbs/run_record.hpp"
 #include "verbs/simulated_recording.hpp"
+#ifdef PANONAV_COMMAND_SPEAKS_DDS
+#include "ros2/simulated_robot.hpp"
+#endif
 
 namespace panonav::command {
 
@@ -18,12 +24,16 @@ namespace fs = std::filesystem;
 
 struct SimulateArguments {
   std::string scene;
-  std::string out;
+  std::vector<std::string> out;
+  bool ros2 = false;
   std::optional<double> grid_m;
   std::optional<std::uint64_t> random;
   std::optional<std::string> trajectory;
   std::optional<std::string> record;
   SimulationArguments simulation;
+#ifdef PANONAV_COMMAND_SPEAKS_DDS
+  ros2::SimulatedRobotOptions robot;
+#endif
 };
 
 /// --grid, --random and --trajectory each say all of the way; with the options of [recording] they
@@ -101,9 +111,42 @@ RunMoment moment_of(const DatasetEntry& entry, const Image& picture,
   return moment;
 }
 
+#ifdef PANONAV_COMMAND_SPEAKS_DDS
+ExitCode drive_robot(const SimulatedWorld& world, const ros2::SimulatedRobotOptions& options,
+                     Session& session) {
+  const SimulationArguments& settled = world.arguments();
+  const auto seed = static_cast<std::uint64_t>(settled.simulation.scene.seed);
+  Random random(seed, 0);
+  const Scene& scene = world.scene();
+  Pose2 start = world.free_space().random_pose(random);
+  if (scene.tour.size() > 1 && world.free_space().is_free(scene.tour.front())) {
+    const Point2 way{scene.tour[1].x_m - scene.tour[0].x_m, scene.tour[1].y_m - scene.tour[0].y_m};
+    start = {scene.tour[0].x_m, scene.tour[0].y_m, std::atan2(way.y_m, way.x_m)};
+  }
+  ros2::SimulatedRobot robot(
+      {.node = "panonav_simulation"}, options,
+      {start, [&](Point2 place) { return world.free_space().is_free(place); },
+       [&](const Pose2& pose, std::uint64_t number) {
+         return take_picture(world.renderer(), pose, world.camera(), settled.frame, settled.sensor,
+                             number, session.executor());
+       }},
+      settled.odometry, seed, [&](const std::string& line) { session.note(line); });
+  const StopSignals signals([&] { robot.stop(); });
+  session.note("panonav simulate: a robot is in " + scene.name + " at " + fixed(start.x_m, 2) +
+               ", " + fixed(start.y_m, 2) + "; it obeys cmd_vel, and Ctrl-C ends it");
+  robot.run();
+  return ExitCode::done;
+}
+#endif
+
 ExitCode simulate(const Arguments& arguments, SimulateArguments wanted, Session& session) {
+  if (wanted.ros2 ? !wanted.out.empty() : wanted.out.size() != 1) {
+    throw UsageError(wanted.ros2 ? "--ros2 makes no data set; leave OUT away"
+                                 : "OUT is missing or given twice: a folder for the data set");
+  }
+  const std::string out = wanted.ros2 ? "" : wanted.out.front();
   apply_shorthands(arguments, wanted);
-  check_out(wanted.out);
+  if (!wanted.ros2) check_out(out);
   const SimulatedWorld world(
       wanted.scene, wanted.simulation,
       [&](const std::string& section, const std::string& name) {
@@ -111,6 +154,14 @@ ExitCode simulate(const Arguments& arguments, SimulateArguments wanted, Session&
       },
       session.executor());
   for (const auto& warning : world.scene().warnings) session.note("warning: " + warning);
+  if (wanted.ros2) {
+#ifdef PANONAV_COMMAND_SPEAKS_DDS
+    return drive_robot(world, wanted.robot, session);
+#else
+    throw Error(
+        "this panonav was built without Cyclone DDS; install cyclonedds-dev and build it again");
+#endif
+  }
   const auto& settled = world.arguments();
   const auto poses =
       wanted.trajectory
@@ -123,7 +174,7 @@ ExitCode simulate(const Arguments& arguments, SimulateArguments wanted, Session&
   const PanoramaReader panoramas(world.source(), {});
   std::size_t number = 0;
   Progress progress(session, "rendering", poses.size());
-  const auto dataset = record_dataset(world, wanted.out, poses, with_path, session.executor(),
+  const auto dataset = record_dataset(world, out, poses, with_path, session.executor(),
                                       [&](const DatasetEntry& entry, const Image& picture) {
                                         if (record.wanted())
                                           record.add(moment_of(entry, picture, panoramas, number));
@@ -133,15 +184,15 @@ ExitCode simulate(const Arguments& arguments, SimulateArguments wanted, Session&
   progress.clear();
   record.close();
   if (session.json()) {
-    session.print(json_line(ordered_json{{"dataset", wanted.out},
+    session.print(json_line(ordered_json{{"dataset", out},
                                          {"scene", world.scene().name},
                                          {"views", dataset.entries.size()},
                                          {"free_area_m2", world.free_space().area_m2()},
                                          {"warnings", world.scene().warnings}}));
   } else {
     session.print(session.strong(std::to_string(dataset.entries.size())) + " views of " +
-                  world.scene().name + " in " + wanted.out);
-    session.suggest({"panonav", "memorise", wanted.out, "NAME.panonav"});
+                  world.scene().name + " in " + out);
+    session.suggest({"panonav", "memorise", out, "NAME.panonav"});
   }
   return ExitCode::done;
 }
@@ -154,7 +205,9 @@ Run declare_simulate_verb(Arguments& arguments) {
   arguments.positional("SCENE", wanted->scene,
                        "Built-in scene (" + names + "), Gazebo world (.world, .sdf) or mesh file",
                        {scenes.begin(), scenes.end()});
-  arguments.positional("OUT", wanted->out, "Folder for the data set; new or empty");
+  arguments.optional_positionals("OUT", wanted->out, "Folder for the data set; new or empty");
+  arguments.flag("--ros2", wanted->ros2,
+                 "No data set: a robot in the scene that ROS 2 sees and drives");
   arguments.option("--grid METRES", wanted->grid_m,
                    "Short for --path grid --spacing-m: all free places of a grid");
   arguments.option("--random N", wanted->random,
@@ -164,6 +217,11 @@ Run declare_simulate_verb(Arguments& arguments) {
   declare_record(arguments, wanted->record);
   arguments.uncommon({"--record"});
   declare_simulation(arguments, wanted->simulation);
+#ifdef PANONAV_COMMAND_SPEAKS_DDS
+  arguments.options("robot", wanted->robot);
+  arguments.used_only(
+      {"[robot]"}, [wanted] { return wanted->ros2; }, "without --ros2");
+#endif
   arguments.common(
       {"--path", "--spacing-m", "--poses", "--kind", "--seed", "--light", "--moved-objects"});
   const auto path = [wanted] {
@@ -203,7 +261,8 @@ Verb simulate_verb() {
           "seeds give the same pictures on one kind of processor.",
           "  panonav simulate office memory_run --grid 0.25\n"
           "  panonav simulate office query_run --random 20 --seed 7\n"
-          "  panonav simulate house.world house_run --grid 0.5 --kind panorama",
+          "  panonav simulate house.world house_run --grid 0.5 --kind panorama\n"
+          "  panonav simulate office --ros2 --kind panorama",
           declare_simulate_verb};
 }
 
