@@ -222,8 +222,7 @@ Run declare_simulate_verb(Arguments& arguments) {
   arguments.used_only(
       {"[robot]"}, [wanted] { return wanted->ros2; }, "without --ros2");
 #endif
-  arguments.common(
-      {"--path", "--spacing-m", "--poses", "--kind", "--seed", "--light", "--moved-objects"});
+  arguments.common({"--path", "--spacing-m", "--poses", "--kind", "--seed", "--light"});
   const auto path = [wanted] {
     return wanted->random ? RecordingPath::random : wanted->simulation.recording.path;
   };
