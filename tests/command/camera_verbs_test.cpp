@@ -185,6 +185,9 @@ TEST_F(CameraVerbs, RecordingsAreCalibratedAndUnwrappedAsTheirPicturesAre) {
   EXPECT_TRUE(
       contains(refusal({"unwrap", run, "-o", out_ / "by_folder"}), "allowed: a new folder"));
   EXPECT_TRUE(contains(refusal({"unwrap", recording, "-o", out_ / "none"}), "--kind"));
+  for (const char* verb : {"unwrap", "calibrate"}) {
+    EXPECT_TRUE(contains(refusal({verb, picture(1), "-o", out_ / "x", "--every", "2"}), "picture"));
+  }
 }
 
 TEST_F(CameraVerbs, UnwrapRefusesBadInput) {

@@ -16,8 +16,6 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/camera_file.hpp"
 #include "panonav/io/image_file.hpp"
-#include "panonav/io/live_pictures.hpp"
-#include "panonav/io/video_file.hpp"
 #include "verbs/recording.hpp"
 
 namespace panonav::command {
@@ -102,21 +100,19 @@ struct CalibrateArguments {
 /// spread: as many as tell the mirror's circle well.
 std::vector<DatasetEntry> entries_of(const std::string& input, const CalibrateArguments& wanted,
                                      Session& session) {
-  std::error_code ignored;
-  if (!std::filesystem::is_directory(input, ignored) && !is_recording(input) && !is_video(input) &&
-      !is_live(input)) {
+  if (is_one_picture(input)) {
     DatasetEntry entry;
     entry.file = input;
     entry.path = input;
     return {entry};
   }
   constexpr std::size_t max_pictures = 64;
-  PictureArguments pictures = wanted.pictures;
   std::optional<PictureSource> any;
+  std::error_code ignored;
   if (!std::filesystem::exists(std::filesystem::path(input) / "dataset.toml", ignored)) {
     any.emplace();
   }
-  std::vector<DatasetEntry> all = open_recording(input, pictures, any, session).entries;
+  std::vector<DatasetEntry> all = open_recording(input, wanted.pictures, any, session).entries;
   if (all.size() <= max_pictures) return all;
   session.note("of the " + std::to_string(all.size()) + " pictures of " + readable_line(input) +
                " " + std::to_string(max_pictures) + " are taken, evenly spread");
@@ -298,6 +294,9 @@ ExitCode calibrate_lenses(const CalibrateArguments& wanted, const std::vector<st
 }
 
 ExitCode calibrate(const Arguments& arguments, const CalibrateArguments& wanted, Session& session) {
+  if (std::ranges::all_of(wanted.inputs, is_one_picture)) {
+    arguments.refuse_unused(recording_options(), "as all inputs are single pictures");
+  }
   std::vector<std::string> names;
   const auto images = read_images(wanted, names, session);
   std::vector<ImageView> views;

@@ -127,6 +127,17 @@ void declare_pictures(Arguments& arguments, PictureArguments& pictures) {
   declare_part(arguments, pictures.part, true);
 }
 
+std::vector<std::string> recording_options() {
+  return {"--image-topic", "--odometry-topic", "--odometry-frames", "--imu-topic", "--from",
+          "--to",          "--every"};
+}
+
+bool is_one_picture(const std::string& input) {
+  std::error_code ignored;
+  return !fs::is_directory(input, ignored) && !is_recording(input) && !is_video(input) &&
+         !is_live(input);
+}
+
 PictureSelection selection_of(const PartArguments& part) {
   PictureSelection selection{.from_s = part.from_s, .to_s = part.to_s};
   for (const auto& [flag, value] : {std::pair{"--from", part.from_s}, {"--to", part.to_s}}) {

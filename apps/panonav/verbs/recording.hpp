@@ -45,6 +45,11 @@ void declare_part(Arguments& arguments, PartArguments& part, bool every);
 /// All three.
 void declare_pictures(Arguments& arguments, PictureArguments& pictures);
 
+/// The flags of the last two, for verbs that also take single pictures.
+[[nodiscard]] std::vector<std::string> recording_options();
+/// Neither a folder nor a recording, a video or a live source.
+[[nodiscard]] bool is_one_picture(const std::string& input);
+
 /// Empty when the user said nothing. Throws UsageError on flags that do not fit together, FileError
 /// on the camera file.
 [[nodiscard]] std::optional<PictureSource> picture_source(const PictureArguments& pictures);

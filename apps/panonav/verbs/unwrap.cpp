@@ -8,9 +8,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
-#include "panonav/io/live_pictures.hpp"
 #include "panonav/io/panorama_reader.hpp"
-#include "panonav/io/video_file.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "verbs/recording.hpp"
 
@@ -98,13 +96,14 @@ ExitCode unwrap_series(const UnwrapArguments& wanted, const Dataset& recording, 
   return ExitCode::done;
 }
 
-ExitCode unwrap(const UnwrapArguments& wanted, Session& session) {
-  std::error_code ignored;
+ExitCode unwrap(const Arguments& arguments, const UnwrapArguments& wanted, Session& session) {
   const std::string& input = wanted.input;
-  if (fs::is_directory(input, ignored) || is_recording(input) || is_video(input) ||
-      is_live(input)) {
+  if (!is_one_picture(input)) {
     return unwrap_series(wanted, open_recording(input, wanted.pictures, std::nullopt, session),
                          session);
+  }
+  if (fs::exists(input)) {
+    arguments.refuse_unused(recording_options(), "as " + input + " is one picture");
   }
   auto source = picture_source(wanted.pictures);
   if (!source) {
@@ -135,7 +134,7 @@ Run declare_unwrap(Arguments& arguments) {
   declare_pictures(arguments, wanted->pictures);
   arguments.options("unwarper", wanted->unwarper);
   arguments.common({"--rows", "--columns"});
-  return [wanted](Session& session) { return unwrap(*wanted, session); };
+  return [wanted, &arguments](Session& session) { return unwrap(arguments, *wanted, session); };
 }
 
 }  // namespace

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <span>
 #include <unordered_set>
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
+#include "panonav/io/internal/recorded_track.hpp"
 #include "panonav/io/ros_messages.hpp"
 
 namespace panonav {
@@ -19,150 +19,9 @@ namespace fs = std::filesystem;
 using MessageBytes = std::span<const std::uint8_t>;
 
 constexpr std::int64_t second_ns = 1'000'000'000;
-/// A robot turns and brakes within a second: what lies between is not known.
-constexpr std::int64_t max_gap_ns = second_ns;
 constexpr std::size_t max_samples = 10'000'000;
 constexpr std::size_t max_pictures = 1'000'000;  // nine hours of 30 a second
 constexpr std::string_view ground_truth = "/ground_truth";
-
-struct Times {
-  std::int64_t log_ns = 0;
-  std::int64_t stamp_ns = 0;
-};
-
-/// Poses over time.
-class Track {
- public:
-  void add(const Times& times, const ros::Pose& pose) { samples_.push_back({times, pose}); }
-  void keep_last() { samples_.erase(samples_.begin(), samples_.end() - 1); }
-  [[nodiscard]] std::size_t size() const noexcept { return samples_.size(); }
-  [[nodiscard]] bool has_stamps() const {
-    return samples_.empty() || std::ranges::any_of(samples_, [](const Sample& each) {
-             return each.times.stamp_ns != 0;
-           });
-  }
-  /// Puts them in order, by the header's stamp or by the log time. Of one time the last stays.
-  void sort(bool by_log) {
-    for (Sample& each : samples_) each.at_ns = by_log ? each.times.log_ns : each.times.stamp_ns;
-    std::ranges::reverse(samples_);
-    std::ranges::stable_sort(samples_, {}, &Sample::at_ns);
-    const auto same = [](const Sample& a, const Sample& b) { return a.at_ns == b.at_ns; };
-    samples_.erase(std::unique(samples_.begin(), samples_.end(), same), samples_.end());
-  }
-  [[nodiscard]] const ros::Pose& last() const { return samples_.back().pose; }
-  [[nodiscard]] std::optional<ros::Pose> at(std::int64_t ns) const {
-    const auto after = std::ranges::lower_bound(samples_, ns, {}, &Sample::at_ns);
-    if (after != samples_.end() && after->at_ns == ns) return after->pose;
-    if (samples_.size() < 2) return std::nullopt;
-    const auto next = std::clamp(after, samples_.begin() + 1, samples_.end() - 1);
-    const Sample& a = *(next - 1);
-    const Sample& b = *next;
-    const std::int64_t interval = b.at_ns - a.at_ns;
-    if (interval > max_gap_ns || ns < a.at_ns - interval || ns > b.at_ns + interval) {
-      return std::nullopt;
-    }
-    return ros::between(a.pose, b.pose,
-                        static_cast<double>(ns - a.at_ns) / static_cast<double>(interval));
-  }
-
- private:
-  struct Sample {
-    Times times;
-    ros::Pose pose;
-    std::int64_t at_ns = 0;
-  };
-  std::vector<Sample> samples_;
-};
-
-/// ROS 1 writes "/odom" and "odom" alike.
-std::string plain_frame(std::string_view name) {
-  return std::string(name.starts_with('/') ? name.substr(1) : name);
-}
-
-/// The transforms between two frames. Once these are connected, all others are forgotten.
-class TransformChain {
- public:
-  TransformChain(std::string_view top, std::string_view bottom)
-      : top_(plain_frame(top)), bottom_(plain_frame(bottom)) {
-    if (top_ == bottom_) throw ContractError("odometry frames", top_ + " twice", "two frames");
-  }
-
-  void add(const ros::TransformStamped& transform, std::int64_t log_ns, bool is_static) {
-    const std::string child = plain_frame(transform.child_frame_id);
-    const std::string parent = plain_frame(transform.header.frame_id);
-    auto found = links_.find(child);
-    if (found == links_.end()) {
-      if (connected_) return;
-      links_.try_emplace(child, Link{parent, {}, is_static});
-      connect();
-      found = links_.find(child);
-      if (found == links_.end()) return;
-    }
-    Link& link = found->second;
-    if (link.parent != parent) {
-      ++other_parents_;
-      return;
-    }
-    link.track.add({log_ns, transform.header.stamp_ns}, transform.transform);
-    if (link.is_static) link.track.keep_last();
-  }
-
-  [[nodiscard]] bool connected() const noexcept { return connected_; }
-  [[nodiscard]] std::size_t other_parents() const noexcept { return other_parents_; }
-  [[nodiscard]] bool has_stamps() const {
-    return std::ranges::all_of(links_, [](const auto& each) {
-      return each.second.is_static || each.second.track.has_stamps();
-    });
-  }
-  void sort(bool by_log) {
-    for (auto& [child, link] : links_) link.track.sort(by_log);
-  }
-  /// top_from_bottom.
-  [[nodiscard]] std::optional<ros::Pose> at(std::int64_t ns) const {
-    ros::Pose frame_from_bottom;
-    for (std::string frame = bottom_; frame != top_;) {
-      const Link& link = links_.at(frame);
-      const auto up = link.is_static ? std::optional(link.track.last()) : link.track.at(ns);
-      if (!up) return std::nullopt;
-      frame_from_bottom = *up * frame_from_bottom;
-      frame = link.parent;
-    }
-    return frame_from_bottom;
-  }
-  /// All that there is, for what is not connected.
-  [[nodiscard]] std::string known() const {
-    std::string text;
-    for (const auto& [child, link] : links_) {
-      text += (text.empty() ? "" : ", ") + link.parent + " -> " + child;
-    }
-    return text.empty() ? "none" : readable_line(shortened(text, 400));
-  }
-
- private:
-  struct Link {
-    std::string parent;
-    Track track;
-    bool is_static = false;
-  };
-
-  void connect() {
-    std::map<std::string, Link> chain;
-    std::string frame = bottom_;
-    while (frame != top_) {
-      const auto link = links_.find(frame);
-      if (link == links_.end()) return;
-      if (!chain.try_emplace(frame, link->second).second) return;  // a circle leads nowhere
-      frame = link->second.parent;
-    }
-    links_ = std::move(chain);
-    connected_ = true;
-  }
-
-  std::string top_, bottom_;
-  std::map<std::string, Link> links_;  // by child
-  bool connected_ = false;
-  std::size_t other_parents_ = 0;
-};
 
 bool is_picture_type(std::string_view type) {
   return type == ros::Image::type || type == ros::CompressedImage::type;
@@ -351,7 +210,7 @@ class Collector {
     const bool by_log = !has_stamps || !odometry_.has_stamps() || !orientation_.has_stamps() ||
                         !truth_.has_stamps() || (chain_ && !chain_->has_stamps());
     if (by_log) warn("headers without stamps: the times of recording serve instead");
-    for (Track* track : {&odometry_, &orientation_, &truth_}) track->sort(by_log);
+    for (RecordedTrack* track : {&odometry_, &orientation_, &truth_}) track->sort(by_log);
     if (chain_) chain_->sort(by_log);
 
     RecordedDataset made;
@@ -578,7 +437,7 @@ class Collector {
   std::vector<Job> jobs_;  // of each topic
   Topics topics_;
   std::vector<Picture> pictures_;
-  Track odometry_, orientation_, truth_;
+  RecordedTrack odometry_, orientation_, truth_;
   std::optional<TransformChain> chain_;
   bool frames_named_ = false;
   std::string frames_text_;
