@@ -120,7 +120,7 @@ std::string in_words(NavigationEvent event) {
 }
 
 std::string as_text(const NavigationDecision& decision, const RobotNavigator& robot) {
-  std::string line = "look " + std::to_string(decision.step) + "  ";
+  std::string line = "step " + std::to_string(decision.step) + "  ";
   if (decision.nearest) {
     line += "at " + robot.info(*decision.nearest).name + " (probability " +
             fixed(decision.probability, 2) + ")  ";
