@@ -221,13 +221,13 @@ ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& se
   record.close();
   const LiveCounts& counts = taking.finish();
   const auto asked = static_cast<double>(counts.pictures);
-  session.note(std::to_string(counts.pictures) + " pictures, " + std::to_string(known) +
-               " of places of " + wanted.memory +
-               (wanted.learn ? ", " + std::to_string(memory.learnt()) + " views learnt" : "") +
-               (route ? ", " + std::to_string(lines) + " lines of the route" : "") +
-               events_text(counts, record.left_out()) +
-               (live ? ", unwrapping " + fixed(unwrapping.count() / std::max(1.0, asked), 1) + " ms"
-                     : ""));
+  session.note(
+      std::to_string(counts.pictures) + " pictures, " + std::to_string(known) + " of places of " +
+      wanted.memory +
+      (wanted.learn ? ", " + std::to_string(memory.learnt()) + " views learnt" : "") +
+      (route ? ", " + std::to_string(lines) + " lines of the route" : "") +
+      events_text(counts, record.left_out()) +
+      (live ? ", unwrapping " + fixed(unwrapping.count() / std::max(1.0, asked), 1) + " ms" : ""));
   return counts.pictures > 0 ? ExitCode::done : ExitCode::no_answer;
 }
 

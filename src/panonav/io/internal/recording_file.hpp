@@ -194,9 +194,9 @@ inline constexpr std::string_view bag_magic = "#ROSBAG V2.0\n";
 [[nodiscard]] bool begins_with(std::span<const std::uint8_t> bytes, std::string_view text) noexcept;
 
 [[nodiscard]] std::unique_ptr<RecordingFile> open_mcap(const std::filesystem::path& path,
-                                                             const RecordingLimits& limits);
+                                                       const RecordingLimits& limits);
 [[nodiscard]] std::unique_ptr<RecordingFile> open_ros1_bag(const std::filesystem::path& path,
-                                                                 const RecordingLimits& limits);
+                                                           const RecordingLimits& limits);
 [[nodiscard]] std::unique_ptr<RecordingFile> open_rosbag2_database(
     const std::filesystem::path& path, const RecordingLimits& limits);
 
