@@ -1,8 +1,10 @@
 #include "cli/stop_signals.hpp"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -23,14 +25,23 @@ StopSignals::StopSignals(std::function<void()> stop) : stop_(std::move(stop)) {
     const char asked = 's';
     (void)!write(signal_pipe, &asked, 1);
   };
-  action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
+  action.sa_flags = SA_RESTART;
   sigaction(SIGINT, &action, &interrupt_);
   sigaction(SIGTERM, &action, &terminate_);
   waiting_ = std::thread([this] {
     char asked = 0;
     while (read(pipe_[0], &asked, 1) < 0) {
     }
-    if (asked == 's') stop_();
+    if (asked != 's') return;
+    stop_();
+    // A program that ends others may send a signal to this one and then to its group: one request.
+    const auto until = std::chrono::steady_clock::now() + std::chrono::milliseconds(500);
+    while (std::chrono::steady_clock::now() < until) {
+      pollfd again{pipe_[0], POLLIN, 0};
+      if (poll(&again, 1, 50) == 1 && read(pipe_[0], &asked, 1) == 1 && asked == 'o') return;
+    }
+    signal(SIGINT, SIG_DFL);
+    signal(SIGTERM, SIG_DFL);
   });
 }
 

@@ -211,6 +211,9 @@ PositionModel learn_position_model(const ColumnRanking& ranking,
   const std::vector<ViewId> sample =
       sample_views(posed, options.sampled_views, static_cast<std::uint64_t>(options.seed));
   const NeighbourSupport support(ranking);
+  // How to interpolate is learnt from what the search finds, its doubles included, which decide
+  // most where there are few views; how far the result is off, from what an answer is made of.
+  std::vector<Neighbours> all_neighbours;
   std::vector<Neighbours> neighbours;
   std::vector<Point2> truths;
   std::vector<double> differences;
@@ -222,16 +225,24 @@ PositionModel learn_position_model(const ColumnRanking& ranking,
         memory.search(own, {.top = searched, .components = ranking.components()},
                       {.excluded_views = excluded, .allowed_rows = {}});
     std::vector<RankedMatch> ranked = ranking.rank(own, found.matches);
+    const auto nearest =
+        std::span(found.matches)
+            .first(std::min<std::size_t>(found.matches.size(), PositionModel::candidates));
+    const std::vector<RankedMatch> all = ranking.rank(own, nearest);
     for (const ViewId other : doubles_of(memory, truth, ranked, spacing_m)) {
       excluded.push_back(other);
       std::erase_if(ranked, [&](const RankedMatch& match) { return match.match.view == other; });
     }
     support.put_best_supported_first(ranking.profiles(view), ranked, excluded);
     // As in an answer, the nearest view must have a pose.
-    if (ranked.empty() || !memory.info(ranked[0].match.view).pose) continue;
+    const auto begins_posed = [&](std::span<const RankedMatch> matches) {
+      return !matches.empty() && memory.info(matches[0].match.view).pose;
+    };
+    if (!begins_posed(ranked) || !begins_posed(all)) continue;
+    all_neighbours.push_back(gather(ranking, all));
     neighbours.push_back(gather(ranking, ranked));
     truths.push_back(truth);
-    differences.push_back(neighbours.back().to_query(0));
+    differences.push_back(all_neighbours.back().to_query(0));
   }
   if (neighbours.size() < PositionModel::min_views) return model;
   model.sampled_views = static_cast<int>(neighbours.size());
@@ -240,41 +251,41 @@ PositionModel learn_position_model(const ColumnRanking& ranking,
 
   // Views whose nearest match only looks alike say nothing on how to interpolate; a wide
   // neighbourhood would then win because the middle of many wrong places is wrong by less.
-  const auto is_near = [&](std::size_t i) {
-    return distance(neighbours[i].positions[0], truths[i]) <= 2.0 * spacing_m;
+  const auto is_near = [&](const Neighbours& n, std::size_t i) {
+    return distance(n.positions[0], truths[i]) <= 2.0 * spacing_m;
   };
   double best_sum_m = std::numeric_limits<double>::infinity();
-  std::vector<double> best_errors;
-  std::vector<double> best_variances;
   for (const double spacings : neighbourhoods) {
     for (const double exponent : exponents) {
-      std::vector<double> errors;
-      std::vector<double> variances;
       double sum_m = 0.0;
-      for (std::size_t i = 0; i < neighbours.size(); ++i) {
+      for (std::size_t i = 0; i < all_neighbours.size(); ++i) {
         const Kriged kriged =
-            krige(neighbours[i], spacings * spacing_m, exponent, model.difference_unit);
-        errors.push_back(distance(kriged.position, truths[i]));
-        variances.push_back(kriged.variance);
-        if (is_near(i)) sum_m += errors.back();
+            krige(all_neighbours[i], spacings * spacing_m, exponent, model.difference_unit);
+        if (is_near(all_neighbours[i], i)) sum_m += distance(kriged.position, truths[i]);
       }
       if (sum_m < best_sum_m) {
         best_sum_m = sum_m;
         model.neighbourhood_m = spacings * spacing_m;
         model.exponent = exponent;
-        best_errors = std::move(errors);
-        best_variances = std::move(variances);
       }
     }
   }
-  if (best_errors.empty()) return model;  // no finite error
+  if (!std::isfinite(best_sum_m)) return model;
+  std::vector<double> best_errors;
+  std::vector<double> best_variances;
+  for (std::size_t i = 0; i < neighbours.size(); ++i) {
+    const Kriged kriged =
+        krige(neighbours[i], model.neighbourhood_m, model.exponent, model.difference_unit);
+    best_errors.push_back(distance(kriged.position, truths[i]));
+    best_variances.push_back(kriged.variance);
+  }
   model.variance_unit = quantile(best_variances, 0.5);
   std::vector<double> ratios;
   std::vector<double> surrounded;
   std::vector<double> at_edge;
   for (std::size_t i = 0; i < best_errors.size(); ++i) {
     const double variance = best_variances[i] + min_variance * model.variance_unit;
-    if (!(variance > 0.0) || !is_near(i)) continue;
+    if (!(variance > 0.0) || !is_near(neighbours[i], i)) continue;
     ratios.push_back(best_errors[i] / std::sqrt(variance));
     (is_surrounded(neighbours[i], spacing_m) ? surrounded : at_edge).push_back(ratios.back());
   }
@@ -289,7 +300,7 @@ PositionModel learn_position_model(const ColumnRanking& ranking,
   std::size_t clear = 0;
   std::size_t wrong = 0;
   for (std::size_t i = 0; i < by_ratio.size(); ++i) {
-    wrong += is_near(by_ratio[i].second) ? 0 : 1;
+    wrong += is_near(neighbours[by_ratio[i].second], by_ratio[i].second) ? 0 : 1;
     if (static_cast<double>(wrong) <= max_wrong * static_cast<double>(i + 1)) clear = i + 1;
   }
   std::vector<double> ambiguous;
