@@ -6,6 +6,8 @@
 #include <cmath>
 #include <condition_variable>
 #include <deque>
+#include <filesystem>
+#include <fstream>
 #include <map>
 #include <mutex>
 #include <thread>
@@ -15,8 +17,10 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/io/atomic_file.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/named_view.hpp"
+#include "panonav/pipeline/route_driver.hpp"
 #include "panonav/pipeline/run_messages.hpp"
 #include "ros2/motion_history.hpp"
 
@@ -50,6 +54,11 @@ void visit_options(LocalisationNodeOptions& options, OptionVisitor& visitor) {
       option<&T::tilt_from_imu>("level pictures by the orientation on the topic imu"),
       option<&T::command_timeout_s>("without a picture for so long a robot that is driven stops",
                                     above(0), 60),
+      option<&T::resume_s>("a node that died and is started again within so long goes on with the "
+                           "goal it had; 0: never",
+                           0, 86400),
+      option<&T::camera_x_m>("camera in front of the base frame's origin", -10, 10),
+      option<&T::camera_y_m>("and to its left", -10, 10),
   };
   table.visit(options, visitor);
 }
@@ -98,14 +107,13 @@ struct LocalisationNode::Implementation {
       : setup(wanted),
         options(wanted.node),
         notes(std::move(note)),
-        file(MemoryFile::open(wanted.memory, Access::read_only)),
-        tracker(file, wanted.tracker),
         participant(wanted.participant,
                     [this](const std::string& line) { notes.say("qos", line); }),
         transforms(participant, "/tf", {.depth = 100}),
         poses(participant, "~/pose", {.depth = 1, .transient_local = true}),
         particles(participant, "~/particles"),
         references(participant, "~/references", {.depth = 1, .transient_local = true}),
+        areas(participant, "~/areas", {.depth = 1, .transient_local = true}),
         best_matches(participant, "~/best_match/compressed"),
         diagnostics(participant, "/diagnostics"),
         velocities(participant, "cmd_vel", {.depth = 1}),
@@ -113,7 +121,13 @@ struct LocalisationNode::Implementation {
         results(participant, "~/goal/result"),
         answers(participant, "~/command/result") {
     validate(options);
-    publish_references();
+    if (setup.teacher) {
+      teacher.emplace(setup.memory, *setup.teacher);
+      map_from_path = Pose2{};
+    } else {
+      localise_by(setup.memory);
+      resumed = mission_to_resume();
+    }
     subscribe();
   }
 
@@ -162,7 +176,7 @@ struct LocalisationNode::Implementation {
         [this](const ros::PoseWithCovarianceStamped& pose, auto&&) { start_at(pose); });
     listen<ros::PoseStamped>("goal_pose", {}, [this](const ros::PoseStamped& goal, auto&&) {
       require_frame("goal_pose", goal.header.frame_id, setup.frames.map);
-      add_job([this, goal = ros::planar(goal.pose)] { go_to(goal); });
+      add_job([this, goal = ros::planar(goal.pose)] { set_out({.goal = goal}); });
     });
     listen<ros::String>("~/command", {}, [this](const ros::String& message, auto&&) {
       add_job([this, words = message.data] { answer(words); });
@@ -259,7 +273,8 @@ struct LocalisationNode::Implementation {
     const Pose2 pose = ros::planar(message.pose.pose);
     add_job(
         [this, pose, position_m = std::sqrt(position_m2), heading_rad = std::sqrt(heading_rad2)] {
-          tracker.start_at(pose, position_m, heading_rad);
+          require_memory();
+          tracker->start_at(pose * base_from_camera, position_m, heading_rad);
           const std::lock_guard lock(mutex);
           if (const auto now = motion.newest()) map_from_path = pose * inverse(now->path_from_base);
         });
@@ -344,6 +359,7 @@ struct LocalisationNode::Implementation {
     changed.notify_all();
     worker.join();
     end_way("the node ends");
+    if (teacher && teacher->views() > 0) teacher->finish();
   }
 
   // What looks at pictures, on a thread of its own.
@@ -416,17 +432,23 @@ struct LocalisationNode::Implementation {
       const std::lock_guard lock(mutex);
       seen.tilt = tilt;
     }
-    seen.odometry = moved->path_from_base;
+    seen.odometry = moved->path_from_base * base_from_camera;
     seen.stamp_s = 1e-9 * static_cast<double>(stamp_ns);
-    tracker.move_to(moved->path_from_base);
-    const PackedSignature view = tracker.encoder().packed(seen);
-    const MonteCarloEstimate estimate = tracker.observe(view);
+    if (teacher) {
+      teach(std::move(seen), stamp_ns);
+      return;
+    }
+    if (resumed) resume(*std::exchange(resumed, std::nullopt), *moved);
+    tracker->move_to(*seen.odometry);
+    const PackedSignature view = tracker->encoder().packed(seen);
+    MonteCarloEstimate estimate = tracker->observe(view);
 
     RunMoment moment;
+    last_pose = estimate.pose;  // of the camera, as the memory has it
+    if (estimate.pose) estimate.pose = *estimate.pose * inverse(base_from_camera);
     describe(moment, estimate);
     const bool localised = moment.sure && estimate.pose;
-    last_pose = localised ? estimate.pose : std::nullopt;
-    drive(seen);
+    if (!localised) last_pose.reset();
     if (localised) {
       const Pose2 corrected = *estimate.pose * inverse(moved->path_from_base);
       const std::lock_guard lock(mutex);
@@ -440,15 +462,16 @@ struct LocalisationNode::Implementation {
       }
       map_from_path = corrected;
     }
+    drive(seen);
     last_seen = std::move(seen);
     if (localised) poses.publish(pose_message(moment, stamp_ns, setup.frames.map));
     if (particles.subscribers() > 0) {
-      moment.particles = even_sample(tracker.localiser().particles(), shown_particles);
+      moment.particles = even_sample(tracker->localiser().particles(), shown_particles);
       particles.publish(poses_message(moment.particles, stamp_ns, setup.frames.map));
     }
     if (best_matches.subscribers() > 0) {
-      const auto found = tracker.memory().search(view, {.top = 1});
-      const auto thumbnail = file.thumbnail(found.matches.front().view);
+      const auto found = tracker->memory().search(view, {.top = 1});
+      const auto thumbnail = file->thumbnail(found.matches.front().view);
       if (thumbnail) best_matches.publish({{stamp_ns, setup.frames.base}, "png", *thumbnail});
     }
     moment.values.emplace_back(
@@ -464,11 +487,108 @@ struct LocalisationNode::Implementation {
     diagnostics.publish(diagnostics_message(moment, stamp_ns));
   }
 
+  void teach(Observation seen, std::int64_t stamp_ns) {
+    seen.name = "view_" + std::to_string(++taught);
+    seen.pose = ReferencePose{seen.odometry->x_m, seen.odometry->y_m, seen.odometry->heading_rad};
+    const auto answer = teacher->add(std::move(seen));
+    RunMoment moment;
+    moment.state = "learning";
+    moment.values = {{"views", std::to_string(teacher->views())},
+                     {"lines", std::to_string(teacher->lines())},
+                     {"known", fixed(answer.place ? answer.place->known_probability : 0.0, 4)}};
+    {
+      const std::lock_guard lock(mutex);
+      ++counts.pictures;
+      counts.learnt = teacher->views();
+    }
+    diagnostics.publish(diagnostics_message(moment, stamp_ns));
+  }
+
+  void require_memory() const {
+    if (!tracker) throw Error("the memory is being learnt; allowed: finish, then this");
+  }
+
   // Ways to a goal, on the same thread.
+
+  /// What the robot was sent to: a place, or along a route.
+  struct Mission {
+    std::optional<Pose2> goal;
+    std::string route;
+    Pose2 map_from_odom;  // when the file was written
+  };
+
+  [[nodiscard]] std::filesystem::path mission_file() const {
+    return setup.memory.string() + ".mission";
+  }
+
+  /// Once a second, so that its time of change tells when the node died.
+  void keep_mission() {
+    if (options.resume_s <= 0.0 || Steady::now() - mission_kept < 1s) return;
+    mission_kept = Steady::now();
+    const auto words = [](const Pose2& pose) {
+      return to_text(pose.x_m) + " " + to_text(pose.y_m) + " " + to_text(pose.heading_rad) + "\n";
+    };
+    Pose2 map_from_odom;
+    {
+      const std::lock_guard lock(mutex);
+      const auto now = motion.newest();
+      if (!map_from_path || !now) return;
+      map_from_odom = *map_from_path * now->path_from_base * inverse(now->odom_from_base);
+    }
+    write_file(mission_file(), words(map_from_odom) + (mission.goal ? "goal " + words(*mission.goal)
+                                                                    : "repeat " + mission.route));
+  }
+
+  void forget_mission() const {
+    std::error_code ignored;
+    std::filesystem::remove(mission_file(), ignored);
+  }
+
+  /// Empty where there is none, or none of a node that died just now.
+  std::optional<Mission> mission_to_resume() {
+    namespace fs = std::filesystem;
+    std::error_code code;
+    const auto written = fs::last_write_time(mission_file(), code);
+    if (code) return std::nullopt;
+    const double age_s =
+        std::chrono::duration<double>(fs::file_time_type::clock::now() - written).count();
+    std::ifstream in(mission_file());
+    Mission read;
+    std::string word;
+    Pose2& frame = read.map_from_odom;
+    Pose2 goal;
+    in >> frame.x_m >> frame.y_m >> frame.heading_rad >> word;
+    if (word == "goal") {
+      in >> goal.x_m >> goal.y_m >> goal.heading_rad;
+      read.goal = goal;
+    } else {
+      in >> std::ws;
+      std::getline(in, read.route);
+    }
+    const bool whole = in && (read.goal || (word == "repeat" && !read.route.empty()));
+    if (!whole || age_s > options.resume_s) {
+      notes.say("mission", mission_file().string() +
+                               (whole ? " is " + fixed(age_s, 0) + " s old" : " is damaged") +
+                               "; the robot is not sent on");
+      forget_mission();
+      return std::nullopt;
+    }
+    return read;
+  }
+
+  void resume(const Mission& wanted, const MotionHistory::Motion& now) {
+    const Pose2 here = wanted.map_from_odom * now.odom_from_base;
+    tracker->start_at(here * base_from_camera, 0.5 * tracker->localiser().model().spacing_m, 0.1);
+    {
+      const std::lock_guard lock(mutex);
+      map_from_path = here * inverse(now.path_from_base);
+    }
+    set_out(wanted);
+  }
 
   /// There is one: no tracker is made of a memory without positions.
   [[nodiscard]] ViewId nearest_view(Point2 place) const {
-    const VisualMemory& memory = tracker.memory();
+    const VisualMemory& memory = tracker->memory();
     std::optional<std::pair<double, ViewId>> nearest;
     for (const ViewId view : memory.views()) {
       const auto& pose = memory.info(view).pose;
@@ -479,19 +599,32 @@ struct LocalisationNode::Implementation {
     return nearest.value().second;
   }
 
-  void go_to(const Pose2& goal) {
+  void set_out(const Mission& wanted) {
     end_way("another goal");
-    const std::string name = tracker.memory().info(nearest_view(goal.position())).name;
     try {
-      if (navigator) {
-        navigator->set_goal(name);
+      require_memory();
+      driver.reset();
+      if (!wanted.goal) {
+        driver.emplace(
+            *file, setup.tracker.source,
+            RouteDriverOptions{.follower = {.name = wanted.route, .tracker = {}, .fit = {}},
+                               .base = setup.navigator.base});
       } else {
-        navigator.emplace(setup.memory, name, setup.navigator);
+        const std::string name = tracker->memory().info(nearest_view(wanted.goal->position())).name;
+        if (navigator) {
+          navigator->set_goal(name);
+        } else {
+          navigator.emplace(setup.memory, name, setup.navigator);
+          publish_areas();
+        }
       }
     } catch (const Error& error) {
+      forget_mission();
       results.publish(way_message(2, std::string("refused: ") + error.what(), {}));
       throw;
     }
+    mission = wanted;
+    mission_kept = {};
     const std::lock_guard lock(command_mutex);
     driving = true;
     last_command = Steady::now();
@@ -511,11 +644,17 @@ struct LocalisationNode::Implementation {
       driving = false;
       velocities.publish({});
     }
+    forget_mission();
     results.publish(way_message(level, why, {}));
   }
 
   void drive(const Observation& seen) {
     if (!is_driving()) return;
+    keep_mission();
+    if (driver) {
+      drive_along(seen);
+      return;
+    }
     RobotReport report;
     if (last_pose) report.estimate = nearest_view(last_pose->position());
     const NavigationStep step = navigator->step(seen, report);
@@ -525,18 +664,34 @@ struct LocalisationNode::Implementation {
               decision.state == NavigationState::arrived ? 0 : 2);
       return;
     }
-    {
-      const std::lock_guard lock(command_mutex);
-      velocities.publish({{step.velocity.forward_m_s, step.velocity.left_m_s, 0.0},
-                          {0.0, 0.0, step.velocity.turn_rad_s}});
-      last_command = Steady::now();
-    }
+    command(step.velocity);
     if (!step.decided) return;
     feedback.publish(way_message(
         0, std::string(name_of(decision.state)),
         {{"way", fixed(decision.way, 3)},
          {"probability", fixed(decision.probability, 4)},
          {"nearest", decision.nearest ? navigator->info(*decision.nearest).name : std::string()}}));
+  }
+
+  void drive_along(const Observation& seen) {
+    const RouteDriveStep step = driver->step(seen);
+    const std::string state(name_of(step.state));
+    if (step.state == RouteDriveState::arrived || step.state == RouteDriveState::lost) {
+      end_way(state, step.state == RouteDriveState::arrived ? 0 : 2);
+      return;
+    }
+    command(step.velocity);
+    std::vector<ros::KeyValue> values{{"along_m", fixed(step.along_m, 3)},
+                                      {"length_m", fixed(step.length_m, 3)}};
+    if (step.fix) values.push_back({"lateral_m", fixed(step.fix->lateral_m, 3)});
+    feedback.publish(way_message(0, state, std::move(values)));
+  }
+
+  void command(const Velocity& velocity) {
+    const std::lock_guard lock(command_mutex);
+    velocities.publish(
+        {{velocity.forward_m_s, velocity.left_m_s, 0.0}, {0.0, 0.0, velocity.turn_rad_s}});
+    last_command = Steady::now();
   }
 
   [[nodiscard]] bool is_driving() const {
@@ -565,10 +720,17 @@ struct LocalisationNode::Implementation {
     const std::string rest = blank == std::string::npos ? "" : words.substr(blank + 1);
     std::string said = word + " done";
     try {
-      if (word == "relocalise") {
-        tracker.start_anywhere();
+      if (word == "finish" && teacher) {
+        finish_teaching();
       } else if (word == "cancel") {
         end_way("cancelled");
+      } else if (teacher) {
+        throw ContractError("command", "'" + readable_line(shortened(words, 80)) + "'",
+                            "finish, as the memory is being learnt");
+      } else if (word == "relocalise") {
+        tracker->start_anywhere();
+      } else if (word == "repeat" && !rest.empty()) {
+        set_out({.route = rest});
       } else if (word == "learn" && !rest.empty()) {
         learn(rest);
       } else if (word == "forget" && !rest.empty()) {
@@ -577,12 +739,24 @@ struct LocalisationNode::Implementation {
         load(rest);
       } else {
         throw ContractError("command", "'" + readable_line(shortened(words, 80)) + "'",
-                            "relocalise, cancel, learn NAME, forget NAME, load FILE");
+                            "relocalise, cancel, repeat ROUTE, learn NAME, forget NAME, load FILE");
       }
     } catch (const Error& error) {
       said = "refused: " + readable_line(error.what());
     }
     answers.publish({said});
+  }
+
+  void finish_teaching() {
+    teacher->finish();
+    std::optional<Pose2> here;
+    {
+      const std::lock_guard lock(mutex);
+      if (const auto now = motion.newest()) here = now->path_from_base * base_from_camera;
+    }
+    localise_by(setup.memory);
+    teacher.reset();
+    if (here) start_tracker_at(*here);
   }
 
   void learn(const std::string& name) {
@@ -604,34 +778,60 @@ struct LocalisationNode::Implementation {
     reload(setup.memory, last_pose);
   }
 
+  /// Whoever may write to a topic may not open any file that the node may read.
   void load(const std::string& path) {
-    reload(path, std::nullopt);
+    namespace fs = std::filesystem;
+    std::error_code code;
+    const fs::path folder = fs::weakly_canonical(fs::absolute(setup.memory), code).parent_path();
+    const fs::path wanted = fs::weakly_canonical(folder / path, code);
+    if (code || wanted.parent_path() != folder) {
+      throw ContractError("file to load", "'" + readable_line(shortened(path, 80)) + "'",
+                          "the name of a file in the folder of the memory");
+    }
+    reload(wanted, std::nullopt);
     const std::lock_guard lock(mutex);
     map_from_path.reset();  // of the other memory's frame
   }
 
   /// The memory that counts until now stays if this throws.
-  void reload(const std::filesystem::path& path, const std::optional<Pose2> here) {
+  void localise_by(const std::filesystem::path& path) {
     MemoryFile opened = MemoryFile::open(path, Access::read_only);
     Tracker made(opened, setup.tracker);
     end_way("another memory");
     navigator.reset();
-    file = std::move(opened);
-    tracker = std::move(made);
+    driver.reset();
+    file.emplace(std::move(opened));
+    tracker.emplace(std::move(made));
     setup.memory = path;
     last_seen.reset();
     last_pose.reset();
-    if (here) {
-      const double spacing_m = tracker.localiser().model().spacing_m;
-      tracker.start_at(*here, 0.5 * spacing_m, 0.1);
-    }
     publish_references();
+  }
+
+  void reload(const std::filesystem::path& path, const std::optional<Pose2> here) {
+    localise_by(path);
+    if (here) start_tracker_at(*here);
+  }
+
+  void start_tracker_at(const Pose2& camera) {
+    tracker->start_at(camera, 0.5 * tracker->localiser().model().spacing_m, 0.1);
+  }
+
+  /// Those that ways are planned over, a number each.
+  void publish_areas() {
+    PointValues cloud;
+    const auto& planner = navigator->planner();
+    for (std::size_t node = 0; node < planner.graph().size(); ++node) {
+      const auto& pose = tracker->memory().info(planner.graph().view(node)).pose;
+      if (pose) cloud.add(pose->position(), static_cast<double>(planner.areas().area_of[node]));
+    }
+    areas.publish(cloud.message(now_ns(), setup.frames.map, "area"));
   }
 
   void publish_references() {
     PointValues cloud;
-    for (const ViewId view : tracker.memory().views()) {
-      const auto& pose = tracker.memory().info(view).pose;
+    for (const ViewId view : tracker->memory().views()) {
+      const auto& pose = tracker->memory().info(view).pose;
       if (pose) cloud.add(pose->position(), static_cast<double>(cloud.values.size() / 4));
     }
     references.publish(cloud.message(now_ns(), setup.frames.map, "number"));
@@ -640,19 +840,27 @@ struct LocalisationNode::Implementation {
   LocalisationNodeSetup setup;
   LocalisationNodeOptions options;
   RareNotes notes;
-  MemoryFile file;  // file and tracker: of the thread that looks
-  Tracker tracker;
+  Pose2 base_from_camera{options.camera_x_m, options.camera_y_m, 0.0};
+  // Of the thread that looks: either a teacher, or a memory that it localises by.
+  std::optional<Teacher> teacher;
+  std::optional<MemoryFile> file;
+  std::optional<Tracker> tracker;
+  std::size_t taught = 0;  // pictures
   Participant participant;
   Publisher<ros::TFMessage> transforms;
   Publisher<ros::PoseWithCovarianceStamped> poses;
   Publisher<ros::PoseArray> particles;
-  Publisher<ros::PointCloud2> references;
+  Publisher<ros::PointCloud2> references, areas;
   Publisher<ros::CompressedImage> best_matches;
   Publisher<ros::DiagnosticArray> diagnostics;
   Publisher<ros::Twist> velocities;
   Publisher<ros::DiagnosticArray> feedback, results;
   Publisher<ros::String> answers;
   std::optional<RobotNavigator> navigator;  // of the thread that looks, as the next
+  std::optional<RouteDriver> driver;        // instead of the navigator, along a route
+  Mission mission;
+  std::optional<Mission> resumed;  // until the first picture
+  Steady::time_point mission_kept;
   std::optional<Observation> last_seen;
   std::optional<Pose2> last_pose;  // where it was seen; empty: not localised then
   std::atomic<bool> stopped = false;

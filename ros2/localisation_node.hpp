@@ -12,6 +12,7 @@
 #include "panonav/pipeline/robot_navigator.hpp"
 #include "panonav/pipeline/tracker.hpp"
 #include "ros2/participant.hpp"
+#include "ros2/teacher.hpp"
 
 namespace panonav::ros2 {
 
@@ -28,6 +29,9 @@ struct LocalisationNodeOptions {
   bool use_sim_time = false;
   bool tilt_from_imu = false;
   double command_timeout_s = 0.5;
+  double resume_s = 30.0;
+  double camera_x_m = 0.0;
+  double camera_y_m = 0.0;
 };
 void visit_options(LocalisationNodeOptions& options, OptionVisitor& visitor);
 
@@ -44,7 +48,9 @@ struct LocalisationNodeSetup {
   FrameNames frames;
   LocalisationNodeOptions node;
   TrackerOptions tracker;
-  RobotNavigatorOptions navigator;  ///< of ways to a goal
+  RobotNavigatorOptions navigator;  ///< of ways to a goal; its base of routes, too
+  /// The memory is a new one that the first drive makes, until the command "finish".
+  std::optional<TeacherOptions> teacher;
 };
 
 /// Says lines, at most one of a kind in ten seconds, with how often it would have been said.
@@ -66,8 +72,11 @@ class RareNotes {
 /// Localises a robot for ROS 2 by its pictures and odometry and a memory (`Tracker`), as AMCL does
 /// by laser scans: the transform from map to odom, which a picture corrects and odometry carries on
 /// meanwhile, pose, particles, references, best match and diagnostics. Sent to a goal, it drives
-/// the robot to the remembered view next to it (`RobotNavigator`). docs/ros2.md has the topics. One
-/// thread takes and sends messages, another one looks at pictures, always the newest.
+/// the robot to the remembered view next to it (`RobotNavigator`), or along a route
+/// (`RouteDriver`); what it was sent to stands in a file beside the memory, so that a node that is
+/// started anew after it died goes on. Without a memory it learns one (`Teacher`). docs/ros2.md has
+/// the topics. One thread takes and sends messages, another one looks at pictures, always the
+/// newest.
 class LocalisationNode {
  public:
   /// `note` hears warnings, a line each, from any thread. Throws as `Tracker` and `Participant`.
@@ -86,6 +95,7 @@ class LocalisationNode {
     std::size_t localised = 0;  ///< of these
     std::size_t dropped = 0;    ///< came while another one was looked at
     std::size_t notes = 0;
+    std::size_t learnt = 0;  ///< views of a first drive
   };
   [[nodiscard]] Counts counts() const;
 

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "panonav/geometry/angles.hpp"
+#include "panonav/io/atomic_file.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "ros2/simulated_robot.hpp"
@@ -57,12 +58,13 @@ class LocalisationNodeOnTheWire : public ::testing::Test {
   ~LocalisationNodeOnTheWire() override { stop(); }
 
   void start(LocalisationNodeOptions options = {}, const ParticipantOptions& participant = {}) {
-    node_.emplace(
-        LocalisationNodeSetup{.memory = memory(), .participant = participant, .node = options},
-        [this](const std::string& line) {
-          const std::lock_guard lock(mutex_);
-          notes_.push_back(line);
-        });
+    start({.memory = memory(), .participant = participant, .node = options});
+  }
+  void start(const LocalisationNodeSetup& setup) {
+    node_.emplace(setup, [this](const std::string& line) {
+      const std::lock_guard lock(mutex_);
+      notes_.push_back(line);
+    });
     thread_ = std::thread([this] { node_->run(); });
   }
   void stop() {
@@ -362,8 +364,8 @@ TEST_F(LocalisationNodeOnTheWire, AFloodOfMessagesLeavesItLocalisedWithinItsMemo
 class DrivenRobot {
  public:
   explicit DrivenRobot(const testing::ToyWorld& world,
-                       std::function<Image(const Pose2& pose)> picture)
-      : robot_({.node = "robot"}, {.time_factor = 2.0},
+                       std::function<Image(const Pose2& pose)> picture, double time_factor = 2.0)
+      : robot_({.node = "robot"}, {.time_factor = time_factor},
                {{0.8, 0.8, 0.3},
                 [&world](Point2 place) { return testing::robot_fits(world, place); },
                 [picture](const Pose2& pose, std::uint64_t) { return picture(pose); }},
@@ -462,6 +464,94 @@ TEST_F(LocalisationNodeOnTheWire, DrivesASimulatedRobotToAGoalFindsItKidnappedAn
   EXPECT_EQ(state_of(FastPeer::next(result, 5s)), "the node ends");
 }
 
+TEST_F(LocalisationNodeOnTheWire, LearnsADriveRepeatsItAndGoesOnAfterItDied) {
+  auto& command = peer_.talk("rt/panonav/command", "std_msgs::msg::dds_::String_");
+  auto& answer = peer_.listen("rt/panonav/command/result", "std_msgs::msg::dds_::String_");
+  auto& velocity = peer_.talk("rt/cmd_vel", "geometry_msgs::msg::dds_::Twist_");
+  auto& set_pose = peer_.talk("rt/set_pose", "geometry_msgs::msg::dds_::PoseStamped_");
+  auto& truth = peer_.listen("rt/ground_truth", "geometry_msgs::msg::dds_::PoseStamped_", false);
+  auto& result =
+      peer_.listen("rt/panonav/goal/result", "diagnostic_msgs::msg::dds_::DiagnosticArray_");
+  const fs::path drive = *folder_ / "drive.panonav";
+  const fs::path mission = drive.string() + ".mission";
+  constexpr double time_factor = 4.0;
+  DrivenRobot robot(world_, picture, time_factor);
+  LocalisationNodeSetup setup{.memory = drive, .node = {.use_sim_time = true}};
+  setup.teacher =
+      TeacherOptions{.pictures = source(), .route = "drive", .signature = {}, .preprocessing = {}};
+  start(setup);
+  for (auto* each : {&command, &answer, &velocity, &set_pose, &truth, &result}) {
+    ASSERT_TRUE(FastPeer::matched(*each, 10s));
+  }
+  const auto robot_is = [&] {
+    FastPeer::Bytes last;
+    while (FastPeer::waiting(truth) > 0) last = FastPeer::next(truth, 1s);
+    if (last.empty()) last = FastPeer::next(truth, 10s);
+    return ros::planar(read<ros::PoseStamped>(last).pose);
+  };
+  const auto ask = [&](const std::string& words) {
+    for (int i = 0; i < 5; ++i) {  // who writes before both sides know of each other says it again
+      FastPeer::write(command, ros::write_message(ros::String{words}));
+      const auto cdr = FastPeer::next(answer, 5s);
+      if (!cdr.empty()) return read<ros::String>(cdr).data;
+    }
+    return std::string("nothing");
+  };
+  ASSERT_TRUE(comes_true([&] { return node_->counts().pictures >= 3; }));
+  EXPECT_EQ(ask("repeat drive").find("refused: "), 0U);
+  for (int i = 0; i < 100; ++i) {  // a bend of 3.4 m
+    FastPeer::write(velocity, ros::write_message(
+                                  ros::Twist{{0.3, 0.0, 0.0}, {0.0, 0.0, i < 50 ? -0.05 : 0.3}}));
+    std::this_thread::sleep_for(28ms);
+  }
+  FastPeer::write(velocity, ros::write_message(ros::Twist{}));
+  std::this_thread::sleep_for(200ms);
+  const Pose2 end = robot_is();
+  EXPECT_GT(end.x_m, 2.0);
+  EXPECT_EQ(ask("finish"), "finish done");
+  EXPECT_GE(node_->counts().learnt, 10U);
+
+  const auto carried_back = [&] {
+    FastPeer::write(
+        set_pose, ros::write_message(ros::PoseStamped{{0, "map"}, ros::pose_of({0.8, 0.8, 0.2})}));
+    std::this_thread::sleep_for(100ms);
+  };
+  const auto arrives = [&] {
+    const auto cdr = FastPeer::next(result, 30s);
+    return !cdr.empty() && read<ros::DiagnosticArray>(cdr).status.at(0).message == "arrived" &&
+           distance(robot_is().position(), end.position()) < 0.25;
+  };
+  carried_back();
+  EXPECT_EQ(ask("repeat drive"), "repeat done");
+  EXPECT_TRUE(arrives());
+  EXPECT_FALSE(fs::exists(mission));
+
+  // What a node leaves that is killed on its way is there when another one starts.
+  carried_back();
+  EXPECT_EQ(ask("repeat drive"), "repeat done");
+  ASSERT_TRUE(comes_true([&] { return fs::exists(mission) && robot_is().x_m > 1.3; }));
+  const auto left = read_file(mission, 1000);
+  stop();
+  EXPECT_FALSE(fs::exists(mission));
+  while (FastPeer::waiting(result) > 0) (void)FastPeer::next(result, 1s);
+  write_file(mission, left);
+  setup.teacher.reset();
+  start(setup);
+  EXPECT_TRUE(arrives());
+  stop();
+
+  // One of a node that died long ago, or half of one, sends no robot anywhere.
+  write_file(mission, left);
+  fs::last_write_time(mission, fs::file_time_type::clock::now() - 60s);
+  start(setup);
+  EXPECT_EQ(notes_with("the robot is not sent on"), 1U);
+  EXPECT_FALSE(fs::exists(mission));
+  stop();
+  write_file(mission, std::string_view("1 2 3 repeat"));
+  start(setup);
+  EXPECT_EQ(notes_with("is damaged"), 1U);
+}
+
 TEST_F(LocalisationNodeOnTheWire, DoesWhatUsersAskForAndSaysSo) {
   auto& command = peer_.talk("rt/panonav/command", "std_msgs::msg::dds_::String_");
   auto& answer = peer_.listen("rt/panonav/command/result", "std_msgs::msg::dds_::String_");
@@ -469,6 +559,7 @@ TEST_F(LocalisationNodeOnTheWire, DoesWhatUsersAskForAndSaysSo) {
   auto& image = peer_.talk("rt/image", "sensor_msgs::msg::dds_::Image_");
   const fs::path own = *folder_ / "own.panonav";
   fs::copy_file(memory(), own);
+  fs::create_symlink("/etc/hostname", *folder_ / "linked.panonav");
   start();
   for (auto* each : {&command, &answer, &odom, &image}) {
     ASSERT_TRUE(FastPeer::matched(*each, 10s));
@@ -484,8 +575,11 @@ TEST_F(LocalisationNodeOnTheWire, DoesWhatUsersAskForAndSaysSo) {
   };
   EXPECT_EQ(ask("dance").find("refused: command is 'dance'; allowed: relocalise, "), 0U);
   EXPECT_NE(ask("learn here").find("refused: the robot is not localised"), std::string::npos);
-  EXPECT_NE(ask("load /nowhere.panonav").find("refused: /nowhere.panonav"), std::string::npos);
-  EXPECT_EQ(ask("load " + own.string()), "load done");
+  for (const char* outside : {"/nowhere.panonav", "../own.panonav", "linked.panonav"}) {
+    EXPECT_EQ(ask(std::string("load ") + outside).find("refused: file to load is '"), 0U);
+  }
+  EXPECT_NE(ask("load nowhere.panonav").find("nowhere.panonav"), std::string::npos);
+  EXPECT_EQ(ask("load own.panonav"), "load done");
   const auto see = [&](std::int64_t ns, const Pose2& pose) {
     FastPeer::write(image, image_message(ns, picture(pose)));
   };

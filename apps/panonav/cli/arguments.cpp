@@ -44,6 +44,7 @@ struct Arguments::Implementation {
   std::vector<Former> former = {};
   std::vector<UsedOnly> used_only = {};
   std::set<std::string, std::less<>> typed = {};  ///< flags
+  std::vector<std::string> plain = {};            ///< flags outside options structs in option files
 };
 
 namespace {
@@ -53,6 +54,13 @@ std::string flag_of(std::string_view name) {
   std::string flag = "--" + std::string(name);
   std::replace(flag.begin(), flag.end(), '_', '-');
   return flag;
+}
+
+/// And back.
+std::string member_of(std::string_view flag) {
+  std::string name(flag.substr(2));
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
 }
 
 template <class Number>
@@ -254,6 +262,14 @@ void Arguments::add_section(const std::string& section, const std::string& prefi
   added.visit(lister);
 }
 
+void Arguments::in_files(const std::string& section,
+                         std::initializer_list<std::string_view> flags) {
+  for (const auto flag : flags) {
+    std::ranges::find(implementation_->infos, flag, &ArgumentInfo::name)->section = section;
+    implementation_->plain.emplace_back(flag);
+  }
+}
+
 void Arguments::set_common(std::initializer_list<std::string_view> flags, bool common) {
   for (const auto flag : flags) {
     const auto found = std::ranges::find(implementation_->infos, flag, &ArgumentInfo::name);
@@ -418,6 +434,16 @@ std::vector<std::string> Arguments::resolve(
     const std::vector<std::string_view> other_views(others.begin(), others.end());
     file->require_sections(own_views, other_views);
   }
+  for (std::size_t i = 0; file && i < implementation_->infos.size(); ++i) {
+    const ArgumentInfo& info = implementation_->infos[i];
+    if (std::ranges::find(implementation_->plain, info.name) == implementation_->plain.end()) {
+      continue;
+    }
+    const auto text = file->take_text(info.section, member_of(info.name));
+    if (text && !implementation_->typed.contains(info.name)) {
+      implementation_->takes[i](std::span(&*text, 1));
+    }
+  }
   for (auto& section : implementation_->sections) {
     if (file) {
       file->apply(section.name, section.visit);
@@ -505,6 +531,14 @@ std::string Arguments::config_template(std::string_view verb) const {
               (is_name ? toml_text(option.value) : option.value) + "\n";
     });
     section.visit(lister);
+    for (const ArgumentInfo& info : implementation_->infos) {
+      if (info.section != section.name ||
+          std::ranges::find(implementation_->plain, info.name) == implementation_->plain.end()) {
+        continue;
+      }
+      text +=
+          "# " + info.help + "\n# " + member_of(info.name) + " = " + toml_text(info.initial) + "\n";
+    }
   }
   if (implementation_->sections.empty()) {
     text += "# This verb has no option that a file can set.\n";
@@ -619,8 +653,10 @@ ParsedCommand parse(std::span<const Verb> verbs, std::span<const std::string> wo
   const Verb& verb = required_verb(verbs, words);
   const auto declared = declare(verb);
   const std::size_t own_words = words_of(verb.name).second.empty() ? 1 : 2;
-  const std::vector<std::string> rest(words.begin() + static_cast<std::ptrdiff_t>(own_words),
-                                      words.end());
+  const auto behind = words.subspan(own_words);
+  const std::vector<std::string> rest = verb.translate == nullptr
+                                            ? std::vector<std::string>(behind.begin(), behind.end())
+                                            : verb.translate(behind, declared->arguments.infos());
   for (const auto& word : rest) {
     if (word == "--") break;
     if (!asks_for_help(word)) continue;

@@ -101,6 +101,10 @@ class Arguments {
         [&values] { validate(values); });
   }
 
+  /// Flags declared before, of texts and one value each, that stand in the table [`section`] of a
+  /// --config file beside the options of it.
+  void in_files(const std::string& section, std::initializer_list<std::string_view> flags);
+
   /// Flags declared before that `--help` shows, or leaves to `--help-all`. Throws logic_error when
   /// there is no such flag.
   void common(std::initializer_list<std::string_view> flags) { set_common(flags, true); }

@@ -1,11 +1,15 @@
 #pragma once
 
 #include <functional>
+#include <span>
+#include <string>
 #include <string_view>
+#include <vector>
 
 namespace panonav::command {
 
 class Arguments;
+struct ArgumentInfo;
 class Session;
 
 /// What the program tells its caller.
@@ -29,6 +33,9 @@ struct Verb {
   std::string_view example;  ///< command lines that work as they stand, the most useful ones first
   Run (*declare)(Arguments&);
   std::string_view alias = {};  ///< another spelling that is taken
+  /// Says in words of the command line what words of another convention mean; null: there is none.
+  std::vector<std::string> (*translate)(std::span<const std::string> words,
+                                        std::span<const ArgumentInfo> infos) = nullptr;
 };
 
 }  // namespace panonav::command

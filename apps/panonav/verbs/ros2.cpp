@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <atomic>
 #include <memory>
 
@@ -7,8 +8,10 @@
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
+#include "verbs/recording.hpp"
 #ifdef PANONAV_COMMAND_SPEAKS_DDS
 #include "ros2/localisation_node.hpp"
+#include "ros2/ros_arguments.hpp"
 #endif
 
 namespace panonav::command {
@@ -21,26 +24,97 @@ struct Ros2Arguments {
   std::vector<std::string> remappings;
   std::string memory;
   std::optional<int> domain;
+  bool learn = false;
+  std::optional<std::string> route;
+  PictureArguments pictures;
+  ros2::TeacherOptions teacher;
   ros2::LocalisationNodeSetup setup;
 };
 
-std::map<std::string, std::string> remappings_of(const std::vector<std::string>& words) {
-  std::map<std::string, std::string> remappings;
-  for (const std::string& text : words) {
-    const std::size_t at = text.find(":=");
-    if (at == 0 || at == std::string::npos || at + 2 == text.size()) {
-      throw UsageError("'" + readable_line(text) +
-                       "' is no remapping; allowed: FROM:=TO, as image:=/camera/image");
-    }
-    remappings.insert_or_assign(text.substr(0, at), text.substr(at + 2));
+std::string parameter_name(const ArgumentInfo& info) {
+  std::string name = info.name.substr(info.positional() ? 0 : 2);
+  std::ranges::transform(name, name.begin(), [](char c) {
+    return c == '-' ? '_' : c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  return name;
+}
+
+/// The word behind a flag, or the flag's initial value.
+std::string typed_or_initial(std::span<const std::string> words,
+                             std::span<const ArgumentInfo> infos, const std::string& flag) {
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    if (words[i] == flag && i + 1 < words.size()) return words[i + 1];
+    if (words[i].starts_with(flag + "=")) return words[i].substr(flag.size() + 1);
   }
-  return remappings;
+  return std::ranges::find(infos, flag, &ArgumentInfo::name)->initial;
+}
+
+/// As `ros2 run` and launch files call a node: parameters are options.
+std::vector<std::string> without_ros_arguments(std::span<const std::string> typed,
+                                               std::span<const ArgumentInfo> infos) {
+  const auto read = ros2::read_ros_arguments(typed, typed_or_initial(typed, infos, "--node-name"),
+                                             typed_or_initial(typed, infos, "--namespace"));
+  std::vector<std::string> words = read.words;
+  const auto is_typed = [&](const std::string& flag) {
+    return std::ranges::any_of(read.words, [&](const std::string& word) {
+      return word == flag || word.starts_with(flag + "=");
+    });
+  };
+  std::vector<std::string_view> names;
+  std::vector<std::string> own_names;
+  for (const auto& info : infos) own_names.push_back(parameter_name(info));
+  names.assign(own_names.begin(), own_names.end());
+  for (const auto& [name, values, where] : read.parameters) {
+    const auto found = std::ranges::find(own_names, name);
+    if (found == own_names.end()) {
+      throw UsageError(where + ": the node has no parameter '" + readable_line(name) + "'" +
+                       did_you_mean(name, names));
+    }
+    const auto& info = infos[static_cast<std::size_t>(found - own_names.begin())];
+    if (info.name == "MEMORY") {
+      const bool given = std::ranges::any_of(
+          read.words, [](const std::string& word) { return word.ends_with(".panonav"); });
+      if (!given) words.insert(words.begin(), values.begin(), values.end());
+    } else if (info.positional()) {
+      words.insert(words.end(), values.begin(), values.end());
+    } else if (is_typed(info.name)) {
+      continue;
+    } else if (info.value.empty()) {
+      if (values.size() != 1 || (values[0] != "true" && values[0] != "false")) {
+        throw UsageError(where + ": " + name + " is no truth value; allowed: true, false");
+      }
+      if (values[0] == "true") words.push_back(info.name);
+    } else {
+      words.push_back(info.name);
+      words.insert(words.end(), values.begin(), values.end());
+    }
+  }
+  for (const auto& [from, to] : read.remappings) {
+    if (from == "__node" || from == "__ns") {
+      const std::string flag = from == "__node" ? "--node-name" : "--namespace";
+      if (is_typed(flag)) throw UsageError(flag + " and " + from + " exclude each other");
+      words.insert(words.end(), {flag, to});
+    } else {
+      words.push_back(from + ":=" + to);
+    }
+  }
+  return words;
 }
 
 ExitCode run_node(Ros2Arguments& wanted, Session& session) {
   wanted.setup.memory = wanted.memory;
   wanted.setup.participant.domain = wanted.domain;
-  wanted.setup.participant.remappings = remappings_of(wanted.remappings);
+  for (const std::string& text : wanted.remappings) {
+    const auto [from, to] = ros2::remapping_of(text);
+    wanted.setup.participant.remappings.insert_or_assign(from, to);
+  }
+  if (wanted.learn) {
+    const auto pictures = picture_source(wanted.pictures);
+    if (!pictures) throw UsageError("say what the pictures show with --kind");
+    wanted.setup.teacher = wanted.teacher;
+    wanted.setup.teacher->pictures = *pictures;
+    wanted.setup.teacher->route = wanted.route;
+  }
   std::atomic<bool> stopped = false;
   std::atomic<ros2::LocalisationNode*> running = nullptr;
   const StopSignals signals([&] {
@@ -50,13 +124,16 @@ ExitCode run_node(Ros2Arguments& wanted, Session& session) {
   ros2::LocalisationNode node(wanted.setup, [&](const std::string& line) { session.note(line); });
   running = &node;
   if (stopped) return ExitCode::done;
-  session.note("panonav ros2: " + wanted.memory + " is loaded; the node listens");
+  session.note("panonav ros2: " + wanted.memory + (wanted.learn ? " is learnt" : " is loaded") +
+               "; the node listens");
   node.run();
   running = nullptr;
   const auto counts = node.counts();
   session.note(std::to_string(counts.pictures) + " pictures, localised at " +
-               std::to_string(counts.localised) + ", " + std::to_string(counts.dropped) +
-               " came too fast and were dropped, " + std::to_string(counts.notes) + " warnings");
+               std::to_string(counts.localised) + ", " +
+               (wanted.learn ? std::to_string(counts.learnt) + " views learnt, " : "") +
+               std::to_string(counts.dropped) + " came too fast and were dropped, " +
+               std::to_string(counts.notes) + " warnings");
   return ExitCode::done;
 }
 
@@ -66,6 +143,9 @@ Run declare_ros2(Arguments& arguments) {
   arguments.positional("MEMORY", wanted->memory, "Memory file");
   arguments.optional_positionals("REMAPPING", wanted->remappings,
                                  "Names of topics, FROM:=TO: image:=/camera/image_raw");
+  arguments.flag("--learn", wanted->learn,
+                 "Make MEMORY, a new file, of the first drive, until ~/command says finish");
+  arguments.option("--route NAME", wanted->route, "With --learn: record the drive as this route");
   arguments.option("--node-name NAME", setup.participant.node, "Name of the node");
   arguments.option("--namespace NAME", setup.participant.name_space, "Namespace of the node");
   arguments.option("--domain-id", wanted->domain, 0,
@@ -73,10 +153,19 @@ Run declare_ros2(Arguments& arguments) {
   arguments.option("--map-frame NAME", setup.frames.map, "Frame of the memory's positions");
   arguments.option("--odom-frame NAME", setup.frames.odom, "Frame of the odometry");
   arguments.option("--base-frame NAME", setup.frames.base, "Frame of the robot");
+  arguments.in_files("ros2",
+                     {"--node-name", "--namespace", "--map-frame", "--odom-frame", "--base-frame"});
+  declare_layout(arguments, wanted->pictures);
+  arguments.options("signature", wanted->teacher.signature);
+  arguments.options("preprocessing", wanted->teacher.preprocessing);
   arguments.options("ros2", setup.node);
   arguments.options("monte_carlo", setup.tracker.filter);
   arguments.options("odometry", setup.tracker.odometry, "odometry");
   arguments.options("base", setup.navigator.base);
+  arguments.used_only(
+      {"--route", "--kind", "--camera", "--columns-run", "--forward-column", "--elevation-deg",
+       "[signature]", "[preprocessing]"},
+      [wanted] { return wanted->learn; }, "without --learn");
   arguments.common({"--motion", "--pictures", "--use-sim-time"});
   return [wanted](Session& session) { return run_node(*wanted, session); };
 }
@@ -97,14 +186,21 @@ Run declare_ros2(Arguments& arguments) {
 }  // namespace
 
 Verb ros2_verb() {
-  return {"ros2", "Localise a robot as a ROS 2 node, without an installed ROS",
+  return {"ros2",
+          "Localise a robot as a ROS 2 node, without an installed ROS",
           "Listens to image, odom, initialpose and goal_pose; sends map -> odom on /tf, and pose, "
           "particles, references, best match and diagnostics, on the way to a goal cmd_vel. Any "
           "ROS 2 distribution on the network sees the "
           "node (docs/ros2.md). Ends on Ctrl-C.",
           "  panonav ros2 office.panonav image:=/camera/image_raw\n"
+          "  panonav ros2 new.panonav --learn --route round --kind panorama\n"
           "  panonav ros2 office.panonav --pictures compressed --use-sim-time true",
-          declare_ros2};
+          declare_ros2,
+          {},
+#ifdef PANONAV_COMMAND_SPEAKS_DDS
+          without_ros_arguments
+#endif
+  };
 }
 
 }  // namespace panonav::command

@@ -124,6 +124,15 @@ void OptionFile::apply(std::string_view section, const std::function<void(Option
   reader.finish();
 }
 
+std::optional<std::string> OptionFile::take_text(std::string_view section, std::string_view field) {
+  TomlTable* table = section_in(table_, section);
+  if (table == nullptr) return std::nullopt;
+  TomlFields fields(path_, std::string(section), *table);
+  auto text = fields.text(field);
+  std::erase_if(*table, [&](const TomlField& each) { return each.name == field; });
+  return text;
+}
+
 bool OptionFile::has(std::string_view section, std::string_view field) const {
   const TomlTable* table = section_in(table_, section);
   return table != nullptr && std::ranges::find(*table, field, &TomlField::name) != table->end();

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -30,6 +31,10 @@ class OptionFile {
   void apply(std::string_view section, Options& options) {
     apply(section, [&options](OptionVisitor& visitor) { visit_options(options, visitor); });
   }
+
+  /// Takes a field that holds a text, which then is no more there: `apply` refuses what it does not
+  /// know. Empty when there is none. Throws FileError on another type.
+  std::optional<std::string> take_text(std::string_view section, std::string_view field);
 
   /// Whether the file gives this field.
   [[nodiscard]] bool has(std::string_view section, std::string_view field) const;

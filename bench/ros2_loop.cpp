@@ -1,0 +1,379 @@
+// A robot in the loop over DDS, in processes of their own: the simulated robot, the node, and this
+// judge. It teaches a drive, repeats it, sends the robot to places of it, carries it elsewhere, and
+// kills the node in the middle of its way. In a network of its own:
+//   panonav simulate WORLD places --grid 0.5 --kind panorama
+//   unshare -rn sh -c 'ip link set lo up multicast on; ip route add 224.0.0.0/4 dev lo;
+//     ros2_loop PANONAV WORLD places/poses.csv NEW.panonav 60 REPEATS MISSIONS KIDNAPPINGS FACTOR'
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <queue>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "panonav/core/random.hpp"
+#include "panonav/core/statistics.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/motion/steering.hpp"
+#include "panonav/motion/velocity.hpp"
+#include "panonav/route/route_place.hpp"
+#include "ros2/participant.hpp"
+
+namespace {
+
+using namespace panonav;
+using namespace panonav::ros2;
+
+double wall_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+/// Ends with whoever started it.
+class Process {
+ public:
+  explicit Process(std::vector<std::string> words) : pid_(fork()) {
+    if (pid_ != 0) return;
+    std::vector<char*> raw;
+    for (auto& word : words) raw.push_back(word.data());
+    raw.push_back(nullptr);
+    execvp(raw[0], raw.data());
+    _exit(127);
+  }
+  ~Process() { end(SIGINT); }
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+  void end(int signal) {
+    if (pid_ <= 0) return;
+    kill(pid_, signal);
+    waitpid(pid_, nullptr, 0);
+    pid_ = 0;
+  }
+
+ private:
+  pid_t pid_;
+};
+
+std::vector<Point2> places_of(const std::string& csv) {
+  std::vector<Point2> places;
+  std::ifstream in(csv);
+  std::string line;
+  std::getline(in, line);
+  while (std::getline(in, line)) {
+    std::stringstream fields(line);
+    std::vector<std::string> words;
+    for (std::string field; std::getline(fields, field, ',');) words.push_back(field);
+    if (words.size() > 3) places.push_back({std::stod(words[2]), std::stod(words[3])});
+  }
+  return places;
+}
+
+double step_of(const std::vector<Point2>& places) {
+  double step_m = 1e9;
+  for (std::size_t i = 1; i < places.size(); ++i) {
+    step_m = std::min(step_m, distance(places[0], places[i]));
+  }
+  return step_m;
+}
+
+/// Those with room on all sides: nothing here looks for obstacles.
+std::vector<Point2> roomy(const std::vector<Point2>& places) {
+  const double step_m = step_of(places);
+  std::vector<Point2> kept;
+  std::ranges::copy_if(places, std::back_inserter(kept), [&](Point2 place) {
+    return std::ranges::count_if(
+               places, [&](Point2 other) { return distance(place, other) < 1.5 * step_m; }) == 9;
+  });
+  return kept;
+}
+
+/// Shortest way over neighbours of the grid.
+std::vector<Point2> way_between(const std::vector<Point2>& places, std::size_t from, std::size_t to,
+                                double step_m) {
+  std::vector<double> way(places.size(), 1e9);
+  std::vector<std::size_t> before(places.size(), from);
+  using Entry = std::pair<double, std::size_t>;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
+  way[from] = 0.0;
+  open.emplace(0.0, from);
+  while (!open.empty()) {
+    const auto [so_far, at] = open.top();
+    open.pop();
+    if (so_far > way[at]) continue;
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      const double step = distance(places[at], places[i]);
+      if (step > 1.01 * step_m || so_far + step >= way[i]) continue;
+      way[i] = so_far + step;
+      before[i] = at;
+      open.emplace(way[i], i);
+    }
+  }
+  std::vector<Point2> found;
+  if (way[to] >= 1e9) return found;
+  for (std::size_t at = to;; at = before[at]) {
+    found.push_back(places[at]);
+    if (at == from) break;
+  }
+  std::ranges::reverse(found);
+  return found;
+}
+
+/// A drive of the wanted length from place to place, at random.
+std::vector<Point2> drive_of(const std::vector<Point2>& places, double length_m, Random& random) {
+  const double step_m = step_of(places);
+  std::vector<Point2> path;
+  std::size_t at = random.index(places.size());
+  double driven_m = 0.0;
+  while (driven_m < length_m) {
+    const std::size_t to = random.index(places.size());
+    const auto leg = way_between(places, at, to, step_m);
+    if (leg.size() < 4) {
+      if (path.empty()) at = random.index(places.size());
+      continue;
+    }
+    for (const Point2 place : leg) {
+      if (!path.empty() && distance(path.back(), place) < 1e-6) continue;
+      if (!path.empty()) driven_m += distance(path.back(), place);
+      path.push_back(place);
+      if (driven_m >= length_m) break;
+    }
+    at = to;
+  }
+  return path;
+}
+
+struct Judge {
+  explicit Judge()
+      : participant({.node = "judge"}, [](const std::string& line) { puts(line.c_str()); }) {
+    hear<ros::PoseStamped>("ground_truth", [this](const ros::PoseStamped& message) {
+      truth = ros::planar(message.pose);
+      now_s = 1e-9 * static_cast<double>(message.header.stamp_ns);
+      seen = true;
+    });
+    hear<ros::TFMessage>("/tf", [this](const ros::TFMessage& message) {
+      for (const auto& each : message.transforms) {
+        if (each.child_frame_id == "base_link") odom_from_base = ros::planar(each.transform);
+        if (each.child_frame_id != "odom") continue;
+        map_from_odom = ros::planar(each.transform);
+        if (last_transform_s > 0.0) gaps_ms.push_back(1e3 * (wall_s() - last_transform_s));
+        last_transform_s = wall_s();
+      }
+    });
+    hear<ros::DiagnosticArray>("/diagnostics", [this](const ros::DiagnosticArray& message) {
+      state = message.status.at(0).message;
+      values.clear();
+      for (const auto& [key, value] : message.status.at(0).values) {
+        values += "  " + std::string(key) + " " + std::string(value);
+      }
+      ++pictures;
+    });
+    hear<ros::DiagnosticArray>("panonav/goal/result", [this](const ros::DiagnosticArray& message) {
+      const std::string told = message.status.at(0).message;
+      if (told != "another goal") result = told;
+    });
+    hear<ros::DiagnosticArray>("panonav/goal/feedback",
+                               [this](const ros::DiagnosticArray&) { ++feedback; });
+    hear<ros::String>("panonav/command/result",
+                      [this](const ros::String& message) { answer = message.data; });
+    hear<ros::Twist>("cmd_vel", [this](const ros::Twist& message) {
+      if (message.linear.x != 0.0 || message.angular.z != 0.0) last_command_s = wall_s();
+    });
+  }
+  template <class Message, class Use>
+  void hear(const std::string& topic, Use use) {
+    participant.subscribe(topic, Message::type, {.depth = 50}, [use](auto cdr) {
+      use(ros::read_message<Message>(cdr, MessageEncoding::cdr));
+    });
+  }
+  bool until(double sim_s, const std::function<bool()>& condition) {
+    double end_s = -1.0;
+    while (true) {
+      participant.wait(std::chrono::milliseconds(5));
+      if (!seen) continue;
+      if (end_s < 0.0) end_s = now_s + sim_s;
+      if (condition()) return true;
+      if (now_s > end_s) return false;
+    }
+  }
+  void carry(const Pose2& to) {
+    set_pose.publish({{0, "map"}, ros::pose_of(to)});
+    until(1.0, [] { return false; });
+  }
+  [[nodiscard]] Pose2 told() const { return map_from_odom * odom_from_base; }
+
+  Participant participant;
+  Publisher<ros::PoseStamped> set_pose{participant, "set_pose"}, goal{participant, "goal_pose"};
+  Publisher<ros::Twist> cmd_vel{participant, "cmd_vel"};
+  Publisher<ros::String> command{participant, "panonav/command"};
+  Pose2 truth, odom_from_base, map_from_odom;
+  double now_s = 0.0, last_transform_s = 0.0, last_command_s = 0.0;
+  bool seen = false;
+  std::string state, result, answer, values;
+  std::size_t pictures = 0, feedback = 0;
+  std::vector<double> gaps_ms;
+};
+
+/// A place of the drive: where the robot was, and where the memory has it.
+struct Taught {
+  Pose2 truth, map;
+};
+
+std::vector<Taught> teach(Judge& judge, const std::vector<Point2>& path) {
+  PathFollower follower(path);
+  const BaseOptions base;
+  std::vector<Taught> taught;
+  double next_s = 0.0;
+  judge.until(3600, [&] {
+    if (judge.now_s < next_s) return false;
+    next_s = judge.now_s + 0.05;
+    if (taught.empty() || distance(taught.back().truth.position(), judge.truth.position()) > 0.05) {
+      taught.push_back({judge.truth, judge.told()});
+    }
+    const auto aim = follower.next_aim(judge.truth.position());
+    Velocity velocity;
+    if (aim) {
+      const Point2 ahead = inverse(judge.truth) * *aim;
+      velocity =
+          command_towards(std::atan2(ahead.y_m, ahead.x_m), std::hypot(ahead.x_m, ahead.y_m), base);
+    }
+    judge.cmd_vel.publish({{velocity.forward_m_s, 0.0, 0.0}, {0.0, 0.0, velocity.turn_rad_s}});
+    return !aim;
+  });
+  return taught;
+}
+
+double beside_m(const std::vector<Taught>& taught, Point2 place) {
+  double nearest = 1e9;
+  for (const auto& each : taught)
+    nearest = std::min(nearest, distance(each.truth.position(), place));
+  return nearest;
+}
+
+}  // namespace
+
+int main(int count, char** words) {
+  if (count < 10) {
+    puts("PANONAV WORLD PLACES.csv NEW.panonav METRES REPEATS MISSIONS KIDNAPPINGS FACTOR [WORDS]");
+    return 2;
+  }
+  setvbuf(stdout, nullptr, _IOLBF, 0);
+  const std::string panonav = words[1], world = words[2], memory = words[4];
+  const double metres = std::atof(words[5]);
+  const int repeats = std::atoi(words[6]), missions = std::atoi(words[7]);
+  const int kidnappings = std::atoi(words[8]);
+  Random random(7);
+  const auto path = drive_of(roomy(places_of(words[3])), metres, random);
+  std::vector<std::string> simulate{panonav,  "simulate", world,           "--ros2",
+                                    "--kind", "panorama", "--time-factor", words[9]};
+  simulate.insert(simulate.end(), words + 10, words + count);
+  const std::vector<std::string> node_words{panonav, "ros2", memory, "--use-sim-time", "true"};
+  Process robot(simulate);
+  Judge judge;
+  std::vector<Taught> taught;
+  {
+    auto learning = node_words;
+    learning.insert(learning.end(), {"--learn", "--route", "drive", "--kind", "panorama"});
+    // The robot first stands where the drive begins.
+    judge.until(2.0, [] { return false; });
+    const Point2 ahead = path[1];
+    judge.carry(
+        {path[0].x_m, path[0].y_m, std::atan2(ahead.y_m - path[0].y_m, ahead.x_m - path[0].x_m)});
+    Process node(learning);
+    judge.until(60.0, [&] { return judge.pictures > 2; });
+    taught = teach(judge, path);
+    judge.until(1.0, [] { return false; });
+    printf("taught %zu places:%s\n", taught.size(), judge.values.c_str());
+    const double before_s = wall_s();
+    judge.command.publish({"finish"});
+    judge.until(600.0, [&] { return !judge.answer.empty(); });
+    printf("%s after %.1f s\n", judge.answer.c_str(), wall_s() - before_s);
+  }
+  if (taught.empty()) return 1;
+  auto node = std::make_unique<Process>(node_words);
+  judge.pictures = 0;
+  judge.until(60.0, [&] { return judge.pictures > 2; });
+  judge.until(2.0, [] { return false; });
+
+  const auto drives = [&](const char* what, const std::function<void()>& send, Point2 end,
+                          bool kill, double limit_s) {
+    judge.result.clear();
+    judge.feedback = 0;
+    for (int i = 0; i < 5 && judge.feedback == 0 && judge.result.empty(); ++i) {
+      send();
+      judge.until(30.0, [&] { return judge.feedback > 0 || !judge.result.empty(); });
+    }
+    double resumed_s = -1.0;
+    if (kill) {
+      judge.until(10.0, [&] { return !judge.result.empty(); });
+      node->end(SIGKILL);
+      judge.until(3.0, [] { return false; });
+      const double before_s = wall_s();
+      node = std::make_unique<Process>(node_words);
+      judge.until(100.0, [&] { return judge.last_command_s > before_s; });
+      resumed_s = judge.last_command_s - before_s;
+    }
+    const double start_s = judge.now_s;
+    double farthest_m = 0.0;
+    judge.until(limit_s, [&] {
+      farthest_m = std::max(farthest_m, beside_m(taught, judge.truth.position()));
+      return !judge.result.empty();
+    });
+    const double off_m = distance(judge.truth.position(), end);
+    printf("%s: %s after %.0f s, %.2f m from its end, at most %.2f m beside the taught drive", what,
+           judge.result.c_str(), judge.now_s - start_s, off_m, farthest_m);
+    if (kill) printf("; killed, drove again %.2f s after its new start", resumed_s);
+    puts("");
+    return judge.result == "arrived" && off_m < 0.5;
+  };
+
+  int found = 0;
+  for (int i = 0; i < kidnappings; ++i) {
+    const Taught& place = taught[random.index(taught.size())];
+    const double turn = random.uniform(-3.0, 3.0);
+    judge.carry(place.truth * Pose2{0.0, 0.0, turn});
+    judge.until(1.0, [] { return false; });
+    const double start_s = judge.now_s;
+    const auto off_m = [&] { return distance(judge.told().position(), place.map.position()); };
+    const bool right =
+        judge.until(40.0, [&] { return judge.state == "localised" && off_m() < 0.5; });
+    found += right ? 1 : 0;
+    printf("kidnapped %d: %s after %.1f s, %.2f m off, %s\n", i, right ? "found" : "not found",
+           judge.now_s - start_s, off_m(), judge.state.c_str());
+  }
+  int repeated = 0;
+  for (int i = 0; i < repeats; ++i) {
+    judge.carry(taught.front().truth * Pose2{0.0, random.uniform(-0.1, 0.1), 0.0});
+    repeated += drives(
+                    "repeated", [&] { judge.command.publish({"repeat drive"}); },
+                    taught.back().truth.position(), i == 0, 2.0 * metres / 0.3 + 100.0)
+                    ? 1
+                    : 0;
+  }
+  int reached = 0;
+  for (int i = 0; i < missions; ++i) {
+    const Taught& place = taught[random.index(taught.size())];
+    reached += drives(
+                   "mission",
+                   [&] {
+                     judge.goal.publish({{0, "map"}, ros::pose_of(place.map)});
+                   },
+                   place.truth.position(), i == 1, 600.0)
+                   ? 1
+                   : 0;
+  }
+  printf("repeated %d of %d, reached %d of %d, found %d of %d\n", repeated, repeats, reached,
+         missions, found, kidnappings);
+  if (!judge.gaps_ms.empty()) {
+    printf("map -> odom: median %.1f ms, 99.9 %% %.1f ms\n", quantile(judge.gaps_ms, 0.5),
+           quantile(judge.gaps_ms, 0.999));
+  }
+  return 0;
+}

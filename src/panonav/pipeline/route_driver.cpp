@@ -1,0 +1,68 @@
+#include "panonav/pipeline/route_driver.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "panonav/core/error.hpp"
+#include "panonav/route/route_place.hpp"
+
+namespace panonav {
+
+std::string_view name_of(RouteDriveState state) {
+  constexpr std::array<std::string_view, 4> names{"searching", "driving", "arrived", "lost"};
+  return names.at(static_cast<std::size_t>(state));
+}
+
+RouteDriver::RouteDriver(const MemoryFile& memory, const std::optional<PictureSource>& source,
+                         const RouteDriverOptions& options)
+    : options_(options), follower_(memory, source, options.follower) {
+  validate(options_.base);
+  for (std::size_t i = 1; i < poses().size(); ++i) {
+    length_m_ += distance(poses()[i - 1].position(), poses()[i].position());
+  }
+}
+
+void RouteDriver::start_at(Point2 place) {
+  // A route that ends where it begins is driven from its beginning.
+  constexpr double reach_m = 0.5;
+  const auto passes = places_on_route(poses(), place, reach_m);
+  start_m_ = passes.empty() ? place_on_route(poses(), place).along_m : passes.front().along_m;
+  // At its very end there still is a path.
+  constexpr double least_way_m = 0.01;
+  const double from_m = std::min(start_m_, std::max(0.0, length_m_ - least_way_m));
+  path_.emplace(stretch_of_route(poses(), from_m, length_m_), options_.path);
+}
+
+RouteDriveStep RouteDriver::step(const Observation& observation) {
+  if (!observation.odometry) {
+    throw ContractError("odometry of the observation", "unknown", "known, to repeat a route");
+  }
+  const Pose2 moved = inverse(odometry_.value_or(*observation.odometry)) * *observation.odometry;
+  odometry_ = observation.odometry;
+  RouteDriveStep step;
+  step.length_m = length_m_;
+  step.fix = follower_.step(observation).fix;
+  blind_m_ = step.fix ? 0.0 : blind_m_ + std::hypot(moved.x_m, moved.y_m);
+  const auto& robot = follower_.tracker().pose();
+  if (!path_) {
+    if (!step.fix) {
+      if (++searches_ >= max_searches) step.state = RouteDriveState::lost;
+      return step;
+    }
+    start_at(step.fix->fix.pose.position());
+  }
+  step.along_m = start_m_ + path_->along_m();
+  step.state = RouteDriveState::lost;
+  if (!robot || blind_m_ > max_blind_m) return step;
+  const auto aim = path_->next_aim(robot->position());
+  step.along_m = start_m_ + path_->along_m();
+  step.state = aim ? RouteDriveState::driving : RouteDriveState::arrived;
+  if (!aim) return step;
+  const Point2 ahead = inverse(*robot) * *aim;
+  step.velocity = command_towards(std::atan2(ahead.y_m, ahead.x_m),
+                                  std::hypot(ahead.x_m, ahead.y_m), options_.base);
+  return step;
+}
+
+}  // namespace panonav

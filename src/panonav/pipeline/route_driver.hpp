@@ -1,0 +1,71 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string_view>
+
+#include "panonav/motion/steering.hpp"
+#include "panonav/motion/velocity.hpp"
+#include "panonav/pipeline/route_follower.hpp"
+
+namespace panonav {
+
+struct RouteDriverOptions {
+  RouteFollowerOptions follower;
+  PathFollowerOptions path;
+  BaseOptions base;
+};
+
+enum class RouteDriveState {
+  searching,  ///< the robot stands: no line has told yet where it is
+  driving,
+  arrived,  ///< at the end of the route
+  lost,     ///< not found on the route, or not for so long that odometry alone is no guide
+};
+/// "searching", "driving", "arrived", "lost".
+[[nodiscard]] std::string_view name_of(RouteDriveState state);
+
+/// What a robot is to do after an observation, and where it is beside the route.
+struct RouteDriveStep {
+  RouteDriveState state = RouteDriveState::searching;
+  Velocity velocity;                   ///< for the next period of the base; 0 unless driving
+  std::optional<TrackedRouteFix> fix;  ///< empty: odometry carries the robot on
+  double along_m = 0.0;                ///< way along the route
+  double length_m = 0.0;               ///< of the route
+};
+
+/// Repeats a recorded route [Y03]: a picture with its odometry in, a velocity out. It drives from
+/// the place where the robot is, of several the first on the way, to the end of the route, by pure
+/// pursuit of the positions of its lines (`PathFollower`). One thread at a time.
+class RouteDriver {
+ public:
+  /// Without a fix it drives no farther by odometry alone.
+  static constexpr double max_blind_m = 1.0;
+  /// Pictures after which a robot that stands is not on the route.
+  static constexpr int max_searches = 10;
+
+  /// As `RouteFollower`. Throws OptionError.
+  RouteDriver(const MemoryFile& memory, const std::optional<PictureSource>& source,
+              const RouteDriverOptions& options = {});
+
+  /// To be called once in each period of the base, until it arrived or is lost. Throws as
+  /// `LineEncoder::line`, ContractError on an observation without odometry.
+  [[nodiscard]] RouteDriveStep step(const Observation& observation);
+
+  [[nodiscard]] const RouteFollower& follower() const noexcept { return follower_; }
+
+ private:
+  [[nodiscard]] std::span<const Pose2> poses() const { return follower_.tracker().lines().poses(); }
+  void start_at(Point2 place);
+
+  RouteDriverOptions options_;
+  RouteFollower follower_;
+  std::optional<PathFollower> path_;  // from the robot's first place on
+  double start_m_ = 0.0;              // along the route
+  double length_m_ = 0.0;
+  std::optional<Pose2> odometry_;  // of the step before
+  double blind_m_ = 0.0;           // driven since the last fix
+  int searches_ = 0;
+};
+
+}  // namespace panonav

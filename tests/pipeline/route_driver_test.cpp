@@ -1,0 +1,116 @@
+#include "panonav/pipeline/route_driver.hpp"
+
+#include <gtest/gtest.h>
+
+#include "panonav/core/error.hpp"
+#include "panonav/pipeline/memoriser.hpp"
+#include "panonav/pipeline/route_recorder.hpp"
+#include "panonav/route/route_place.hpp"
+#include "support/remembered_worlds.hpp"
+#include "support/smooth_path.hpp"
+#include "support/temporary_folder.hpp"
+
+namespace panonav::testing {
+namespace {
+
+/// A round through the first of two rooms that ends where it begins, remembered by odometry.
+class RouteDriving : public ::testing::Test {
+ protected:
+  RouteDriving() {
+    const auto round = smooth_path(
+        std::vector<Point2>{{0.6, 0.7}, {3.0, 0.7}, {3.2, 2.9}, {0.8, 3.1}, {0.6, 0.7}}, 0.05);
+    PictureSource source{.kind = PictureKind::panorama};
+    source.layout.elevations = band;
+    Memoriser memoriser(memory, {.source = source});
+    for (std::size_t i = 0; i < round.size(); i += 4) {
+      Observation seen(picture(round[i]));
+      seen.name = "view " + std::to_string(i);
+      memoriser.add(std::move(seen));
+    }
+    memoriser.finish();
+    RouteRecorder recorder(memory, {.odometry = true});
+    SimulatedOdometry drifting({}, 4);
+    Pose2 before = round.front();
+    for (const Pose2& pose : round) {
+      Observation seen(picture(pose));
+      seen.odometry = drifting.advance(inverse(before) * pose);
+      before = pose;
+      recorder.add(seen);
+    }
+    (void)recorder.finish();
+    start = round.front();
+    end = round.back();
+    for (const Pose2& pose : round) path.push_back(pose);
+  }
+
+  static Image picture(const Pose2& pose) {
+    return to_picture(world.panorama(pose, 24, 128, band));
+  }
+
+  /// Where the robot is in the end; `carry` may put it elsewhere at each step.
+  Pose2 drive(Pose2 robot, std::uint64_t seed, RouteDriveState& state,
+              const std::function<void(int, Pose2&)>& carry = {}) {
+    RouteDriver driver(MemoryFile::open(memory, Access::read_only), std::nullopt);
+    SimulatedOdometry wheels({}, seed);
+    Pose2 read;
+    for (int i = 0; i < 2000; ++i) {
+      Observation seen(picture(robot));
+      seen.odometry = read;
+      const RouteDriveStep step = driver.step(seen);
+      state = step.state;
+      if (state == RouteDriveState::arrived || state == RouteDriveState::lost) {
+        EXPECT_EQ(step.velocity, Velocity{});
+        break;
+      }
+      const Pose2 moved = motion_after(step.velocity, BaseOptions{}.period_s);
+      read = wheels.advance(moved);
+      robot = robot * moved;
+      way_m += std::hypot(moved.x_m, moved.y_m);
+      beside_m = std::max(beside_m, std::abs(place_on_route(path, robot.position()).lateral_m));
+      if (carry) carry(i, robot);
+    }
+    return robot;
+  }
+
+  static constexpr ElevationBand band{-0.45, 0.6};
+  inline static const ToyWorld world = two_rooms(3, false);
+  TemporaryFolder folder;
+  std::filesystem::path memory = folder / "round.panonav";
+  std::vector<Pose2> path;
+  Pose2 start, end;
+  double way_m = 0.0;
+  double beside_m = 0.0;
+};
+
+TEST_F(RouteDriving, RepeatsARoundFromItsBeginningToItsEnd) {
+  RouteDriveState state{};
+  const Pose2 robot = drive(start * Pose2{0.0, 0.1, 0.3}, 9, state);
+  EXPECT_EQ(state, RouteDriveState::arrived);
+  EXPECT_LT(distance(robot.position(), end.position()), 0.1);
+  EXPECT_GT(way_m, 8.0);  // not at its end from the beginning
+  EXPECT_LT(beside_m, 0.15);
+}
+
+TEST_F(RouteDriving, ARobotThatIsNowhereOnItStands) {
+  RouteDriveState state{};
+  const Pose2 away{6.8, 1.0, 0.5};
+  EXPECT_EQ(drive(away, 9, state), away);
+  EXPECT_EQ(state, RouteDriveState::lost);
+
+  // Carried into the other room on its way, it does not go on for long.
+  way_m = 0.0;
+  (void)drive(start, 9, state, [&](int i, Pose2& robot) {
+    if (i == 50) {
+      robot = away;
+      way_m = 0.0;
+    }
+  });
+  EXPECT_EQ(state, RouteDriveState::lost);
+  EXPECT_LT(way_m, RouteDriver::max_blind_m + 0.1);
+
+  RouteDriver driver(MemoryFile::open(memory, Access::read_only), std::nullopt);
+  EXPECT_THROW((void)driver.step(picture(start)), ContractError);
+}
+
+}  // namespace
+}  // namespace panonav::testing
