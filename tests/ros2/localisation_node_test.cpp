@@ -518,8 +518,11 @@ TEST_F(LocalisationNodeOnTheWire, LearnsADriveRepeatsItAndGoesOnAfterItDied) {
   };
   const auto arrives = [&] {
     const auto cdr = FastPeer::next(result, 30s);
-    return !cdr.empty() && read<ros::DiagnosticArray>(cdr).status.at(0).message == "arrived" &&
-           distance(robot_is().position(), end.position()) < 0.25;
+    EXPECT_FALSE(cdr.empty()) << (notes_.empty() ? "" : notes_.back());
+    if (cdr.empty()) return false;
+    EXPECT_EQ(read<ros::DiagnosticArray>(cdr).status.at(0).message, "arrived");
+    EXPECT_LT(distance(robot_is().position(), end.position()), 0.25);
+    return true;
   };
   carried_back();
   EXPECT_EQ(ask("repeat drive"), "repeat done");
