@@ -21,6 +21,7 @@ using Parameters = std::vector<RosArguments::Parameter>;
 
 constexpr std::size_t max_file_bytes = 1'000'000;
 constexpr int max_depth = 16;
+constexpr int max_nodes = 10'000;
 
 std::pair<std::string, std::string> sides_of(const std::string& text, const std::string& what,
                                              const std::string& allowed) {
@@ -48,14 +49,16 @@ std::string text_of(const YAML::Node& node, const std::string& name, const std::
   return text == "False" || text == "FALSE" ? "false" : text;
 }
 
-/// Throws YAML's exceptions on what is no parameter.
+/// Throws YAML's exceptions on what is no parameter. `nodes_left` bounds what aliases of aliases
+/// multiply.
 void flatten(const YAML::Node& node, const std::string& name, const std::string& where, int depth,
-             Parameters& parameters) {
+             int& nodes_left, Parameters& parameters) {
   if (depth > max_depth) throw FileError(where, name + " is nested too deeply");
+  if (--nodes_left < 0) throw FileError(where, "has more than 10,000 parameters");
   if (node.IsMap()) {
     for (const auto& entry : node) {
       const auto inner = entry.first.as<std::string>();
-      flatten(entry.second, name.empty() ? inner : name + "." + inner, where, depth + 1,
+      flatten(entry.second, name.empty() ? inner : name + "." + inner, where, depth + 1, nodes_left,
               parameters);
     }
     return;
@@ -84,7 +87,8 @@ void read_parameter_file(const std::string& path, const std::string& node,
                         "has a node without a map ros__parameters; allowed: NODE: "
                         "{ros__parameters: {NAME: VALUE}}");
       }
-      flatten(of_node["ros__parameters"], "", path, 0, parameters);
+      int nodes_left = max_nodes;
+      flatten(of_node["ros__parameters"], "", path, 0, nodes_left, parameters);
     };
     const std::array<std::string, 4> from_wide_to_narrow{"/**", "/**/" + node, node,
                                                          inside + "/" + node};
@@ -171,7 +175,8 @@ RosArguments read_ros_arguments(std::span<const std::string> words, const std::s
       name = name.substr(colon + 1);
     }
     try {
-      flatten(YAML::Load(value), name, word, 0, read.parameters);
+      int nodes_left = max_nodes;
+      flatten(YAML::Load(value), name, word, 0, nodes_left, read.parameters);
     } catch (const YAML::Exception& error) {
       throw ContractError("value of " + name, "'" + readable_line(shortened(value, 80)) + "'",
                           std::string("YAML: ") + readable_line(error.what()));

@@ -85,11 +85,19 @@ TEST(RosArguments, OneLineTellsWhatIsWrong) {
         Words{"--ros-args", "--color"}, Words{"--ros-args", "--params-file", "/nowhere.yaml"}}) {
     EXPECT_NE(refusal(words), "taken") << words.back();
   }
-  for (const char* text :
-       {"", "3", "panonav: 3", "panonav: {ros__parameters: 3}", "panonav: {ros__parameters: {a: }}",
-        "panonav: {ros__parameters: {a: [[1], 2]}}", "[[[[", "a: *b",
-        "panonav: &p {ros__parameters: &q {a: *q}}"}) {
-    write_file(folder / "bad.yaml", std::string_view(text));
+  std::string aliases = "panonav: {ros__parameters: {a0: &a0 {x: {}}";
+  for (int i = 1; i < 12; ++i) {
+    const std::string of = "*a" + std::to_string(i - 1);
+    aliases += ", a" + std::to_string(i) + ": &a" + std::to_string(i) + " {";
+    for (int k = 0; k < 10; ++k) aliases += (k > 0 ? ", k" : "k") + std::to_string(k) + ": " + of;
+    aliases += "}";
+  }
+  aliases += "}}";
+  for (const std::string& text : std::vector<std::string>{
+           aliases, "", "3", "panonav: 3", "panonav: {ros__parameters: 3}",
+           "panonav: {ros__parameters: {a: }}", "panonav: {ros__parameters: {a: [[1], 2]}}", "[[[[",
+           "a: *b", "panonav: &p {ros__parameters: &q {a: *q}}"}) {
+    write_file(folder / "bad.yaml", text);
     EXPECT_NE(
         refusal({"--ros-args", "--params-file", (folder / "bad.yaml").string()}).find("bad.yaml"),
         std::string::npos)

@@ -5,6 +5,7 @@
 #include <deque>
 #include <filesystem>
 #include <iostream>
+#include <map>
 #include <set>
 #include <system_error>
 #include <utility>
@@ -44,7 +45,9 @@ struct Arguments::Implementation {
   std::vector<Former> former = {};
   std::vector<UsedOnly> used_only = {};
   std::set<std::string, std::less<>> typed = {};  ///< flags
-  std::vector<std::string> plain = {};            ///< flags outside options structs in option files
+  /// Flags outside options structs that stand in option files, and what a file or the command line
+  /// says.
+  std::map<std::string, std::optional<std::string>, std::less<>> plain = {};
 };
 
 namespace {
@@ -266,7 +269,7 @@ void Arguments::in_files(const std::string& section,
                          std::initializer_list<std::string_view> flags) {
   for (const auto flag : flags) {
     std::ranges::find(implementation_->infos, flag, &ArgumentInfo::name)->section = section;
-    implementation_->plain.emplace_back(flag);
+    implementation_->plain.emplace(flag, std::nullopt);
   }
 }
 
@@ -376,6 +379,8 @@ std::vector<std::string> Arguments::read(std::vector<std::string> words, std::st
     seen[number] = true;
     implementation_->typed.insert(found->name);
     implementation_->takes[number](values);
+    const auto plain = implementation_->plain.find(found->name);
+    if (plain != implementation_->plain.end()) plain->second = values.front();
   }
   take_positionals(loose, verb, may_miss);
   for (std::size_t i = 0; i < infos.size() && !may_miss; ++i) {
@@ -436,12 +441,12 @@ std::vector<std::string> Arguments::resolve(
   }
   for (std::size_t i = 0; file && i < implementation_->infos.size(); ++i) {
     const ArgumentInfo& info = implementation_->infos[i];
-    if (std::ranges::find(implementation_->plain, info.name) == implementation_->plain.end()) {
-      continue;
-    }
+    const auto plain = implementation_->plain.find(info.name);
+    if (plain == implementation_->plain.end()) continue;
     const auto text = file->take_text(info.section, member_of(info.name));
     if (text && !implementation_->typed.contains(info.name)) {
       implementation_->takes[i](std::span(&*text, 1));
+      plain->second = text;
     }
   }
   for (auto& section : implementation_->sections) {
@@ -532,12 +537,10 @@ std::string Arguments::config_template(std::string_view verb) const {
     });
     section.visit(lister);
     for (const ArgumentInfo& info : implementation_->infos) {
-      if (info.section != section.name ||
-          std::ranges::find(implementation_->plain, info.name) == implementation_->plain.end()) {
-        continue;
-      }
-      text +=
-          "# " + info.help + "\n# " + member_of(info.name) + " = " + toml_text(info.initial) + "\n";
+      const auto plain = implementation_->plain.find(info.name);
+      if (info.section != section.name || plain == implementation_->plain.end()) continue;
+      text += "# " + info.help + "\n" + (plain->second ? "" : "# ") + member_of(info.name) + " = " +
+              toml_text(plain->second.value_or(info.initial)) + "\n";
     }
   }
   if (implementation_->sections.empty()) {

@@ -167,6 +167,7 @@ Run declare_ros2(Arguments& arguments) {
        "[signature]", "[preprocessing]"},
       [wanted] { return wanted->learn; }, "without --learn");
   arguments.common({"--motion", "--pictures", "--use-sim-time"});
+  arguments.uncommon({"--node-name", "--domain-id", "--map-frame", "--odom-frame", "--base-frame"});
   return [wanted](Session& session) { return run_node(*wanted, session); };
 }
 
@@ -193,7 +194,8 @@ Verb ros2_verb() {
           "ROS 2 distribution on the network sees the "
           "node (docs/ros2.md). Ends on Ctrl-C.",
           "  panonav ros2 office.panonav image:=/camera/image_raw\n"
-          "  panonav ros2 new.panonav --learn --route round --kind panorama\n"
+          "  panonav ros2 new.panonav --learn --kind mirror --camera mirror.toml --elevation-deg "
+          "-25 35\n"
           "  panonav ros2 office.panonav --pictures compressed --use-sim-time true",
           declare_ros2,
           {},
