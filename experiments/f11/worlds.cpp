@@ -204,7 +204,7 @@ void measure_step_time(const MappingReproductionOptions& options, Executor& exec
                        Reproduction& result) {
   const PlaceRecording place =
       empty_place(make_scene("loop", {.seed = options.seed}), options.seed, 512, executor);
-  constexpr std::size_t views = 60;
+  const auto views = static_cast<std::size_t>(std::min(60, options.views));
   const auto poses = drive(place, {}, 0.1, views);
   Camera camera;
   camera.model = HyperboloidalModel{};

@@ -70,7 +70,7 @@ TEST_F(Reproductions, MappingIsTheSameOnOneAndTwoThreads) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   const auto reproduce = [](const std::filesystem::path& out, Executor& executor) {
     return reproduce_f11(
-        {.out = out, .scenes = 2, .runs = 1, .views = 40, .max_views = 100, .columns = 132},
+        {.out = out, .scenes = 2, .runs = 1, .views = 16, .max_views = 100, .columns = 132},
         executor);
   };
   expect_same_on_one_and_two_threads(reproduce, 30, 0);
