@@ -7,9 +7,11 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "panonav/core/error.hpp"
@@ -132,6 +134,27 @@ TEST(Executor, ManyShortLoopsDoNotHangOrLoseWork) {
         5, 2, [&](std::size_t begin, std::size_t end, std::size_t) { sum += end - begin; });
   }
   EXPECT_EQ(sum.load(), 10'000U);
+}
+
+TEST(Executor, WhatBetweenThrowsEndsALoopAndTheNextOneRuns) {
+  for (const int threads : {1, 4}) {
+    int asked = 0;
+    bool interrupted = true;
+    Executor executor(threads, [&] {
+      if (++asked >= 3 && interrupted) throw std::runtime_error("the user");
+    });
+    std::atomic<int> calls = 0;
+    const auto work = [&](std::size_t, std::size_t, std::size_t) {
+      ++calls;
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    };
+    EXPECT_THROW(executor.for_chunks(1000, 1, work), std::runtime_error);
+    EXPECT_LT(calls.load(), 500);
+    interrupted = false;
+    calls = 0;
+    executor.for_chunks(20, 1, work);
+    EXPECT_EQ(calls.load(), 20);
+  }
 }
 
 TEST(Executor, RefusesBadNumbers) {

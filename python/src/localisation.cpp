@@ -1,0 +1,312 @@
+#include "bindings.hpp"
+#include "memories.hpp"
+#include "panonav/pipeline/observation_source.hpp"
+#include "panonav/pipeline/place_recogniser.hpp"
+#include "panonav/pipeline/tracker.hpp"
+#include "recordings.hpp"
+
+namespace panonav::python {
+
+namespace {
+
+/// An answer and what was asked.
+struct NamedPlace : Place {
+  std::string name;
+};
+struct NamedEstimate : MonteCarloEstimate {
+  std::string name;
+};
+
+void bind_places(py::module_& m) {
+  Record<PlaceMatch>(m, "PlaceMatch", "A view of the memory that a picture resembles.")
+      .field("name", &PlaceMatch::name, "Of the view.")
+      .field("view", &PlaceMatch::view, "Its id.")
+      .field("dissimilarity", &PlaceMatch::dissimilarity, "Integer L1 over packed magnitudes.")
+      .field("column_difference", &PlaceMatch::column_difference,
+             "Column by column, after turning.")
+      .field("verified_features", &PlaceMatch::verified_features,
+             "Local features that agree; None where they do not decide.")
+      .field("heading_rad", &PlaceMatch::heading_rad, "Of the robot relative to this view.");
+  Record<PlacePosition>(m, "PlacePosition", "A position and how far off it may be.")
+      .field("x_m", &PlacePosition::x_m, "")
+      .field("y_m", &PlacePosition::y_m, "")
+      .field("radius_m", &PlacePosition::radius_m,
+             "The true position lies within it in 95 % of the cases.");
+  Record<Circle>(m, "Circle", "A circle.")
+      .field(
+          "centre", [](const Circle& c) { return c.centre; }, "(x_m, y_m)")
+      .field("radius_m", &Circle::radius_m, "");
+  Record<LocalisationLevel>(m, "LocalisationLevel",
+                            "The area where the robot may be after some components.")
+      .field("components", &LocalisationLevel::components, "Compared.")
+      .field("candidates", &LocalisationLevel::candidates, "Views that may still be the place.")
+      .field("area_m2", &LocalisationLevel::area_m2, "Of the candidates' cells, or None.")
+      .field("region", &LocalisationLevel::region, "A circle that covers them, or None.")
+      .field("bytes_read", &LocalisationLevel::bytes_read, "By all levels so far.");
+  Record<NamedPlace>(m, "Place", "What one picture tells of where it was taken.")
+      .field("name", &NamedPlace::name, "Of the picture, where it has one.")
+      .field("known", &NamedPlace::known, "Whether the place is one of the memory's.")
+      .field("known_probability", &NamedPlace::known_probability, "That it is.")
+      .field("position", &NamedPlace::position, "None: unknown.")
+      .field("heading_rad", &NamedPlace::heading_rad, "None: unknown.")
+      .field("matches", &NamedPlace::matches, "The best first; listed for unknown places, too.")
+      .field("components", &NamedPlace::components, "Compared.")
+      .field("bytes_read", &NamedPlace::bytes_read, "By the search.")
+      .field("areas", &NamedPlace::areas, "From coarse to fine, where they were asked for.");
+}
+
+using SharedRecogniser = Shared<PlaceRecogniser>;
+
+NamedPlace localise_one(const PlaceRecogniser& recogniser, const Observation& seen,
+                        std::span<const std::string> excluded_names) {
+  return {recogniser.localise(seen, excluded_names), seen.name};
+}
+
+PlaceRecogniserOptions recogniser_options(const std::optional<PictureSource>& source, bool areas,
+                                          const py::kwargs& keywords) {
+  PlaceRecogniserOptions options{.source = source};
+  WantedAccuracy accuracy;
+  Keywords taken(keywords);
+  taken.options(options.localiser);
+  if (areas) {
+    taken.options(accuracy, "area");
+    options.areas = accuracy;
+  }
+  taken.finish();
+  return options;
+}
+
+/// `memory`: a path or a MemoryFile.
+std::unique_ptr<SharedRecogniser> make_recogniser(const py::object& memory,
+                                                  const PlaceRecogniserOptions& options) {
+  if (py::isinstance<SharedFile>(memory)) {
+    auto& file = memory.cast<SharedFile&>();
+    return file.change(
+        [&](MemoryFile& f) { return std::make_unique<SharedRecogniser>(f, options); });
+  }
+  const auto path = memory.cast<std::filesystem::path>();
+  const py::gil_scoped_release free;
+  return std::make_unique<SharedRecogniser>(path, options);
+}
+
+std::vector<NamedPlace> localise_all(const SharedRecogniser& recogniser, const Dataset& recording,
+                                     bool exclude_same_file, int threads) {
+  return recogniser.read([&](const PlaceRecogniser& r) {
+    InterruptibleExecutor executor(threads);
+    std::vector<NamedPlace> places;
+    in_order(
+        recording.entries.size(), executor,
+        [&](std::size_t i) {
+          const DatasetEntry& entry = recording.entries[i];
+          return localise_one(r, read_observation(entry),
+                              std::span(&entry.file, exclude_same_file ? 1 : 0));
+        },
+        [&](std::size_t, NamedPlace&& place) { places.push_back(std::move(place)); });
+    return places;
+  });
+}
+
+void bind_recogniser(py::module_& m) {
+  const std::string options =
+      with_options("", {options_of<LocaliserOptions>(), options_of<WantedAccuracy>("area")});
+  py::class_<SharedRecogniser>(
+      m, "PlaceRecogniser",
+      "Tells from one picture where it was taken, by a memory file. Several threads may ask at a "
+      "time.")
+      .def(py::init([](const py::object& memory, const std::optional<PictureSource>& source,
+                       bool areas, const py::kwargs& keywords) {
+             return make_recogniser(memory, recogniser_options(source, areas, keywords));
+           }),
+           py::arg("memory"), py::arg("source") = py::none(), py::arg("areas") = false,
+           ("`memory`: the path of a memory file, or a MemoryFile. `source`: how pictures lie; "
+            "None: as the memory's own. `areas`: also tell the area where the robot may be; only "
+            "then there are options area_*." +
+            options)
+               .c_str())
+      .def(
+          "localise",
+          [](const SharedRecogniser& recogniser, const py::object& observation,
+             const std::vector<std::string>& excluded_names) {
+            const Observation seen = observation_from(observation);
+            return recogniser.read(
+                [&](const PlaceRecogniser& r) { return localise_one(r, seen, excluded_names); });
+          },
+          py::arg("observation"), py::arg("excluded_names") = std::vector<std::string>{},
+          "Where an observation was made: an Observation, a Panorama, an array of pixels, or the "
+          "path of a picture. Views called `excluded_names` are not found.")
+      .def(
+          "localise_all",
+          [](const SharedRecogniser& recogniser, const py::object& recording,
+             bool exclude_same_file, int threads) {
+            const auto source = recogniser.read(
+                [](const PlaceRecogniser& r) { return r.encoder().header().source; });
+            return localise_all(recogniser, dataset_from(recording, source), exclude_same_file,
+                                threads);
+          },
+          py::arg("recording"), py::kw_only(), py::arg("exclude_same_file") = false,
+          py::arg("threads") = 0,
+          "The same for each picture of a Dataset or of what lies at a path, on all threads.")
+      .def(
+          "packed",
+          [](const SharedRecogniser& recogniser, const py::object& observation) {
+            const Observation seen = observation_from(observation);
+            return recogniser.read(
+                [&](const PlaceRecogniser& r) { return r.encoder().packed(seen); });
+          },
+          py::arg("observation"), "The signature that is compared.")
+      .def(
+          "panorama",
+          [](const SharedRecogniser& recogniser, const py::object& observation) {
+            const Observation seen = observation_from(observation);
+            return recogniser.read(
+                [&](const PlaceRecogniser& r) { return r.encoder().panorama(seen); });
+          },
+          py::arg("observation"), "The panorama as the memory has it.")
+      .def_property_readonly(
+          "memory",
+          [](const SharedRecogniser& recogniser) {
+            return recogniser.read([](const PlaceRecogniser& r) {
+              return std::make_shared<SharedMemory>(r.memory());
+            });
+          },
+          "A copy of the views that can be found.")
+      .def(
+          "append",
+          [](SharedRecogniser& recogniser, const PackedSignature& signature,
+             const std::string& name, const std::optional<ReferencePose>& pose,
+             std::optional<double> stamp_s) {
+            recogniser.change([&](PlaceRecogniser& r) {
+              r.append({.name = name, .pose = pose, .stamp_s = stamp_s}, signature);
+            });
+          },
+          py::arg("signature"), py::arg("name"), py::arg("pose") = py::none(),
+          py::arg("stamp_s") = py::none(),
+          "A view that can be found from now on; the file is not touched.");
+  m.def(
+      "localise",
+      [](const py::object& memory, const py::object& observation, bool areas,
+         const py::kwargs& keywords) {
+        const auto recogniser =
+            make_recogniser(memory, recogniser_options(std::nullopt, areas, keywords));
+        const Observation seen = observation_from(observation);
+        return recogniser->read(
+            [&](const PlaceRecogniser& r) { return localise_one(r, seen, {}); });
+      },
+      py::arg("memory"), py::arg("observation"), py::arg("areas") = false,
+      ("Tells from one picture where it was taken and which way the robot faced. Who asks more "
+       "than once makes a PlaceRecogniser.\n\n"
+       "`memory`: the path of a memory file, or a MemoryFile. `observation`: an Observation, a "
+       "Panorama, an array of pixels (uint8), or the path of a picture, which lies as those of "
+       "the memory." +
+       options)
+          .c_str());
+}
+
+void bind_tracker(py::module_& m) {
+  Record<PoseMode>(m, "PoseMode", "Particles that lie together.")
+      .field("weight", &PoseMode::weight, "")
+      .field("mean", &PoseMode::mean, "")
+      .field(
+          "covariance",
+          [](const PoseMode& mode) {
+            return py::array_t<double>({3, 3}, mode.covariance.data());
+          },
+          "(3, 3) of x, y in m and heading in rad.")
+      .field("spread_m", &PoseMode::spread_m, "")
+      .field("heading_spread_rad", &PoseMode::heading_spread_rad, "");
+  Record<NamedEstimate>(m, "MonteCarloEstimate", "Where a tracked robot is.")
+      .field("name", &NamedEstimate::name, "Of the picture, where it has one.")
+      .field(
+          "state", [](const NamedEstimate& e) { return name_of(e.state); },
+          "'localised', 'ambiguous' or 'lost'.")
+      .field("pose", &NamedEstimate::pose, "Mean of the heaviest mode; None when lost.")
+      .field("inside", &NamedEstimate::inside, "Belief that the robot is in the memorised area.")
+      .field("probability", &NamedEstimate::probability, "That it is at the heaviest mode.")
+      .field("modes", &NamedEstimate::modes, "Heaviest first.")
+      .field("spread_m", &NamedEstimate::spread_m, "")
+      .field("particles", &NamedEstimate::particles, "")
+      .field("effective_particles", &NamedEstimate::effective_particles, "")
+      .field("resampled", &NamedEstimate::resampled, "")
+      .field("injected", &NamedEstimate::injected, "")
+      .field("difference_here", &NamedEstimate::difference_here, "")
+      .field("difference_anywhere", &NamedEstimate::difference_anywhere, "");
+  using SharedTracker = Shared<Tracker>;
+  py::class_<SharedTracker>(
+      m, "Tracker",
+      "Follows a moving robot through its pictures and odometry by a memory file. The robot starts "
+      "anywhere in the memorised area.")
+      .def(py::init([](const py::object& memory, const std::optional<PictureSource>& source,
+                       const py::kwargs& keywords) {
+             TrackerOptions options{.source = source};
+             Keywords(keywords).options(options.filter).options(options.odometry).finish();
+             if (py::isinstance<SharedFile>(memory)) {
+               return memory.cast<SharedFile&>().change(
+                   [&](MemoryFile& f) { return std::make_unique<SharedTracker>(f, options); });
+             }
+             const auto path = memory.cast<std::filesystem::path>();
+             const py::gil_scoped_release free;
+             return std::make_unique<SharedTracker>(path, options);
+           }),
+           py::arg("memory"), py::arg("source") = py::none(),
+           with_options("`memory`: the path of a memory file, or a MemoryFile.",
+                        {options_of<MonteCarloOptions>(), options_of<OdometryNoise>()})
+               .c_str())
+      .def(
+          "observe",
+          [](SharedTracker& tracker, const py::object& observation) {
+            const Observation seen = observation_from(observation);
+            return tracker.change([&](Tracker& t) {
+              return NamedEstimate{t.observe(seen), seen.name};
+            });
+          },
+          py::arg("observation"),
+          "Moves by the odometry, where the observation has one, and takes the picture into "
+          "account.")
+      .def(
+          "move_to",
+          [](SharedTracker& tracker, const Pose2& odometry) {
+            tracker.change([&](Tracker& t) { t.move_to(odometry); });
+          },
+          py::arg("odometry"), "Odometry between pictures, absolute in its own frame.")
+      .def(
+          "start_anywhere",
+          [](SharedTracker& tracker, std::optional<double> heading_rad) {
+            tracker.change([&](Tracker& t) { t.start_anywhere(heading_rad); });
+          },
+          py::arg("heading_rad") = py::none(), "Forgets what is known of the robot.")
+      .def(
+          "start_at",
+          [](SharedTracker& tracker, const Pose2& pose, double deviation_m,
+             double heading_deviation_rad) {
+            tracker.change(
+                [&](Tracker& t) { t.start_at(pose, deviation_m, heading_deviation_rad); });
+          },
+          py::arg("pose"), py::arg("deviation_m"), py::arg("heading_deviation_rad"))
+      .def(
+          "particles",
+          [](const SharedTracker& tracker) {
+            const Particles all =
+                tracker.read([](const Tracker& t) { return t.localiser().particles(); });
+            py::array_t<double> rows({static_cast<py::ssize_t>(all.size()), py::ssize_t{4}});
+            auto row = rows.mutable_unchecked<2>();
+            for (std::size_t i = 0; i < all.size(); ++i) {
+              const auto at = static_cast<py::ssize_t>(i);
+              row(at, 0) = all.x_m[i];
+              row(at, 1) = all.y_m[i];
+              row(at, 2) = all.heading_rad[i];
+              row(at, 3) = all.weight[i];
+            }
+            return rows;
+          },
+          "(n, 4) of x_m, y_m, heading_rad, weight.");
+}
+
+}  // namespace
+
+void bind_localisation(py::module_& m) {
+  bind_places(m);
+  bind_recogniser(m);
+  bind_tracker(m);
+}
+
+}  // namespace panonav::python

@@ -1,0 +1,109 @@
+#include "bindings.hpp"
+#include "panonav/geometry/alignment.hpp"
+#include "panonav/io/trajectory_file.hpp"
+#include "panonav/motion/trajectory_error.hpp"
+
+namespace panonav::python {
+
+namespace {
+
+using Rows = py::array_t<double, py::array::c_style>;
+
+std::vector<Point2> points_of(const Rows& rows) {
+  std::vector<Point2> points;
+  for (py::ssize_t i = 0; i < rows.shape(0); ++i) points.push_back({rows.at(i, 0), rows.at(i, 1)});
+  return points;
+}
+
+Trajectory trajectory_of(const Rows& rows) {
+  std::vector<StampedPose> poses;
+  for (py::ssize_t i = 0; i < rows.shape(0); ++i) {
+    poses.push_back({rows.at(i, 0), {rows.at(i, 1), rows.at(i, 2), rows.at(i, 3)}});
+  }
+  return Trajectory(std::move(poses));
+}
+
+Rows rows_of(const std::vector<StampedPose>& poses) {
+  Rows rows({static_cast<py::ssize_t>(poses.size()), py::ssize_t{4}});
+  auto row = rows.mutable_unchecked<2>();
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const auto at = static_cast<py::ssize_t>(i);
+    row(at, 0) = poses[i].stamp_s;
+    row(at, 1) = poses[i].pose.x_m;
+    row(at, 2) = poses[i].pose.y_m;
+    row(at, 3) = poses[i].pose.heading_rad;
+  }
+  return rows;
+}
+
+}  // namespace
+
+void bind_measures(py::module_& m) {
+  Record<Alignment>(m, "Alignment", "to = scale R(rotation) from + translation.")
+      .field("scale", &Alignment::scale, "")
+      .field("rotation_rad", &Alignment::rotation_rad, "")
+      .field(
+          "translation", [](const Alignment& a) { return a.translation; }, "(x_m, y_m)")
+      .field("reflected", &Alignment::reflected, "A mirror image (y -> -y) comes first.")
+      .field("rms_m", &Alignment::rms_m, "Root mean square distance that remains.");
+  Record<ShapeDifference>(m, "ShapeDifference", "Procrustes disparity of two shapes.")
+      .field("value", &ShapeDifference::value, "0 (same shape) to 1.")
+      .field("with_reflection", &ShapeDifference::with_reflection,
+             "When a mirror image is allowed.");
+  Record<ErrorSummary>(m, "ErrorSummary", "Statistics of errors.")
+      .field("rms", &ErrorSummary::rms, "")
+      .field("mean", &ErrorSummary::mean, "")
+      .field("median", &ErrorSummary::median, "")
+      .field("p95", &ErrorSummary::p95, "95 % are at most this.")
+      .field("largest", &ErrorSummary::largest, "");
+  Record<TrajectoryError>(m, "TrajectoryError",
+                          "How far an estimated trajectory is from the truth: ATE and RPE.")
+      .field("pairs", &TrajectoryError::pairs, "Estimates with a true pose at their stamp.")
+      .field("left_out", &TrajectoryError::left_out, "Estimates without one.")
+      .field("ground_truth_from_estimate", &TrajectoryError::ground_truth_from_estimate, "")
+      .field("position_m", &TrajectoryError::position_m, "ATE, after alignment.")
+      .field("heading_rad", &TrajectoryError::heading_rad, "After alignment.")
+      .field("relative_pairs", &TrajectoryError::relative_pairs, "")
+      .field("relative_position_m", &TrajectoryError::relative_position_m,
+             "RPE over relative_distance_m.")
+      .field("relative_heading_rad", &TrajectoryError::relative_heading_rad, "");
+  m.def(
+      "align",
+      [](const py::object& from, const py::object& to, bool allow_scale, bool allow_reflection) {
+        return align(points_of(number_rows(from, "source", 2)),
+                     points_of(number_rows(to, "target", 2)), {allow_scale, allow_reflection});
+      },
+      py::arg("source"), py::arg("target"), py::arg("allow_scale") = false,
+      py::arg("allow_reflection") = false,
+      "The least-squares map (Procrustes) of one point set (n, 2) onto another.");
+  m.def(
+      "shape_difference",
+      [](const py::object& a, const py::object& b) {
+        return shape_difference(points_of(number_rows(a, "a", 2)),
+                                points_of(number_rows(b, "b", 2)));
+      },
+      py::arg("a"), py::arg("b"),
+      "Procrustes disparity of two point sets (n, 2): how much they differ after the best "
+      "translation, rotation and scale.");
+  m.def(
+      "trajectory_error",
+      [](const py::object& estimate, const py::object& truth, const py::kwargs& keywords) {
+        TrajectoryErrorOptions options;
+        Keywords(keywords).options(options).finish();
+        const auto a = trajectory_of(number_rows(estimate, "estimate", 4));
+        const auto b = trajectory_of(number_rows(truth, "truth", 4));
+        const py::gil_scoped_release free;
+        return trajectory_error(a, b, options);
+      },
+      py::arg("estimate"), py::arg("truth"),
+      with_options("ATE and RPE of two trajectories, (n, 4) of stamp_s, x_m, y_m, heading_rad. "
+                   "None when fewer than two estimates have a true pose at their stamp.",
+                   {options_of<TrajectoryErrorOptions>()})
+          .c_str());
+  m.def(
+      "read_trajectory",
+      [](const std::filesystem::path& path) { return rows_of(read_trajectory(path)); },
+      py::arg("path"), "TUM text, or CSV: (n, 4) of stamp_s, x_m, y_m, heading_rad.");
+}
+
+}  // namespace panonav::python

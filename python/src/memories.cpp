@@ -1,0 +1,346 @@
+#include <cmath>
+
+#include "bindings.hpp"
+#include "memories.hpp"
+#include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/named_view.hpp"
+
+namespace panonav::python {
+
+namespace {
+
+constexpr std::array<const char*, 3> link_names{"sequence", "neighbour", "closure"};
+
+LinkKind link_kind(const std::string& name) {
+  for (std::size_t i = 0; i < link_names.size(); ++i) {
+    if (name == link_names[i]) return static_cast<LinkKind>(i);
+  }
+  throw ContractError("kind", "'" + name + "'", "'sequence', 'neighbour', 'closure'");
+}
+
+/// x_m, y_m, heading_rad; nan stands for unknown.
+std::optional<ReferencePose> pose_of_row(const double* row) {
+  if (std::isnan(row[0]) && std::isnan(row[1])) return std::nullopt;
+  return ReferencePose{row[0], row[1], std::isnan(row[2]) ? std::nullopt : std::optional(row[2])};
+}
+
+SearchResult search(const SharedMemory& memory, const PackedSignature& query, int top,
+                    int components, const std::vector<ViewId>& excluded_views) {
+  return memory.read([&](const VisualMemory& m) {
+    return m.search(query, {.top = top, .components = components},
+                    {.excluded_views = excluded_views, .allowed_rows = {}});
+  });
+}
+
+/// Appends n views from arrays of (n, components, rows).
+void extend(SharedMemory& memory, const py::object& given_magnitudes,
+            const py::object& given_phases, const std::optional<std::vector<std::string>>& names,
+            const py::object& given_poses) {
+  const SignatureShape shape = memory.read([](const VisualMemory& m) { return m.shape(); });
+  const auto magnitudes =
+      exact_array<std::uint8_t>(given_magnitudes, "magnitudes", {-1, shape.components, shape.rows});
+  const py::ssize_t count = magnitudes.shape(0);
+  const auto phases =
+      exact_array<std::uint8_t>(given_phases, "phases", {count, shape.components, shape.rows});
+  std::optional<py::array_t<double, py::array::c_style>> poses;
+  if (!given_poses.is_none()) poses = number_rows(given_poses, "poses", 3);
+  const auto check = [&](std::size_t size, const char* what) {
+    require(size == static_cast<std::size_t>(count), what, static_cast<double>(size),
+            "one for each signature");
+  };
+  if (names) check(names->size(), "number of names");
+  if (poses) check(static_cast<std::size_t>(poses->shape(0)), "number of poses");
+  const std::uint8_t* const first_magnitude = magnitudes.data();
+  const std::uint8_t* const first_phase = phases.data();
+  const double* const first_pose = poses ? poses->data() : nullptr;
+  memory.change([&](VisualMemory& m) {
+    PackedSignature signature{shape, {}, {}};
+    const std::size_t size = shape.size();
+    std::size_t next = m.empty() ? 0 : m.views().back().value + std::size_t{1};
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+      signature.magnitudes.assign(first_magnitude + i * size, first_magnitude + (i + 1) * size);
+      signature.phases.assign(first_phase + i * size, first_phase + (i + 1) * size);
+      m.append(signature, {.name = names ? (*names)[i] : std::to_string(next++),
+                           .pose = first_pose ? pose_of_row(first_pose + 3 * i) : std::nullopt,
+                           .stamp_s = std::nullopt});
+      if (i % 1024 == 0) check_signals();
+    }
+  });
+}
+
+/// One row for each view in the order of their ids; nan where something is not known.
+py::array_t<double> poses_of(const SharedMemory& memory) {
+  std::vector<double> rows;
+  memory.read([&](const VisualMemory& m) {
+    constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+    for (const ViewId view : m.views()) {
+      const auto& pose = m.info(view).pose;
+      rows.push_back(pose ? pose->x_m : unknown);
+      rows.push_back(pose ? pose->y_m : unknown);
+      rows.push_back(pose ? pose->heading_rad.value_or(unknown) : unknown);
+    }
+  });
+  return py::array_t<double>({static_cast<py::ssize_t>(rows.size() / 3), py::ssize_t{3}},
+                             rows.data());
+}
+
+void bind_visual_memory(py::module_& m) {
+  Record<Match>(m, "Match", "A view that a search found.")
+      .field("view", &Match::view, "Its id.")
+      .field("dissimilarity", &Match::dissimilarity, "Integer L1 of packed magnitudes.");
+  Record<SearchResult>(m, "SearchResult", "What an exact search found.")
+      .field("matches", &SearchResult::matches, "Ascending (dissimilarity, view).")
+      .field("bytes_read", &SearchResult::bytes_read, "That the search touched.")
+      .field("bytes_in_full", &SearchResult::bytes_in_full, "That a scan over all would read.")
+      .field("views_in_full", &SearchResult::views_in_full, "Views whose whole sum was computed.");
+  Record<ReferenceInfo>(m, "ReferenceInfo", "What a memory knows of a view beside its signature.")
+      .field("name", &ReferenceInfo::name, "Unique within a memory.")
+      .field("pose", &ReferenceInfo::pose, "Where it was taken, or None.")
+      .field("stamp_s", &ReferenceInfo::stamp_s, "When, or None.");
+  Record<Link>(m, "Link", "Two views between which a robot can move.")
+      .field("a", &Link::a, "Id of the one.")
+      .field("b", &Link::b, "Id of the other.")
+      .field(
+          "kind", [](const Link& l) { return link_names[static_cast<std::size_t>(l.kind)]; },
+          "'sequence', 'neighbour' or 'closure'.");
+
+  py::class_<SharedMemory, std::shared_ptr<SharedMemory>>(
+      m, "VisualMemory",
+      "The reference views that a robot remembers, in memory. Any number of threads may ask at a "
+      "time; views keep their id for ever.")
+      .def(py::init<SignatureShape, float, std::optional<ElevationBand>>(), py::arg("shape"),
+           py::arg("full_scale"), py::arg("elevations") = py::none(),
+           "`shape`: (rows, components); `full_scale`: the magnitude that is packed as 255.")
+      .def_property_readonly(
+          "shape",
+          [](const SharedMemory& s) {
+            return s.read([](const VisualMemory& memory) { return memory.shape(); });
+          },
+          "(rows, components)")
+      .def_property_readonly("full_scale",
+                             [](const SharedMemory& s) {
+                               return s.read([](const VisualMemory& v) { return v.full_scale(); });
+                             })
+      .def_property_readonly("elevations",
+                             [](const SharedMemory& s) {
+                               return s.read([](const VisualMemory& v) { return v.elevations(); });
+                             })
+      .def("__len__",
+           [](const SharedMemory& s) {
+             return s.read([](const VisualMemory& v) { return v.size(); });
+           })
+      .def(
+          "append",
+          [](SharedMemory& s, const py::object& signature, const std::string& name,
+             const std::optional<ReferencePose>& pose, std::optional<double> stamp_s) {
+            ReferenceInfo info{name, pose, stamp_s};
+            if (py::isinstance<PackedSignature>(signature)) {
+              const auto& packed = signature.cast<const PackedSignature&>();
+              return s.change([&](VisualMemory& v) { return v.append(packed, std::move(info)); });
+            }
+            const auto& own = signature.cast<const FourierSignature&>();
+            return s.change([&](VisualMemory& v) { return v.append(own, std::move(info)); });
+          },
+          py::arg("signature"), py::arg("name"), py::arg("pose") = py::none(),
+          py::arg("stamp_s") = py::none(), "Adds a view, packed or to be packed, and gives its id.")
+      .def("extend", &extend, py::arg("magnitudes"), py::arg("phases"),
+           py::arg("names") = py::none(), py::arg("poses") = py::none(),
+           "Adds n views from uint8 arrays of (n, components, rows). `names`: None stands for the "
+           "numbers; `poses`: (n, 3) of x_m, y_m, heading_rad, nan where unknown. An error keeps "
+           "the views before it.")
+      .def(
+          "remove",
+          [](SharedMemory& s, ViewId view) { s.change([&](VisualMemory& v) { v.remove(view); }); },
+          py::arg("view"))
+      .def_property_readonly(
+          "views",
+          [](const SharedMemory& s) {
+            return s.read([](const VisualMemory& v) {
+              return std::vector<ViewId>(v.views().begin(), v.views().end());
+            });
+          },
+          "All ids, ascending.")
+      .def(
+          "find",
+          [](const SharedMemory& s, const std::string& name) {
+            return s.read([&](const VisualMemory& v) { return v.find(name); });
+          },
+          py::arg("name"), "The id of a view, or None.")
+      .def(
+          "info",
+          [](const SharedMemory& s, ViewId view) {
+            return s.read([&](const VisualMemory& v) { return v.info(view); });
+          },
+          py::arg("view"))
+      .def(
+          "set_pose",
+          [](SharedMemory& s, ViewId view, const std::optional<ReferencePose>& pose) {
+            s.change([&](VisualMemory& v) { v.set_pose(view, pose); });
+          },
+          py::arg("view"), py::arg("pose"))
+      .def(
+          "packed",
+          [](const SharedMemory& s, ViewId view) {
+            return s.read([&](const VisualMemory& v) { return v.packed(view); });
+          },
+          py::arg("view"))
+      .def(
+          "signature",
+          [](const SharedMemory& s, ViewId view) {
+            return s.read([&](const VisualMemory& v) { return v.signature(view); });
+          },
+          py::arg("view"))
+      .def("poses", &poses_of, "(n, 3) of x_m, y_m, heading_rad by ascending id; nan: unknown.")
+      .def(
+          "link",
+          [](SharedMemory& s, ViewId a, ViewId b, const std::string& kind) {
+            const Link link{a, b, link_kind(kind)};
+            s.change([&](VisualMemory& v) { v.link(link); });
+          },
+          py::arg("a"), py::arg("b"), py::arg("kind") = "sequence")
+      .def(
+          "unlink",
+          [](SharedMemory& s, ViewId a, ViewId b) {
+            s.change([&](VisualMemory& v) { v.unlink(a, b); });
+          },
+          py::arg("a"), py::arg("b"))
+      .def_property_readonly("links",
+                             [](const SharedMemory& s) {
+                               return s.read([](const VisualMemory& v) {
+                                 return std::vector<Link>(v.links().begin(), v.links().end());
+                               });
+                             })
+      .def(
+          "search", &search, py::arg("query"), py::arg("top") = 10, py::arg("components") = 0,
+          py::arg("excluded_views") = std::vector<ViewId>{},
+          "The nearest views by integer L1 over packed magnitudes: exactly what a full scan finds, "
+          "ties by id. `components`: 0 takes all.")
+      .def("__repr__", [](const SharedMemory& s) {
+        return s.read([](const VisualMemory& v) {
+          return "VisualMemory(" + std::to_string(v.size()) + " views, " +
+                 std::to_string(v.shape().components) + " components, " +
+                 std::to_string(v.shape().rows) + " rows)";
+        });
+      });
+}
+
+void bind_memory_file(py::module_& m) {
+  Record<MemoryFileInfo>(m, "MemoryFileInfo", "Counts and sizes of a memory file.")
+      .field("views", &MemoryFileInfo::views, "")
+      .field("views_with_position", &MemoryFileInfo::views_with_position, "")
+      .field("views_with_heading", &MemoryFileInfo::views_with_heading, "")
+      .field("links", &MemoryFileInfo::links, "")
+      .field("thumbnails", &MemoryFileInfo::thumbnails, "")
+      .field("views_with_features", &MemoryFileInfo::views_with_features, "")
+      .field("feature_bytes", &MemoryFileInfo::feature_bytes, "")
+      .field("maps", &MemoryFileInfo::maps, "")
+      .field("routes", &MemoryFileInfo::routes, "")
+      .field("file_bytes", &MemoryFileInfo::file_bytes, "")
+      .field("format_version", &MemoryFileInfo::format_version, "");
+  Record<MemoryFault>(m, "MemoryFault", "What is wrong in a memory file.")
+      .field("view", &MemoryFault::view, "Where it concerns one.")
+      .field("what", &MemoryFault::what, "One line.");
+  Record<MemoryHeader>(m, "MemoryHeader",
+                       "What a memory file says of all its views: how pictures become signatures.")
+      .field(
+          "shape", [](const MemoryHeader& h) { return h.shape; }, "(rows, components)")
+      .field("full_scale", &MemoryHeader::full_scale, "The magnitude that is packed as 255.")
+      .field(
+          "elevations", [](const MemoryHeader& h) { return h.elevations; },
+          "(bottom, top) in radians, or None.")
+      .field("panorama_columns", &MemoryHeader::panorama_columns, "")
+      .field("source", &MemoryHeader::source, "How its pictures lay.")
+      .field("created_s", &MemoryHeader::created_s, "Seconds since 1970, or None.");
+
+  py::class_<SharedFile, std::shared_ptr<SharedFile>>(
+      m, "MemoryFile",
+      "A visual memory on disk. What a changing function returned for is still there after the "
+      "process is killed. All functions raise FileError.")
+      .def(py::init([](const std::filesystem::path& path, bool write) {
+             return std::make_shared<SharedFile>(
+                 MemoryFile::open(path, write ? Access::read_write : Access::read_only));
+           }),
+           py::arg("path"), py::arg("write") = false, py::call_guard<py::gil_scoped_release>(),
+           "Opens a memory file; with `write` it can be changed.")
+      .def_property_readonly("header",
+                             [](const SharedFile& s) {
+                               return s.read([](const MemoryFile& f) { return f.header(); });
+                             })
+      .def_property_readonly(
+          "path",
+          [](const SharedFile& s) { return s.read([](const MemoryFile& f) { return f.path(); }); })
+      .def(
+          "load",
+          [](SharedFile& s) {
+            return s.change([](MemoryFile& f) { return std::make_shared<SharedMemory>(f.load()); });
+          },
+          "All views and links as a VisualMemory, which does not need the file any more.")
+      .def("info", [](SharedFile& s) { return s.change([](MemoryFile& f) { return f.info(); }); })
+      .def(
+          "verify",
+          [](SharedFile& s) { return s.change([](MemoryFile& f) { return f.verify(); }); },
+          "Everything that is wrong with the file; empty: intact.")
+      .def("names", [](SharedFile& s) { return s.change([](MemoryFile& f) { return f.names(); }); })
+      .def(
+          "find",
+          [](SharedFile& s, const std::string& name) {
+            return s.change([&](MemoryFile& f) { return f.find(name); });
+          },
+          py::arg("name"), "The id of a view, or None.")
+      .def(
+          "named",
+          [](SharedFile& s, const std::string& name) {
+            return s.change([&](MemoryFile& f) { return named_view(f, name); });
+          },
+          py::arg("name"), "The id of a view by name or, as text, by id; FileError when none is.")
+      .def(
+          "thumbnail",
+          [](SharedFile& s, ViewId view) -> py::object {
+            const auto bytes = s.change([&](MemoryFile& f) { return f.thumbnail(view); });
+            if (!bytes) return py::none();
+            return py::bytes(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+          },
+          py::arg("view"), "The bytes of its picture file (PNG or JPEG), or None.")
+      .def(
+          "set_pose",
+          [](SharedFile& s, ViewId view, const std::optional<ReferencePose>& pose) {
+            s.change([&](MemoryFile& f) { f.set_pose(view, pose); });
+          },
+          py::arg("view"), py::arg("pose"))
+      .def(
+          "rename",
+          [](SharedFile& s, ViewId view, const std::string& name) {
+            s.change([&](MemoryFile& f) { f.rename(view, name); });
+          },
+          py::arg("view"), py::arg("name"))
+      .def(
+          "remove",
+          [](SharedFile& s, const std::vector<ViewId>& views) {
+            s.change([&](MemoryFile& f) { f.remove(views); });
+          },
+          py::arg("views"), "Also drops their links, thumbnails and features; all or none.")
+      .def(
+          "undo", [](SharedFile& s) { s.change([](MemoryFile& f) { f.undo(); }); },
+          "Takes back the last change that the command kept for this.")
+      .def("map_names",
+           [](SharedFile& s) { return s.change([](MemoryFile& f) { return f.map_names(); }); })
+      .def("route_names",
+           [](SharedFile& s) { return s.change([](MemoryFile& f) { return f.route_names(); }); })
+      .def(
+          "keep_models", [](SharedFile& s) { s.change([](MemoryFile& f) { keep_models(f); }); },
+          "Learns what localisation needs of the views and keeps it in the file; to be called "
+          "when views or poses have changed.")
+      .def("__repr__", [](const SharedFile& s) {
+        return s.read(
+            [](const MemoryFile& f) { return "MemoryFile('" + f.path().string() + "')"; });
+      });
+}
+
+}  // namespace
+
+void bind_memories(py::module_& m) {
+  bind_visual_memory(m);
+  bind_memory_file(m);
+}
+
+}  // namespace panonav::python

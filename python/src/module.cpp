@@ -1,0 +1,22 @@
+#include "bindings.hpp"
+
+namespace {
+namespace py = pybind11;
+}
+
+PYBIND11_MODULE(_core, m) {
+  using namespace panonav::python;
+  m.doc() = "The panonav library (see the package panonav).";
+  m.attr("__version__") = PANONAV_VERSION;
+  bind_basics(m);
+  bind_panoramas(m);
+  bind_signatures(m);
+  bind_memories(m);
+  bind_recordings(m);
+  bind_localisation(m);
+  bind_measures(m);
+  // People know these by the package's name.
+  for (const auto& [name, value] : m.attr("__dict__").cast<py::dict>()) {
+    if (py::hasattr(value, "__module__")) value.attr("__module__") = "panonav";
+  }
+}

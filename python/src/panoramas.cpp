@@ -1,0 +1,301 @@
+#include "bindings.hpp"
+#include "panonav/camera/camera.hpp"
+#include "panonav/camera/model_parameters.hpp"
+#include "panonav/io/camera_file.hpp"
+#include "panonav/io/panorama_reader.hpp"
+#include "panonav/panorama/preprocessing.hpp"
+#include "panonav/panorama/tilt.hpp"
+#include "panonav/panorama/unwarper.hpp"
+
+namespace panonav::python {
+
+namespace {
+
+ColumnDirection direction_of(const std::string& name) {
+  if (name == "clockwise") return ColumnDirection::clockwise;
+  if (name == "counter-clockwise") return ColumnDirection::counter_clockwise;
+  throw ContractError("direction", "'" + name + "'", "'clockwise', 'counter-clockwise'");
+}
+
+std::string name_of(ColumnDirection direction) {
+  return direction == ColumnDirection::clockwise ? "clockwise" : "counter-clockwise";
+}
+
+constexpr std::array<const char*, 3> kind_names{"panorama", "equirectangular", "mirror"};
+
+PictureKind kind_of(const std::string& name) {
+  for (std::size_t i = 0; i < kind_names.size(); ++i) {
+    if (name == kind_names[i]) return static_cast<PictureKind>(i);
+  }
+  throw ContractError("kind", "'" + name + "'", "'panorama', 'equirectangular', 'mirror'");
+}
+
+/// Sets the named parameters of a camera model; all that are given must be the model's.
+void set_parameters(CameraModel& model, const py::dict& given) {
+  py::dict left = given.attr("copy")();
+  visit_parameters(model, [&](const auto& name, auto& value) {
+    const py::str key{std::string(name)};
+    if (!left.contains(key)) return;
+    value = left.attr("pop")(key).template cast<std::remove_cvref_t<decltype(value)>>();
+  });
+  if (!left.empty()) {
+    throw ContractError("parameter", std::string(py::repr(left.begin()->first)),
+                        "those of the model '" + std::string(model_name(model)) + "'");
+  }
+}
+
+py::dict parameters_of(const CameraModel& model) {
+  py::dict all;
+  visit_parameters(
+      model, [&](const auto& name, const auto& value) { all[py::str(std::string(name))] = value; });
+  return all;
+}
+
+void bind_cameras(py::module_& m) {
+  py::class_<Camera>(m, "Camera",
+                     "A camera that sees all azimuths: how its pixels and the directions in the "
+                     "robot frame belong together.")
+      .def(py::init([](const std::string& model, std::pair<int, int> image_size,
+                       const py::dict& parameters, std::pair<double, double> centre,
+                       double rim_radius_px, double inner_radius_px, const std::string& direction,
+                       double forward_angle_rad, double forward_column) {
+             const auto known = model_of_name(model);
+             if (!known)
+               throw ContractError("model", "'" + model + "'", "a name of `camera_models`");
+             Camera camera{.model = *known,
+                           .image_size = {image_size.first, image_size.second},
+                           .centre = {centre.first, centre.second},
+                           .rim_radius_px = rim_radius_px,
+                           .inner_radius_px = inner_radius_px,
+                           .direction = direction_of(direction),
+                           .forward_angle_rad = forward_angle_rad,
+                           .forward_column = forward_column};
+             set_parameters(camera.model, parameters);
+             validate(camera);
+             return camera;
+           }),
+           py::arg("model"), py::arg("image_size"), py::arg("parameters") = py::dict(),
+           py::kw_only(), py::arg("centre") = std::pair(0.0, 0.0), py::arg("rim_radius_px") = 0.0,
+           py::arg("inner_radius_px") = 0.0, py::arg("direction") = "clockwise",
+           py::arg("forward_angle_rad") = 0.0, py::arg("forward_column") = 0.5,
+           "`model`: one of `camera_models`; `parameters`: a dictionary of its numbers, as a "
+           "camera file names them; `image_size`: (width, height). Centre and radii in pixels are "
+           "those of a mirror.")
+      .def_property_readonly("model", [](const Camera& c) { return model_name(c.model); })
+      .def_property_readonly("parameters", [](const Camera& c) { return parameters_of(c.model); })
+      .def_property_readonly(
+          "image_size",
+          [](const Camera& c) { return std::pair(c.image_size.width, c.image_size.height); },
+          "(width, height)")
+      .def_property_readonly(
+          "centre", [](const Camera& c) { return std::pair(c.centre.u_px, c.centre.v_px); })
+      .def_readonly("rim_radius_px", &Camera::rim_radius_px)
+      .def_readonly("inner_radius_px", &Camera::inner_radius_px)
+      .def_property_readonly("direction", [](const Camera& c) { return name_of(c.direction); })
+      .def_readonly("forward_angle_rad", &Camera::forward_angle_rad)
+      .def_readonly("forward_column", &Camera::forward_column)
+      .def_property_readonly(
+          "visible_elevations", [](const Camera& c) { return visible_elevations(c); },
+          "(lowest, highest) elevation in radians that is seen at every azimuth.")
+      .def(
+          "project",
+          [](const Camera& camera, const std::tuple<double, double, double>& direction) {
+            const auto pixel = project(camera, std::make_from_tuple<Direction3>(direction));
+            return pixel ? std::optional(std::pair(pixel->u_px, pixel->v_px)) : std::nullopt;
+          },
+          py::arg("direction"),
+          "The pixel (u, v) that shows a direction (x, y, z) of the robot frame; None where the "
+          "camera does not see it.")
+      .def(
+          "unproject",
+          [](const Camera& camera, std::pair<double, double> pixel) {
+            const auto d = unproject(camera, {pixel.first, pixel.second});
+            return d ? std::optional(std::tuple(d->x, d->y, d->z)) : std::nullopt;
+          },
+          py::arg("pixel"), "The unit direction (x, y, z) that a pixel (u, v) shows, or None.")
+      .def("__eq__", [](const Camera& a, const Camera& b) { return a == b; })
+      .def("__repr__",
+           [](const Camera& c) {
+             return "Camera('" + std::string(model_name(c.model)) + "', (" +
+                    std::to_string(c.image_size.width) + ", " +
+                    std::to_string(c.image_size.height) + "))";
+           })
+      .attr("__hash__") = py::none();
+  m.attr("camera_models") = py::tuple(
+      py::cast(std::vector<std::string>(camera_model_names.begin(), camera_model_names.end())));
+  m.def(
+      "read_camera", [](const std::filesystem::path& path) { return read_camera(path).camera; },
+      py::arg("path"), "The camera of a camera file (camera.toml). Raises FileError.");
+  m.def(
+      "write_camera",
+      [](const std::filesystem::path& path, const Camera& camera, const py::object& mask) {
+        CameraFile file{camera, std::nullopt};
+        if (!mask.is_none()) file.mask = PictureArray(mask, "mask").image();
+        write_camera(path, file);
+      },
+      py::arg("path"), py::arg("camera"), py::arg("mask") = py::none(),
+      "Writes a camera file, whole or not at all; a mask (uint8, 0 where the robot itself is seen) "
+      "goes beside it.");
+
+  py::class_<Unwarper>(m, "Unwarper",
+                       "Turns the pictures of one camera into panoramas by a table that is "
+                       "computed once. Several threads may use one at a time.")
+      .def(
+          py::init([](const Camera& camera, const std::optional<ElevationBand>& elevations,
+                      const py::kwargs& keywords) {
+            UnwarperOptions options;
+            Keywords(keywords).options(options).finish();
+            options.elevations = elevations;
+            const py::gil_scoped_release free;
+            return std::make_unique<Unwarper>(camera, options);
+          }),
+          py::arg("camera"), py::arg("elevations") = py::none(),
+          with_options("`elevations`: the band (bottom, top) in radians; None: all that the camera "
+                       "sees at every azimuth.",
+                       {options_of<UnwarperOptions>()})
+              .c_str())
+      .def_property_readonly("rows", &Unwarper::rows)
+      .def_property_readonly("columns", &Unwarper::columns)
+      .def_property_readonly("elevations", &Unwarper::elevations)
+      .def(
+          "unwrap",
+          [](const Unwarper& unwarper, const py::object& picture) {
+            const PictureArray pixels(picture, "picture");
+            const py::gil_scoped_release free;
+            return unwarper.unwrap(pixels.view());
+          },
+          py::arg("picture"),
+          "The panorama of a picture, uint8 of (rows, columns) or (rows, columns, 3).");
+}
+
+}  // namespace
+
+void bind_panoramas(py::module_& m) {
+  py::class_<Panorama>(m, "Panorama",
+                       "A panoramic cylinder of float32: row 0 is the highest elevation, column c "
+                       "looks along azimuth 2 pi c / columns, counter-clockwise, forward at 0.")
+      .def(py::init(&panorama_from_array), py::arg("values"), py::arg("elevations") = py::none(),
+           "`values`: float32, or uint8 for 0 to 1, of (rows, columns), with any strides; copied. "
+           "`elevations`: (bottom, top) of the band in radians; None: unknown.")
+      .def_property_readonly("rows", &Panorama::rows)
+      .def_property_readonly("columns", &Panorama::columns)
+      .def_property_readonly(
+          "elevations", [](const Panorama& p) { return p.elevations(); },
+          "(bottom, top) in radians, or None.")
+      .def_property_readonly(
+          "values",
+          [](const py::object& self) {
+            const auto& p = self.cast<const Panorama&>();
+            return read_only<float>({p.rows(), p.columns()}, p.values().data(), self);
+          },
+          "Read-only array of (rows, columns) that looks at the panorama itself.")
+      .def(
+          "__array__",
+          [](const py::object& self, const py::object& dtype) -> py::object {
+            py::object values = self.attr("values");
+            return dtype.is_none() ? values : values.attr("astype")(dtype);
+          },
+          py::arg("dtype") = py::none())
+      .def(
+          "turned", [](const Panorama& p, int columns) { return turn_columns(p, columns); },
+          py::arg("columns"),
+          "What the robot sees after turning on the spot by so many columns, counter-clockwise.")
+      .def(
+          "to_picture", [](const Panorama& p) { return array_of(to_picture(p)); },
+          "As a picture for people: uint8, clockwise, forward in the middle.")
+      .def("__eq__", [](const Panorama& a, const Panorama& b) { return a == b; })
+      .def("__repr__",
+           [](const Panorama& p) {
+             return "Panorama(" + std::to_string(p.rows()) + " rows, " +
+                    std::to_string(p.columns()) + " columns" +
+                    (p.elevations() ? "" : ", elevations unknown") + ")";
+           })
+      .attr("__hash__") = py::none();
+  m.def(
+      "level_panorama",
+      [](const Panorama& seen, const Tilt& tilt) { return level_panorama(seen, tilt); },
+      py::arg("panorama"), py::arg("tilt"), py::call_guard<py::gil_scoped_release>(),
+      "What the robot would see if its axis were vertical; `tilt` is (roll, pitch) in radians.");
+  m.def(
+      "preprocess",
+      [](const Panorama& panorama, const py::kwargs& keywords) {
+        PreprocessingOptions options;
+        Keywords(keywords).options(options).finish();
+        const py::gil_scoped_release free;
+        return preprocess(panorama, options);
+      },
+      py::arg("panorama"),
+      with_options("What is done to a panorama before its signature is taken.",
+                   {options_of<PreprocessingOptions>()})
+          .c_str());
+
+  bind_cameras(m);
+  py::class_<PictureSource>(m, "PictureSource",
+                            "How pictures become panoramas: all that is known of the camera.")
+      .def(
+          py::init([](const std::string& kind, const std::optional<ElevationBand>& elevations,
+                      const std::optional<ElevationBand>& kept_elevations,
+                      const std::string& direction, double forward_column,
+                      const std::optional<Camera>& camera, const py::object& mask) {
+            PictureSource source{.kind = kind_of(kind),
+                                 .layout = {.direction = direction_of(direction),
+                                            .forward_column = forward_column,
+                                            .elevations = elevations,
+                                            .kept_elevations = kept_elevations},
+                                 .camera = camera,
+                                 .mask = std::nullopt};
+            if (!mask.is_none()) source.mask = PictureArray(mask, "mask").image();
+            return source;
+          }),
+          py::arg("kind") = "panorama", py::kw_only(), py::arg("elevations") = py::none(),
+          py::arg("kept_elevations") = py::none(), py::arg("direction") = "clockwise",
+          py::arg("forward_column") = 0.5, py::arg("camera") = py::none(),
+          py::arg("mask") = py::none(),
+          "`kind`: 'panorama', 'equirectangular' or 'mirror' (which needs `camera`). Bands are "
+          "(bottom, top) in radians: of the picture's edges, and of the part to keep. `direction`: "
+          "how columns run, 'clockwise' or 'counter-clockwise'. `mask`: uint8, 0 where the robot "
+          "itself is seen.")
+      .def_property_readonly(
+          "kind",
+          [](const PictureSource& s) { return kind_names[static_cast<std::size_t>(s.kind)]; })
+      .def_property_readonly("elevations",
+                             [](const PictureSource& s) { return s.layout.elevations; })
+      .def_property_readonly("kept_elevations",
+                             [](const PictureSource& s) { return s.layout.kept_elevations; })
+      .def_property_readonly("direction",
+                             [](const PictureSource& s) { return name_of(s.layout.direction); })
+      .def_property_readonly("forward_column",
+                             [](const PictureSource& s) { return s.layout.forward_column; })
+      .def_readonly("camera", &PictureSource::camera)
+      .def("__eq__", [](const PictureSource& a, const PictureSource& b) { return a == b; })
+      .def("__repr__",
+           [](const PictureSource& s) {
+             return "PictureSource('" + std::string(kind_names[static_cast<std::size_t>(s.kind)]) +
+                    "')";
+           })
+      .attr("__hash__") = py::none();
+  py::class_<PanoramaReader>(
+      m, "PanoramaReader",
+      "Turns the pictures of one source into panoramas of one shape. Several "
+      "threads may use one at a time.")
+      .def(py::init([](const PictureSource& source, const PanoramaShape& shape) {
+             return PanoramaReader(source, shape);
+           }),
+           py::arg("source"), py::arg("shape") = PanoramaShape{},
+           py::call_guard<py::gil_scoped_release>(),
+           "`shape`: (rows, columns); 0 keeps the pictures' own, 80 x 512 for mirror pictures.")
+      .def(
+          "convert",
+          [](const PanoramaReader& reader, const py::object& picture, const Tilt& tilt) {
+            const PictureArray pixels(picture, "picture");
+            const py::gil_scoped_release free;
+            return reader.convert(pixels.view(), tilt);
+          },
+          py::arg("picture"), py::arg("tilt") = Tilt{},
+          "The panorama of a picture; with a tilt (roll, pitch), what a level robot would have "
+          "seen.")
+      .def("read", &PanoramaReader::read, py::arg("path"), py::call_guard<py::gil_scoped_release>(),
+           "Reads a PNG or JPEG file and converts it.");
+}
+
+}  // namespace panonav::python

@@ -1,0 +1,232 @@
+#include "recordings.hpp"
+
+#include "panonav/core/error.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav/io/recorded_dataset.hpp"
+#include "panonav/io/recording.hpp"
+#include "panonav/io/trajectory_file.hpp"
+#include "panonav/io/video_file.hpp"
+#include "panonav/pipeline/memoriser.hpp"
+#include "panonav/pipeline/observation_source.hpp"
+
+namespace panonav::python {
+
+Dataset open_dataset(const std::filesystem::path& path,
+                     const std::optional<PictureSource>& source) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(path, ignored)) {
+    throw FileError(path.string(), "there is no such file or folder");
+  }
+  const bool folder = std::filesystem::is_directory(path, ignored);
+  if (folder && std::filesystem::exists(path / "dataset.toml", ignored)) return read_dataset(path);
+  if (!source) {
+    throw FileError(path.string(),
+                    "does not say how its pictures lie; say it with a PictureSource");
+  }
+  if (is_recording(path)) return read_recording(path, *source).dataset;
+  if (folder) return read_picture_folder(path, *source);
+  return is_video(path) ? read_video(path, *source) : single_picture(path, *source);
+}
+
+Dataset dataset_from(const py::handle& recording, const std::optional<PictureSource>& source) {
+  if (py::isinstance<Dataset>(recording)) return recording.cast<const Dataset&>();
+  const auto path = recording.cast<std::filesystem::path>();
+  const py::gil_scoped_release free;
+  return open_dataset(path, source);
+}
+
+namespace {
+
+py::object picture_of(const Observation& seen) {
+  if (const auto* panorama = std::get_if<Panorama>(&seen.picture)) return py::cast(*panorama);
+  return array_of(std::get<Image>(seen.picture));
+}
+
+void bind_observations(py::module_& m) {
+  py::class_<Observation>(m, "Observation",
+                          "One moment of a robot: what its camera saw, and what else is known of "
+                          "it. A picture alone counts as one.")
+      .def(py::init([](const py::object& picture, const std::string& name,
+                       std::optional<double> stamp_s, const std::optional<Pose2>& odometry,
+                       const std::optional<ReferencePose>& pose, const std::optional<Tilt>& tilt) {
+             Observation seen = observation_from(picture);
+             if (!name.empty()) seen.name = name;
+             seen.stamp_s = stamp_s;
+             seen.odometry = odometry;
+             seen.pose = pose;
+             seen.tilt = tilt;
+             return seen;
+           }),
+           py::arg("picture"), py::kw_only(), py::arg("name") = "", py::arg("stamp_s") = py::none(),
+           py::arg("odometry") = py::none(), py::arg("pose") = py::none(),
+           py::arg("tilt") = py::none(),
+           "`picture`: a Panorama, an array of pixels as the camera delivers them (uint8), or the "
+           "path of a picture. `odometry`: absolute, in a frame that drifts. `pose`: in the world "
+           "frame, where it is known. `tilt`: (roll, pitch) in radians.")
+      .def_property_readonly("picture", &picture_of, "A Panorama, or an array of pixels.")
+      .def_readonly("name", &Observation::name)
+      .def_readonly("stamp_s", &Observation::stamp_s)
+      .def_readonly("odometry", &Observation::odometry)
+      .def_readonly("pose", &Observation::pose)
+      .def_property_readonly("tilt", [](const Observation& o) { return o.tilt; })
+      .def("__repr__", [](const Observation& o) { return "Observation('" + o.name + "')"; });
+}
+
+void bind_datasets(py::module_& m) {
+  Record<DatasetEntry>(m, "DatasetEntry", "One picture of a data set and what is known of it.")
+      .field("file", &DatasetEntry::file, "As the data set names it; unique.")
+      .field("stamp_s", &DatasetEntry::stamp_s, "")
+      .field("pose", &DatasetEntry::pose, "In the world frame, or None.")
+      .field("odometry", &DatasetEntry::odometry, "In the odometry frame, or None.")
+      .field(
+          "tilt", [](const DatasetEntry& e) { return e.tilt; }, "(roll, pitch), or None.")
+      .type()
+      .def(
+          "observation", [](const DatasetEntry& entry) { return read_observation(entry); },
+          py::call_guard<py::gil_scoped_release>(), "Reads the picture. Raises FileError.");
+  py::class_<Dataset>(m, "Dataset",
+                      "A recording: pictures in order, which are read when they are needed. "
+                      "Iterating gives its observations.")
+      .def(py::init(&open_dataset), py::arg("path"), py::arg("source") = py::none(),
+           py::call_guard<py::gil_scoped_release>(),
+           "A data set (a folder with dataset.toml) describes itself. `source` says how the "
+           "pictures of a folder, a video, a recording of topics (MCAP, rosbag2, ROS 1 bag) or a "
+           "single picture lie.")
+      .def_readonly("source", &Dataset::source)
+      .def_readonly("entries", &Dataset::entries)
+      .def_readonly("left_out", &Dataset::left_out, "What lies in a folder and is no picture.")
+      .def("__len__", [](const Dataset& d) { return d.entries.size(); })
+      .def(
+          "__getitem__",
+          [](const Dataset& d, py::ssize_t index) {
+            const auto size = static_cast<py::ssize_t>(d.entries.size());
+            if (index < -size || index >= size) throw py::index_error("no such picture");
+            const auto& entry =
+                d.entries[static_cast<std::size_t>(index < 0 ? index + size : index)];
+            const py::gil_scoped_release free;
+            return read_observation(entry);
+          },
+          py::arg("index"), "Reads an observation.")
+      .def(
+          "select",
+          [](const Dataset& d, int every, std::optional<double> every_s,
+             std::optional<double> from_s, std::optional<double> to_s) {
+            Dataset part = d;
+            select_pictures(part, {every, every_s, from_s, to_s});
+            return part;
+          },
+          py::arg("every") = 1, py::kw_only(), py::arg("every_s") = py::none(),
+          py::arg("from_s") = py::none(), py::arg("to_s") = py::none(),
+          "A part of it: each n-th picture, or by seconds from the first.")
+      .def("__repr__", [](const Dataset& d) {
+        return "Dataset('" + d.folder.string() + "', " + std::to_string(d.entries.size()) +
+               " pictures)";
+      });
+  m.def(
+      "read_image",
+      [](const std::filesystem::path& path) {
+        const Image image = [&] {
+          const py::gil_scoped_release free;
+          return read_image(path);
+        }();
+        return array_of(image);
+      },
+      py::arg("path"),
+      "A PNG or JPEG file, upright, as uint8 of (rows, columns) or (rows, columns, 3).");
+  m.def(
+      "write_png",
+      [](const std::filesystem::path& path, const py::object& picture) {
+        const PictureArray pixels(picture, "picture");
+        const py::gil_scoped_release free;
+        write_png(path, pixels.view());
+      },
+      py::arg("path"), py::arg("picture"), "Writes a PNG that appears whole or not at all.");
+}
+
+void bind_memorising(py::module_& m) {
+  Record<Memoriser::Counts>(m, "MemorisedCounts", "What was added to a memory.")
+      .field("appended", &Memoriser::Counts::appended, "Views.")
+      .field("known_before", &Memoriser::Counts::known_before,
+             "Observations whose views were there.");
+  const std::string options =
+      with_options("", {options_of<SignatureOptions>(), options_of<PreprocessingOptions>()});
+  const auto options_from = [](const std::optional<PictureSource>& source, bool thumbnails,
+                               bool features, const py::kwargs& keywords) {
+    MemoriserOptions wanted{.source = source, .thumbnails = thumbnails, .features = features};
+    Keywords(keywords).options(wanted.signature).options(wanted.preprocessing).finish();
+    return wanted;
+  };
+  using SharedMemoriser = Shared<Memoriser>;
+  py::class_<SharedMemoriser>(m, "Memoriser",
+                              "Appends observations to a memory file, which is made where there is "
+                              "none.")
+      .def(py::init([=](const std::filesystem::path& memory,
+                        const std::optional<PictureSource>& source, bool thumbnails, bool features,
+                        const py::kwargs& keywords) {
+             return std::make_unique<SharedMemoriser>(
+                 memory, options_from(source, thumbnails, features, keywords));
+           }),
+           py::arg("memory"), py::arg("source") = py::none(), py::arg("thumbnails") = true,
+           py::arg("features") = true,
+           ("`source` says how pictures lie; a new file needs it. Options are those of a new "
+            "file." +
+            options)
+               .c_str())
+      .def(
+          "add",
+          [](SharedMemoriser& memoriser, const py::object& observation, const std::string& name) {
+            Observation seen = observation_from(observation);
+            if (!name.empty()) seen.name = name;
+            memoriser.change([&](Memoriser& one) { one.add(std::move(seen)); });
+          },
+          py::arg("observation"), py::arg("name") = "",
+          "The observation's name becomes the view's. A new file appears with its 32nd "
+          "observation, or at `finish`; after that a view is on the disk when this returns.")
+      .def(
+          "finish",
+          [](SharedMemoriser& memoriser) {
+            return memoriser.change([](Memoriser& one) { return one.finish(); });
+          },
+          "Writes what still waits and keeps in the file what is learnt of its views.");
+  m.def(
+      "memorise",
+      [=](const py::object& recording, const std::filesystem::path& memory,
+          const std::optional<PictureSource>& source, bool thumbnails, bool features, int threads,
+          const py::kwargs& keywords) {
+        const Dataset dataset = dataset_from(recording, source);
+        const auto wanted = options_from(dataset.source, thumbnails, features, keywords);
+        const py::gil_scoped_release free;
+        InterruptibleExecutor executor(threads);
+        Memoriser memoriser(memory, wanted);
+        DatasetObservations observations(dataset, executor);
+        std::vector<Observation> batch;
+        const auto add = [&] {
+          if (!batch.empty()) memoriser.add(std::move(batch), executor);
+          batch.clear();
+        };
+        while (auto seen = observations.next()) {
+          batch.push_back(std::move(*seen));
+          if (batch.size() == DatasetObservations::decoded_ahead) add();
+        }
+        add();
+        return memoriser.finish(executor);
+      },
+      py::arg("recording"), py::arg("memory"), py::arg("source") = py::none(),
+      py::arg("thumbnails") = true, py::arg("features") = true, py::arg("threads") = 0,
+      ("Remembers what the places of a recording look like, as `panonav memorise` does.\n\n"
+       "`recording`: a Dataset or a path; `memory`: the file, which grows if it is there. A "
+       "picture that cannot be read raises FileError; those before it are kept. threads: 0 takes "
+       "one for each core." +
+       options)
+          .c_str());
+}
+
+}  // namespace
+
+void bind_recordings(py::module_& m) {
+  bind_observations(m);
+  bind_datasets(m);
+  bind_memorising(m);
+}
+
+}  // namespace panonav::python

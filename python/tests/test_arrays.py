@@ -1,0 +1,134 @@
+"""Arrays of any layout are read right or refused; what is handed out looks at the object itself."""
+import gc
+
+import numpy
+import pytest
+
+import panonav
+
+VALUES = numpy.random.default_rng(1).random((16, 64), dtype=numpy.float32)
+
+
+def test_panorama_takes_any_strides_and_never_misreads():
+    whole = panonav.Panorama(VALUES)
+    assert numpy.array_equal(whole.values, VALUES)
+    for array in (VALUES.T.copy().T, numpy.asfortranarray(VALUES), VALUES[::-1][::-1]):
+        assert panonav.Panorama(array) == whole
+    assert numpy.array_equal(panonav.Panorama(VALUES[1::3, ::2]).values, VALUES[1::3, ::2])
+    assert numpy.array_equal(panonav.Panorama(VALUES[:, ::-1]).values, VALUES[:, ::-1])
+    locked = VALUES.copy()
+    locked.flags.writeable = False
+    assert panonav.Panorama(locked) == whole
+
+
+def test_panorama_of_bytes_is_zero_to_one():
+    pixels = numpy.arange(64, dtype=numpy.uint8).reshape(4, 16) * 4
+    assert numpy.array_equal(panonav.Panorama(pixels).values, pixels.astype(numpy.float32) / numpy.float32(255))
+
+
+@pytest.mark.parametrize("array, line", [
+    (VALUES.astype(numpy.float64), "dtype of values is float64; allowed: float32, or uint8 for 0 to 1"),
+    (VALUES.astype(">f4"), "dtype of values"),
+    (VALUES.astype(numpy.int32), "dtype of values"),
+    (VALUES[0], "shape of values is (64,); allowed: (rows, columns)"),
+    (VALUES[None], "shape of values"),
+    (numpy.zeros((0, 8), numpy.float32), "rows"),
+    (numpy.zeros((8, 0), numpy.float32), "columns"),
+    (numpy.full((4, 8), numpy.nan, numpy.float32), "finite"),
+    ([[1, 2], [3, 4]], "values is list; allowed: a numpy array"),
+    (None, "allowed: a numpy array"),
+])
+def test_panorama_refuses(array, line):
+    with pytest.raises(panonav.ContractError) as caught:
+        panonav.Panorama(array)
+    assert isinstance(caught.value, ValueError)
+    assert line in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_pictures_of_any_layout_are_the_same():
+    pixels = numpy.random.default_rng(2).integers(0, 255, (32, 64, 3), dtype=numpy.uint8)
+    reader = panonav.PanoramaReader(panonav.PictureSource("panorama"), (16, 64))
+    right = reader.convert(pixels)
+    padded = numpy.zeros((32, 80, 3), numpy.uint8)
+    padded[:, 8:72] = pixels
+    planes = numpy.ascontiguousarray(numpy.moveaxis(pixels, 2, 0))
+    upside_down = numpy.ascontiguousarray(pixels[::-1])
+    for same in (padded[:, 8:72], numpy.moveaxis(planes, 0, 2), upside_down[::-1], numpy.asfortranarray(pixels)):
+        assert reader.convert(same) == right
+
+
+@pytest.mark.parametrize("picture", [
+    numpy.zeros((4, 8), numpy.float32), numpy.zeros((4, 8, 4), numpy.uint8), numpy.zeros(8, numpy.uint8),
+    numpy.zeros((0, 8), numpy.uint8), numpy.zeros((4, 8), bool), "missing.png", 3, None,
+])
+def test_wrong_pictures_are_refused_in_one_line(picture):
+    with pytest.raises((panonav.ContractError, panonav.FileError)) as caught:
+        panonav.Observation(picture)
+    assert "\n" not in str(caught.value)
+
+
+def test_what_is_handed_out_is_read_only_and_outlives_its_owner():
+    panorama = panonav.Panorama(VALUES)
+    values = panorama.values
+    assert values.base is panorama
+    with pytest.raises(ValueError):
+        values[0, 0] = 1
+    signature = panonav.compute_signature(panorama, 8)
+    magnitudes, phases = signature.magnitudes, signature.packed(1.0).phases
+    assert magnitudes.shape == (8, 16) and phases.dtype == numpy.uint8
+    before = values.copy(), magnitudes.copy(), phases.copy()
+    del panorama, signature
+    gc.collect()
+    for array, kept in zip((values, magnitudes, phases), before):
+        assert numpy.array_equal(array, kept)
+
+
+def test_signature_is_the_fourier_transform():
+    signature = panonav.compute_signature(panonav.Panorama(VALUES), 8)
+    expected = 2 / 64 * numpy.abs(numpy.fft.rfft(VALUES, axis=1))[:, :8].T
+    assert numpy.allclose(signature.magnitudes, expected, atol=1e-5)
+    again = panonav.FourierSignature(signature.magnitudes, signature.phases_rad)
+    assert again == signature
+    assert panonav.PackedSignature(signature.packed(0.5).magnitudes, signature.packed(0.5).phases) == signature.packed(0.5)
+    with pytest.raises(panonav.ContractError, match="shape of phases_rad"):
+        panonav.FourierSignature(signature.magnitudes, signature.phases_rad[:4])
+    with pytest.raises(panonav.ContractError, match="components"):
+        panonav.compute_signature(panonav.Panorama(VALUES), 33)
+
+
+def test_compass_reads_a_turn():
+    panorama = panonav.Panorama(VALUES)
+    reading = panonav.compass(panonav.compute_signature(panorama.turned(16)), panonav.compute_signature(panorama))
+    assert reading.heading_rad == pytest.approx(numpy.pi / 2, abs=1e-4)
+    flat = panonav.compute_signature(panonav.Panorama(numpy.zeros((16, 64), numpy.float32)))
+    assert panonav.compass(flat, flat) is None
+
+
+def test_options_have_ranges_names_and_types():
+    panorama = panonav.Panorama(VALUES)
+    assert panonav.preprocess(panorama, remove_mean=False, normalise_gain=False) == panorama
+    for wrong, line in [({"remove_men": True}, "there is no option 'remove_men'; did you mean 'remove_mean'?"),
+                        ({"zzz": 1}, "there is no option 'zzz'; allowed: masked_rows_top"),
+                        ({"masked_rows_top": -1}, "masked_rows_top is -1; allowed: >= 0"),
+                        ({"masked_rows_top": 1.5}, "masked_rows_top is 1.5; allowed: whole numbers"),
+                        ({"remove_mean": 1}, "remove_mean is 1; allowed: True, False")]:
+        with pytest.raises(ValueError) as caught:
+            panonav.preprocess(panorama, **wrong)
+        assert line in str(caught.value)
+    assert "masked_rows_top: int = 0" in panonav.preprocess.__doc__
+
+
+def test_camera_projects_and_unwraps():
+    camera = panonav.Camera("hyperboloidal", (320, 240), {"focal_length_px": 100.0}, centre=(160, 120),
+                            rim_radius_px=110, inner_radius_px=15)
+    pixel = camera.project((1, 0, 0))
+    assert camera.unproject(pixel) == pytest.approx((1, 0, 0), abs=1e-9)
+    assert camera.project((0, 0, 1)) is None
+    unwarper = panonav.Unwarper(camera, rows=20, columns=64)
+    panorama = unwarper.unwrap(numpy.full((240, 320, 3), 128, numpy.uint8))
+    assert numpy.allclose(panorama.values, 128 / 255, atol=0.01)
+    assert panorama.elevations == unwarper.elevations
+    with pytest.raises(panonav.ContractError):
+        unwarper.unwrap(numpy.zeros((4, 8), numpy.uint8))
+    with pytest.raises(panonav.ContractError, match="nonsense"):
+        panonav.Camera("hyperboloidal", (320, 240), {"nonsense": 1})

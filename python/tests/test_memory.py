@@ -1,0 +1,132 @@
+"""Memories: exact search from any number of threads, bulk appending, lifetimes, files."""
+import concurrent.futures
+import gc
+
+import numpy
+import pytest
+
+import panonav
+
+
+@pytest.fixture(scope="module")
+def arrays():
+    random = numpy.random.default_rng(5)
+    magnitudes = random.integers(0, 256, (3000, 8, 20), dtype=numpy.uint8)
+    return magnitudes, random.integers(0, 256, magnitudes.shape, dtype=numpy.uint8)
+
+
+@pytest.fixture(scope="module")
+def memory(arrays):
+    memory = panonav.VisualMemory((20, 8), 1.0)
+    memory.extend(*arrays)
+    return memory
+
+
+def nearest(magnitudes, query, top=10):
+    sums = numpy.abs(magnitudes.astype(int) - query.astype(int)).sum(axis=(1, 2))
+    order = numpy.lexsort((numpy.arange(len(sums)), sums))[:top]
+    return [(int(i), int(sums[i])) for i in order]
+
+
+def test_search_is_a_full_scan_from_eight_threads(arrays, memory):
+    random = numpy.random.default_rng(6)
+    queries = [numpy.clip(arrays[0][i].astype(int) + random.integers(-9, 9, (8, 20)), 0, 255).astype(numpy.uint8)
+               for i in random.integers(0, 3000, 64)]
+
+    def ask(query):
+        found = memory.search(panonav.PackedSignature(query, numpy.zeros_like(query)))
+        return [(match.view, match.dissimilarity) for match in found.matches]
+
+    with concurrent.futures.ThreadPoolExecutor(8) as threads:
+        answers = list(threads.map(ask, queries))
+    assert answers == [nearest(arrays[0], query) for query in queries]
+
+
+def test_memory_may_grow_while_threads_ask(arrays):
+    memory = panonav.VisualMemory((20, 8), 1.0)
+    memory.extend(arrays[0][:100], arrays[1][:100])
+    query = memory.packed(7)
+
+    def ask(_):
+        return memory.search(query, top=1).matches[0].view
+
+    with concurrent.futures.ThreadPoolExecutor(8) as threads:
+        asked = [threads.submit(ask, i) for i in range(200)]
+        for i in range(100, 300, 50):
+            memory.extend(arrays[0][i:i + 50], arrays[1][i:i + 50])
+        assert {one.result() for one in asked} == {7}
+    assert len(memory) == 300
+
+
+def test_views_keep_poses_names_and_links(arrays):
+    memory = panonav.VisualMemory((20, 8), 1.0, elevations=(-0.5, 0.5))
+    memory.extend(arrays[0][:3], arrays[1][:3], names=["a", "b", "c"],
+                  poses=[[0, 0, 1], [1, 2, numpy.nan], [numpy.nan] * 3])
+    assert memory.info(1).to_dict() == {"name": "b", "pose": {"x_m": 1, "y_m": 2, "heading_rad": None}, "stamp_s": None}
+    assert memory.info(2).pose is None and memory.find("c") == 2 and memory.find("d") is None
+    assert numpy.array_equal(memory.poses()[:2], [[0, 0, 1], [1, 2, numpy.nan]], equal_nan=True)
+    memory.link(0, 2, "closure")
+    assert [link.to_dict() for link in memory.links] == [{"a": 0, "b": 2, "kind": "closure"}]
+    memory.remove(0)
+    assert memory.views == [1, 2] and memory.links == []
+    assert memory.append(memory.packed(1), "d", pose=(3, 4)) == 3
+    assert memory.elevations == (-0.5, 0.5)
+
+
+@pytest.mark.parametrize("change", [
+    lambda m, a: m.extend(a[0][:2].astype(float), a[1][:2]),
+    lambda m, a: m.extend(a[0][:2, :4], a[1][:2, :4]),
+    lambda m, a: m.extend(a[0][:2], a[1][:3]),
+    lambda m, a: m.extend(a[0][:2], a[1][:2], names=["one"]),
+    lambda m, a: m.extend(a[0][:2], a[1][:2], names=["same", "same"]),
+    lambda m, a: m.extend(a[0][:2], a[1][:2], poses=[[0, 0]]),
+    lambda m, a: m.extend(a[0][:2], a[1][:2], poses="nowhere"),
+    lambda m, a: m.append(m.packed(0), "0"),
+    lambda m, a: m.append(m.packed(0), ""),
+    lambda m, a: m.info(99999),
+    lambda m, a: m.search(panonav.PackedSignature(a[0][0, :4], a[1][0, :4])),
+    lambda m, a: m.search(m.packed(0), top=0),
+    lambda m, a: m.link(0, 0),
+    lambda m, a: m.link(0, 1, "friendship"),
+])
+def test_wrong_values_are_refused_in_one_line(arrays, change):
+    memory = panonav.VisualMemory((20, 8), 1.0)
+    memory.extend(arrays[0][:2], arrays[1][:2])
+    with pytest.raises(panonav.ContractError) as caught:
+        change(memory, arrays)
+    assert "\n" not in str(caught.value)
+
+
+def test_results_outlive_their_memory(office):
+    file = panonav.MemoryFile(office / "office.panonav")
+    memory = file.load()
+    size, header = len(memory), file.header
+    found = memory.search(memory.packed(memory.views[3]))
+    recogniser = panonav.PlaceRecogniser(file)
+    place = recogniser.localise(office / "query_run" / panonav.Dataset(office / "query_run").entries[0].file)
+    matches, position = place.matches, place.position
+    copy = recogniser.memory
+    del file, memory, recogniser, place
+    gc.collect()
+    assert found.matches[0].dissimilarity == 0 and found.matches[0].view == 4
+    assert len(copy) == size and header.shape == (32, 15)
+    assert matches[0].name.endswith(".png") and abs(position.x_m) < 100
+
+
+def test_files(office, tmp_path):
+    file = panonav.MemoryFile(office / "office.panonav")
+    assert file.verify() == [] and file.info().views == len(file.names())
+    assert file.find(file.names()[0]) == file.named(file.names()[0]) == file.named("1")
+    assert file.thumbnail(1).startswith(b"\x89PNG")
+    with pytest.raises(panonav.FileError, match="has no view of the name"):
+        file.named("nowhere")
+    with pytest.raises(panonav.Error):
+        file.rename(1, "other")  # opened for reading
+    for wrong in ("missing.panonav", __file__):
+        with pytest.raises(OSError) as caught:
+            panonav.MemoryFile(wrong)
+        assert str(wrong) in str(caught.value)
+    with pytest.raises(panonav.FileError):
+        panonav.Dataset(tmp_path / "missing")
+    with pytest.raises(panonav.FileError, match="PictureSource"):
+        panonav.Dataset(tmp_path)
