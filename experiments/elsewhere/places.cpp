@@ -157,7 +157,7 @@ void reproduce_tracked_poses(const ElsewhereReproductionOptions& options,
     const auto remembered = remember_for_tracking(place, executor);
     const auto walks = record_walks(
         place, *remembered, clean_condition(),
-        {.variants = 1, .runs_each = std::max(1, options.runs / 8), .seed = options.seed},
+        {.variants = 1, .runs_each = std::max(1, options.runs / 2), .seed = options.seed},
         executor);
     const auto squares = make_each(executor, walks.size(), [&](std::size_t i) {
       std::vector<double> found;

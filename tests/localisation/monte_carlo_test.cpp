@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -10,6 +11,8 @@
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/localisation/internal/position_error.hpp"
 #include "panonav/motion/path.hpp"
 #include "support/remembered_worlds.hpp"
 #include "support/skips.hpp"
@@ -239,6 +242,86 @@ TEST(MonteCarlo, BlindStretchesWidenTheCloudAndTheNextImageNarrowsIt) {
   const MonteCarloEstimate after = filter.observe(run.views[13]);
   EXPECT_LT(after.modes.at(0).spread_m, 0.5 * filter.model().spacing_m);
   EXPECT_LT(error_m(after, run.poses[13]), place.step_m);
+}
+
+// A filter that is linear, so that its true covariance is known from many runs: the particles'
+// variance is that of a Kalman filter which weighs views by `share`.
+TEST(MonteCarlo, TheStatedCovarianceIsThatOfErrorsThatResembleEachOther) {
+  constexpr int runs = 20000;
+  constexpr int images = 25;
+  constexpr double view_m2 = 0.04;  // of each of x and y
+  constexpr double odometry_m2 = 0.0002;
+  constexpr double scale = 0.05;
+  constexpr double correlation = 0.7;
+  constexpr double share = 1.0 - correlation;
+  const Pose2 step{0.25, 0.0, 0.1};
+
+  PositionError stated;
+  stated.begin(2.0 * view_m2);
+  std::vector<double> kept;
+  double particles_m2 = view_m2;
+  for (int i = 1; i < images; ++i) {
+    stated.move(step);
+    const double before_m2 = particles_m2 + odometry_m2;
+    particles_m2 = 1.0 / (1.0 / before_m2 + share / view_m2);
+    kept.push_back(particles_m2 / before_m2);
+    stated.observe(2.0 * before_m2, 2.0 * particles_m2, share, correlation, 1e9);
+  }
+  Random random(5);
+  double xx = 0.0;
+  double xy = 0.0;
+  double yy = 0.0;
+  double heading_rad = 0.0;
+  for (int r = 0; r < runs; ++r) {
+    const double wrong_scale = random.normal(0.0, scale);
+    Point2 view{random.normal(0.0, std::sqrt(view_m2)), random.normal(0.0, std::sqrt(view_m2))};
+    Point2 error = view;
+    heading_rad = 0.0;
+    for (const double k : kept) {
+      error.x_m += wrong_scale * step.x_m * std::cos(heading_rad);
+      error.y_m += wrong_scale * step.x_m * std::sin(heading_rad);
+      heading_rad += step.heading_rad;
+      const double fresh = std::sqrt(view_m2 * (1.0 - correlation * correlation));
+      view.x_m = correlation * view.x_m + random.normal(0.0, fresh);
+      view.y_m = correlation * view.y_m + random.normal(0.0, fresh);
+      const double deviation = std::sqrt(odometry_m2);
+      error.x_m = k * (error.x_m + random.normal(0.0, deviation)) + (1.0 - k) * view.x_m;
+      error.y_m = k * (error.y_m + random.normal(0.0, deviation)) + (1.0 - k) * view.y_m;
+    }
+    xx += error.x_m * error.x_m / runs;
+    xy += error.x_m * error.y_m / runs;
+    yy += error.y_m * error.y_m / runs;
+  }
+  const std::array<double, 9> particles{particles_m2, 0, 0, 0, particles_m2, 0, 0, 0, 0.01};
+  const auto covariance = stated.stated(particles, heading_rad, scale);
+  EXPECT_NEAR(covariance[0], xx, 0.04 * xx);
+  EXPECT_NEAR(covariance[1], xy, 0.04 * xx);
+  EXPECT_NEAR(covariance[4], yy, 0.04 * yy);
+  EXPECT_EQ(covariance[8], 0.01);
+  EXPECT_GT(xx + yy, 2.6 * particles_m2);  // what the particles alone would say is 2
+}
+
+TEST(MonteCarlo, SuccessiveViewsThatResembleEachOtherMakeThePositionLessSure) {
+  const RememberedRoom place(78, {}, 0.3);
+  const Walk run = walk(place, 8, 9);
+  MonteCarloLocaliser filter =
+      quick_filter(place.memory, {.min_particles = 1000, .max_particles = 1000});
+  const auto ratio = [&] {
+    const PoseBins bins{.cell_m = filter.model().spacing_m, .headings = 24};
+    const PoseMode stated = filter.estimate().modes.at(0);
+    const PoseMode particles = find_modes(filter.particles(), bins).modes.at(0);
+    EXPECT_EQ(stated.heading_spread_rad, particles.heading_spread_rad);
+    EXPECT_NEAR(stated.spread_m, std::sqrt(stated.covariance[0] + stated.covariance[4]), 1e-12);
+    return stated.spread_m / particles.spread_m;
+  };
+  filter.observe(run.views[0]);
+  EXPECT_NEAR(ratio(), 1.0, 1e-9);
+  for (std::size_t k = 1; k < run.poses.size(); ++k) {
+    filter.move(run.step(k));
+    filter.observe(run.views[k]);
+  }
+  EXPECT_GT(ratio(), 1.05);
+  EXPECT_LT(ratio(), 2.0);
 }
 
 TEST(MonteCarlo, ARobotThatStandsStillDoesNotBecomeSurer) {

@@ -13,6 +13,7 @@
 #include "panonav/kernels/similarity.hpp"
 #include "panonav/localisation/hierarchical.hpp"
 #include "panonav/localisation/internal/particle_motion.hpp"
+#include "panonav/localisation/internal/position_error.hpp"
 #include "panonav/localisation/internal/resampling.hpp"
 #include "panonav/localisation/internal/view_likelihood.hpp"
 
@@ -63,6 +64,7 @@ struct MonteCarloLocaliser::Implementation {
   std::vector<float> log_ratios_below_most;
   std::vector<float> factors;
   double travelled_m = 0.0;  // since the last image
+  PositionError error;
   bool knows_nothing = true;
   double inside = 0.5;  // belief that the robot is in the memorised area
   MonteCarloEstimate latest;
@@ -141,7 +143,7 @@ struct MonteCarloLocaliser::Implementation {
   };
   Weighed take_share(double share);
   Weighed take_bearable_share(double& share);
-  double weigh();
+  double weigh(double whole);
   void resample(std::size_t count, bool spread);
   int inject_explained(double log_here);
   int inject_fixed(const PackedSignature& view);
@@ -273,12 +275,8 @@ MonteCarloLocaliser::Implementation::take_bearable_share(double& share) {
 // Weighs the particles by the view, in stages when one would leave only few of them: after each
 // stage they are resampled and spread by the kernel that their number and spread call for
 // (progressive correction of a regularised particle filter; Musso, Oudjane and Le Gland 2001).
-// Returns the logarithm of the mean likelihood.
-double MonteCarloLocaliser::Implementation::weigh() {
-  // Views from nearly the same place are alike, also in what misleads: they count for less, as far
-  // as views at that distance resemble each other.
-  const double whole =
-      knows_nothing ? 1.0 : std::max(min_share, 1.0 - std::exp(-travelled_m / model.range_m));
+// The view counts by the exponent `whole`. Returns the logarithm of the mean likelihood.
+double MonteCarloLocaliser::Implementation::weigh(double whole) {
   double evidence = 0.0;
   double evidence_in_full = 0.0;
   double left = whole;
@@ -419,7 +417,12 @@ MonteCarloEstimate MonteCarloLocaliser::Implementation::observe(const PackedSign
       options.injection == ParticleInjection::topological) {
     latest.injected = inject_fixed(view);
   }
-  latest.log_here = weigh();
+  // Views from nearly the same place are alike, also in what misleads: they count for less, as far
+  // as views at that distance resemble each other.
+  const double correlation = std::exp(-travelled_m / model.range_m);
+  const double share = knows_nothing ? 1.0 : std::max(min_share, 1.0 - correlation);
+  const ParticleModes before = knows_nothing ? ParticleModes{} : find_modes(particles, bins());
+  latest.log_here = weigh(share);
   double evidence = latest.log_here;
   if (options.injection == ParticleInjection::explained) {
     latest.injected = inject_explained(latest.log_here);
@@ -440,6 +443,17 @@ MonteCarloEstimate MonteCarloLocaliser::Implementation::observe(const PackedSign
   const ParticleModes found = find_modes(particles, bins());
   latest.particles = static_cast<int>(particles.size());
   latest.effective_particles = effective_sample_size(particles.weight);
+  if (!found.modes.empty()) {
+    const auto variance_m2 = [](const ParticleModes& of) {
+      return of.modes.front().covariance[0] + of.modes.front().covariance[4];
+    };
+    if (before.modes.empty()) {
+      error.begin(variance_m2(found));
+    } else {
+      error.observe(variance_m2(before), variance_m2(found), share, correlation,
+                    latest.effective_particles);
+    }
+  }
   describe(latest, found);
   if (latest.effective_particles < options.resample_below * static_cast<double>(particles.size())) {
     latest.resampled = true;
@@ -454,6 +468,11 @@ MonteCarloEstimate MonteCarloLocaliser::Implementation::observe(const PackedSign
 void MonteCarloLocaliser::Implementation::describe(MonteCarloEstimate& estimate,
                                                    const ParticleModes& found) const {
   estimate.modes = found.modes;
+  for (PoseMode& mode : estimate.modes) {
+    mode.covariance =
+        error.stated(mode.covariance, mode.mean.heading_rad, odometry.translation_scale_error);
+    mode.spread_m = std::sqrt(mode.covariance[0] + mode.covariance[4]);
+  }
   estimate.spread_m = spread_of(particles);
   estimate.inside = inside;
   estimate.probability = found.modes.empty() ? 0.0 : inside * found.modes.front().weight;
@@ -506,6 +525,7 @@ void MonteCarloLocaliser::start_anywhere(std::optional<double> heading_rad) {
         std::min(sites - 1, static_cast<std::size_t>(share * static_cast<double>(sites)));
     own.particles.set(i, own.anywhere_around(site, heading_rad), 1.0 / static_cast<double>(count));
   }
+  own.error = {};
   own.inside = 0.5;
   own.knows_nothing = true;
   own.latest = {};
@@ -522,6 +542,7 @@ void MonteCarloLocaliser::start_at(const Pose2& pose, double deviation_m,
     const double heading = own.random.normal(pose.heading_rad, heading_deviation_rad);
     own.particles.set(i, {x, y, wrap_angle(heading)}, 1.0 / static_cast<double>(count));
   }
+  own.error = {};
   own.inside = 1.0 - leaving;
   own.knows_nothing = false;
   own.latest = {};
@@ -530,6 +551,7 @@ void MonteCarloLocaliser::start_at(const Pose2& pose, double deviation_m,
 void MonteCarloLocaliser::move(const Pose2& step) {
   require(is_finite(step), "step of the odometry", step.x_m, "numbers");
   auto& own = *implementation_;
+  own.error.move(step);
   own.travelled_m += std::hypot(step.x_m, step.y_m);
   move_particles(own.particles, StepSampler(step, own.odometry), own.random);
 }

@@ -50,7 +50,9 @@ enum class LocalisationState {
 
 struct MonteCarloEstimate {
   LocalisationState state = LocalisationState::lost;
-  /// Heaviest first; all that hold at least 1 % of the weight.
+  /// Heaviest first; all that hold at least 1 % of the weight. Covariance and spread of the
+  /// position are those of its error: of the particles, and of what they take for independent, the
+  /// errors of successive views and the wrong scale of travel (docs/decisions.md).
   std::vector<PoseMode> modes;
   /// Mean of the heaviest mode; empty when lost.
   std::optional<Pose2> pose;

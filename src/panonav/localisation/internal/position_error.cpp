@@ -1,0 +1,67 @@
+#include "panonav/localisation/internal/position_error.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace panonav {
+
+void PositionError::move(const Pose2& step) {
+  const double x = per_scale_m_.x_m + step.x_m;
+  const double y = per_scale_m_.y_m + step.y_m;
+  const double cosine = std::cos(step.heading_rad);
+  const double sine = std::sin(step.heading_rad);
+  per_scale_m_ = {cosine * x + sine * y, cosine * y - sine * x};
+}
+
+void PositionError::begin(double after_m2) {
+  last_ = {after_m2, after_m2, after_m2};
+  per_scale_m_ = {};
+}
+
+void PositionError::observe(double before_m2, double after_m2, double share, double correlation,
+                            double effective) {
+  const double ratio = before_m2 > 0.0 ? after_m2 / before_m2 : 1.0;
+  const double kept = std::min(1.0, ratio);
+  const double taken = 1.0 - kept;
+  // Particles that a view spreads, where it moves them to another place, are no surer.
+  const double error_m2 = variance_at(before_m2) * std::max(1.0, ratio);
+  const double with_view_m2 = last_ ? correlation * last_->of_error_and_view_m2 : 0.0;
+  // The particles say that the view's share has the variance after / taken, and so the whole view
+  // `share` times that.
+  last_ = {after_m2,
+           kept * kept * error_m2 + taken * share * after_m2 + 2.0 * kept * taken * with_view_m2 +
+               after_m2 / effective,
+           kept * with_view_m2 + share * after_m2};
+  per_scale_m_ = {kept * per_scale_m_.x_m, kept * per_scale_m_.y_m};
+}
+
+double PositionError::variance_at(double particles_m2) const {
+  if (!last_ || !(last_->of_particles_m2 > 0.0)) return particles_m2;
+  // Odometry adds its random errors to both.
+  if (particles_m2 >= last_->of_particles_m2) {
+    return last_->of_error_m2 + particles_m2 - last_->of_particles_m2;
+  }
+  return last_->of_error_m2 * particles_m2 / last_->of_particles_m2;
+}
+
+std::array<double, 9> PositionError::stated(std::array<double, 9> particles, double heading_rad,
+                                            double translation_scale_error) const {
+  std::array<double, 9> covariance = particles;
+  const double particles_m2 = particles[0] + particles[4];
+  if (particles_m2 > 0.0) {
+    const double ratio = variance_at(particles_m2) / particles_m2;
+    for (const std::size_t i : {0U, 1U, 3U, 4U}) covariance[i] *= ratio;
+    for (const std::size_t i : {2U, 5U, 6U, 7U}) covariance[i] *= std::sqrt(ratio);
+  }
+  const double cosine = std::cos(heading_rad) * translation_scale_error;
+  const double sine = std::sin(heading_rad) * translation_scale_error;
+  const double x = cosine * per_scale_m_.x_m - sine * per_scale_m_.y_m;
+  const double y = sine * per_scale_m_.x_m + cosine * per_scale_m_.y_m;
+  covariance[0] += x * x;
+  covariance[1] += x * y;
+  covariance[3] += x * y;
+  covariance[4] += y * y;
+  return covariance;
+}
+
+}  // namespace panonav
