@@ -37,7 +37,8 @@ TEST_F(CameraFiles, EveryModelReadsBackTheSame) {
   int models = 0;
   for (const CameraModel& model :
        {CameraModel{HyperboloidalModel{}}, CameraModel{PolynomialModel{{-180.0, 0.0, 0.002}}},
-        CameraModel{UnifiedModel{0.9, 280.0}}, CameraModel{EquiangularModel{-1.0, 0.3}}}) {
+        CameraModel{UnifiedModel{0.9, 280.0}}, CameraModel{UnifiedModel{0.9, 280.0, ViewAxis::up}},
+        CameraModel{EquiangularModel{-1.0, 0.3}}}) {
     const CameraFile file{mirror_camera(model), std::nullopt};
     write_camera(path, file);
     const CameraFile back = read_camera(path);
@@ -47,10 +48,23 @@ TEST_F(CameraFiles, EveryModelReadsBackTheSame) {
     EXPECT_EQ(back.camera.direction, file.camera.direction);
     ++models;
   }
-  EXPECT_EQ(models, 4);
+  EXPECT_EQ(models, 5);
   const CameraFile dual{dual_fisheye_camera(), std::nullopt};
   write_camera(path, dual);
   EXPECT_EQ(read_camera(path).camera, dual.camera);
+}
+
+TEST_F(CameraFiles, WithoutAnAxisTheUnifiedModelLooksDown) {
+  const fs::path path = folder / "camera.toml";
+  write_camera(path, {mirror_camera(UnifiedModel{0.9, 280.0}), std::nullopt});
+  std::ifstream in(path);
+  const std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  EXPECT_FALSE(contains(text, "axis"));  // as programs wrote it that knew no axis
+  std::ofstream(path) << text << "axis = \"sideways\"\n";
+  EXPECT_TRUE(contains(error_of(path), "axis"));
+  write_camera(path, {mirror_camera(HyperboloidalModel{}), std::nullopt});
+  std::ofstream(path, std::ios::app) << "axis = \"up\"\n";
+  EXPECT_TRUE(contains(error_of(path), "axis is not a known field"));
 }
 
 TEST_F(CameraFiles, FaultsNameFieldValueAndRange) {

@@ -49,6 +49,9 @@ CameraFile read_camera(const std::filesystem::path& path) {
       value = *numbers;
     }
   });
+  if (auto* unified = std::get_if<UnifiedModel>(&camera.model)) {
+    unified->axis = static_cast<ViewAxis>(fields.choice("axis", view_axis_names).value_or(0));
+  }
   camera.image_size = {whole(fields, "width_px"), whole(fields, "height_px")};
   if (std::holds_alternative<EquirectangularModel>(camera.model)) {
     camera.forward_column = fields.number("forward_column").value_or(0.5);
@@ -103,6 +106,11 @@ void write_camera(const std::filesystem::path& path, const CameraFile& file) {
       text += "]\n";
     }
   });
+  if (const auto* unified = std::get_if<UnifiedModel>(&camera.model);
+      unified != nullptr && unified->axis != ViewAxis::down) {
+    text += "axis = \"" + std::string(view_axis_names[static_cast<std::size_t>(unified->axis)]) +
+            "\"\n";
+  }
   number("width_px", camera.image_size.width);
   number("height_px", camera.image_size.height);
   if (std::holds_alternative<EquirectangularModel>(camera.model)) {

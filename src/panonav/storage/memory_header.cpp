@@ -212,6 +212,11 @@ void put_camera(Settings& settings, const Camera& camera) {
       put(name, bytes_of(value));
     }
   });
+  // A key that programs before it do not know: only where they would misread the camera.
+  if (const auto* unified = std::get_if<UnifiedModel>(&camera.model);
+      unified != nullptr && unified->axis != ViewAxis::down) {
+    put("axis", std::string(view_axis_names[static_cast<std::size_t>(unified->axis)]));
+  }
   put("width_px", std::int64_t{camera.image_size.width});
   put("height_px", std::int64_t{camera.image_size.height});
   put("centre_u_px", camera.centre.u_px);
@@ -237,6 +242,10 @@ Camera camera_from(SettingsReader& reader) {
       value = doubles_of(reader.get<std::vector<std::uint8_t>>(key(parameter)));
     }
   });
+  if (auto* unified = std::get_if<UnifiedModel>(&camera.model);
+      unified != nullptr && reader.has(key("axis"))) {
+    unified->axis = static_cast<ViewAxis>(reader.choice(key("axis"), view_axis_names));
+  }
   camera.image_size = {reader.integer(key("width_px")), reader.integer(key("height_px"))};
   camera.centre = {reader.get<double>(key("centre_u_px")), reader.get<double>(key("centre_v_px"))};
   camera.rim_radius_px = reader.get<double>(key("rim_radius_px"));
