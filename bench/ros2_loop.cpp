@@ -24,8 +24,9 @@
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/motion/steering.hpp"
+#include "panonav/motion/trajectory_error.hpp"
 #include "panonav/motion/velocity.hpp"
-#include "panonav/route/route_place.hpp"
+#include "panonav/storage/memory_file.hpp"
 #include "ros2/participant.hpp"
 
 namespace {
@@ -180,7 +181,16 @@ struct Judge {
       if (told != "another goal") result = told;
     });
     hear<ros::DiagnosticArray>("panonav/goal/feedback",
-                               [this](const ros::DiagnosticArray&) { ++feedback; });
+                               [this](const ros::DiagnosticArray& message) {
+                                 ++feedback;
+                                 way.clear();
+                                 for (const auto& [key, value] : message.status.at(0).values) {
+                                   way += " " + std::string(key) + " " + std::string(value);
+                                 }
+                                 if (std::getenv("WAY") && feedback % 10 == 0)
+                                   printf("  %s | truth %.2f %.2f told %.2f %.2f\n", way.c_str(),
+                                          truth.x_m, truth.y_m, told().x_m, told().y_m);
+                               });
     hear<ros::String>("panonav/command/result",
                       [this](const ros::String& message) { answer = message.data; });
     hear<ros::Twist>("cmd_vel", [this](const ros::Twist& message) {
@@ -216,7 +226,7 @@ struct Judge {
   Pose2 truth, odom_from_base, map_from_odom;
   double now_s = 0.0, last_transform_s = 0.0, last_command_s = 0.0;
   bool seen = false;
-  std::string state, result, answer, values;
+  std::string state, result, answer, values, way;
   std::size_t pictures = 0, feedback = 0;
   std::vector<double> gaps_ms;
 };
@@ -226,16 +236,21 @@ struct Taught {
   Pose2 truth, map;
 };
 
-std::vector<Taught> teach(Judge& judge, const std::vector<Point2>& path) {
+/// Drives along the path. Tells where the robot was, and where its odometry had it.
+std::vector<StampedPose> teach(Judge& judge, const std::vector<Point2>& path,
+                               std::vector<StampedPose>& by_odometry) {
   PathFollower follower(path);
   const BaseOptions base;
-  std::vector<Taught> taught;
+  std::vector<StampedPose> truths;
   double next_s = 0.0;
   judge.until(3600, [&] {
+    if (truths.empty() || judge.now_s > truths.back().stamp_s) {
+      truths.push_back({judge.now_s, judge.truth});
+    }
     if (judge.now_s < next_s) return false;
     next_s = judge.now_s + 0.05;
-    if (taught.empty() || distance(taught.back().truth.position(), judge.truth.position()) > 0.05) {
-      taught.push_back({judge.truth, judge.told()});
+    if (by_odometry.empty() || judge.now_s > by_odometry.back().stamp_s) {
+      by_odometry.push_back({judge.now_s, judge.told()});
     }
     const auto aim = follower.next_aim(judge.truth.position());
     Velocity velocity;
@@ -247,13 +262,33 @@ std::vector<Taught> teach(Judge& judge, const std::vector<Point2>& path) {
     judge.cmd_vel.publish({{velocity.forward_m_s, 0.0, 0.0}, {0.0, 0.0, velocity.turn_rad_s}});
     return !aim;
   });
+  return truths;
+}
+
+/// The views of the memory with the stamps of their pictures.
+std::vector<StampedPose> taught_views(const std::string& memory) {
+  std::vector<StampedPose> taught;
+  const auto views = MemoryFile::open(memory, Access::read_only).load();
+  for (const ViewId view : views.views()) {
+    const auto& info = views.info(view);
+    if (!info.pose || !info.stamp_s) continue;
+    taught.push_back(
+        {*info.stamp_s, {info.pose->x_m, info.pose->y_m, info.pose->heading_rad.value_or(0.0)}});
+  }
   return taught;
 }
 
-double beside_m(const std::vector<Taught>& taught, Point2 place) {
+/// After the best common motion of all.
+double rms_m(const std::vector<StampedPose>& estimate, const std::vector<StampedPose>& truths) {
+  const auto error = trajectory_error(Trajectory(estimate), Trajectory(truths));
+  return error ? error->position_m.rms : -1.0;
+}
+
+double beside_m(const std::vector<StampedPose>& truths, Point2 place) {
   double nearest = 1e9;
-  for (const auto& each : taught)
-    nearest = std::min(nearest, distance(each.truth.position(), place));
+  for (const auto& each : truths) {
+    nearest = std::min(nearest, distance(each.pose.position(), place));
+  }
   return nearest;
 }
 
@@ -277,10 +312,11 @@ int main(int count, char** words) {
   const std::vector<std::string> node_words{panonav, "ros2", memory, "--use-sim-time", "true"};
   Process robot(simulate);
   Judge judge;
-  std::vector<Taught> taught;
+  std::vector<StampedPose> truths;
   {
     auto learning = node_words;
-    learning.insert(learning.end(), {"--learn", "--route", "drive", "--kind", "panorama"});
+    learning.insert(learning.end(), {"--learn", "--route", "drive", "--kind", "panorama",
+                                     "--elevation-deg", "-30", "40"});
     // The robot first stands where the drive begins.
     judge.until(2.0, [] { return false; });
     const Point2 ahead = path[1];
@@ -288,13 +324,22 @@ int main(int count, char** words) {
         {path[0].x_m, path[0].y_m, std::atan2(ahead.y_m - path[0].y_m, ahead.x_m - path[0].x_m)});
     Process node(learning);
     judge.until(60.0, [&] { return judge.pictures > 2; });
-    taught = teach(judge, path);
+    std::vector<StampedPose> by_odometry;
+    truths = teach(judge, path, by_odometry);
     judge.until(1.0, [] { return false; });
-    printf("taught %zu places:%s\n", taught.size(), judge.values.c_str());
+    printf("taught:%s; its odometry is off by %.2f m rms\n", judge.values.c_str(),
+           rms_m(by_odometry, truths));
     const double before_s = wall_s();
     judge.command.publish({"finish"});
     judge.until(600.0, [&] { return !judge.answer.empty(); });
     printf("%s after %.1f s\n", judge.answer.c_str(), wall_s() - before_s);
+  }
+  const auto views = taught_views(memory);
+  printf("the map is off by %.2f m rms\n", rms_m(views, truths));
+  std::vector<Taught> taught;
+  for (const auto& [stamp_s, pose] : views) {
+    const auto at = std::ranges::lower_bound(truths, stamp_s, {}, &StampedPose::stamp_s);
+    if (at != truths.end()) taught.push_back({at->pose, pose});
   }
   if (taught.empty()) return 1;
   auto node = std::make_unique<Process>(node_words);
@@ -323,14 +368,14 @@ int main(int count, char** words) {
     const double start_s = judge.now_s;
     double farthest_m = 0.0;
     judge.until(limit_s, [&] {
-      farthest_m = std::max(farthest_m, beside_m(taught, judge.truth.position()));
+      farthest_m = std::max(farthest_m, beside_m(truths, judge.truth.position()));
       return !judge.result.empty();
     });
     const double off_m = distance(judge.truth.position(), end);
     printf("%s: %s after %.0f s, %.2f m from its end, at most %.2f m beside the taught drive", what,
            judge.result.c_str(), judge.now_s - start_s, off_m, farthest_m);
     if (kill) printf("; killed, drove again %.2f s after its new start", resumed_s);
-    puts("");
+    puts(judge.result == "arrived" ? "" : ("; at last" + judge.way).c_str());
     return judge.result == "arrived" && off_m < 0.5;
   };
 
@@ -350,10 +395,10 @@ int main(int count, char** words) {
   }
   int repeated = 0;
   for (int i = 0; i < repeats; ++i) {
-    judge.carry(taught.front().truth * Pose2{0.0, random.uniform(-0.1, 0.1), 0.0});
+    judge.carry(truths.front().pose * Pose2{0.0, random.uniform(-0.1, 0.1), 0.0});
     repeated += drives(
                     "repeated", [&] { judge.command.publish({"repeat drive"}); },
-                    taught.back().truth.position(), i == 0, 2.0 * metres / 0.3 + 100.0)
+                    truths.back().pose.position(), i == 1, 2.0 * metres / 0.3 + 100.0)
                     ? 1
                     : 0;
   }

@@ -123,7 +123,6 @@ struct LocalisationNode::Implementation {
     validate(options);
     if (setup.teacher) {
       teacher.emplace(setup.memory, *setup.teacher);
-      map_from_path = Pose2{};
     } else {
       localise_by(setup.memory);
       resumed = mission_to_resume();
@@ -489,17 +488,16 @@ struct LocalisationNode::Implementation {
 
   void teach(Observation seen, std::int64_t stamp_ns) {
     seen.name = "view_" + std::to_string(++taught);
-    seen.pose = ReferencePose{seen.odometry->x_m, seen.odometry->y_m, seen.odometry->heading_rad};
-    const auto answer = teacher->add(std::move(seen));
+    teacher->add(std::move(seen));
     RunMoment moment;
     moment.state = "learning";
     moment.values = {{"views", std::to_string(teacher->views())},
-                     {"lines", std::to_string(teacher->lines())},
-                     {"known", fixed(answer.place ? answer.place->known_probability : 0.0, 4)}};
+                     {"lines", std::to_string(teacher->lines())}};
     {
       const std::lock_guard lock(mutex);
       ++counts.pictures;
       counts.learnt = teacher->views();
+      map_from_path = teacher->map_from_odometry();
     }
     diagnostics.publish(diagnostics_message(moment, stamp_ns));
   }
@@ -514,7 +512,8 @@ struct LocalisationNode::Implementation {
   struct Mission {
     std::optional<Pose2> goal;
     std::string route;
-    Pose2 map_from_odom;  // when the file was written
+    std::optional<double> along_m = {};  // of the route, when the file was written, as the next
+    Pose2 map_from_odom = {};
   };
 
   [[nodiscard]] std::filesystem::path mission_file() const {
@@ -535,8 +534,11 @@ struct LocalisationNode::Implementation {
       if (!map_from_path || !now) return;
       map_from_odom = *map_from_path * now->path_from_base * inverse(now->odom_from_base);
     }
-    write_file(mission_file(), words(map_from_odom) + (mission.goal ? "goal " + words(*mission.goal)
-                                                                    : "repeat " + mission.route));
+    write_file(
+        mission_file(),
+        words(map_from_odom) + (mission.goal ? "goal " + words(*mission.goal)
+                                             : "repeat " + to_text(mission.along_m.value_or(0.0)) +
+                                                   " " + mission.route));
   }
 
   void forget_mission() const {
@@ -562,7 +564,9 @@ struct LocalisationNode::Implementation {
       in >> goal.x_m >> goal.y_m >> goal.heading_rad;
       read.goal = goal;
     } else {
-      in >> std::ws;
+      double along_m = 0.0;
+      in >> along_m >> std::ws;
+      read.along_m = along_m;
       std::getline(in, read.route);
     }
     const bool whole = in && (read.goal || (word == "repeat" && !read.route.empty()));
@@ -608,7 +612,8 @@ struct LocalisationNode::Implementation {
         driver.emplace(
             *file, setup.tracker.source,
             RouteDriverOptions{.follower = {.name = wanted.route, .tracker = {}, .fit = {}},
-                               .base = setup.navigator.base});
+                               .base = setup.navigator.base,
+                               .resume_m = wanted.along_m});
       } else {
         const std::string name = tracker->memory().info(nearest_view(wanted.goal->position())).name;
         if (navigator) {
@@ -674,7 +679,8 @@ struct LocalisationNode::Implementation {
   }
 
   void drive_along(const Observation& seen) {
-    const RouteDriveStep step = driver->step(seen);
+    const RouteDriveStep step = driver->step(seen, last_pose);
+    mission.along_m = step.along_m;
     const std::string state(name_of(step.state));
     if (step.state == RouteDriveState::arrived || step.state == RouteDriveState::lost) {
       end_way(state, step.state == RouteDriveState::arrived ? 0 : 2);
@@ -748,15 +754,14 @@ struct LocalisationNode::Implementation {
   }
 
   void finish_teaching() {
-    teacher->finish();
-    std::optional<Pose2> here;
-    {
-      const std::lock_guard lock(mutex);
-      if (const auto now = motion.newest()) here = now->path_from_base * base_from_camera;
-    }
+    const Pose2 map_from_odometry = teacher->finish();
     localise_by(setup.memory);
     teacher.reset();
-    if (here) start_tracker_at(*here);
+    const std::lock_guard lock(mutex);
+    map_from_path = map_from_odometry;
+    if (const auto now = motion.newest()) {
+      start_tracker_at(map_from_odometry * now->path_from_base * base_from_camera);
+    }
   }
 
   void learn(const std::string& name) {

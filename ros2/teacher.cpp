@@ -6,19 +6,12 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/motion/trajectory.hpp"
+#include "panonav/pipeline/memoriser.hpp"
 
 namespace panonav::ros2 {
 
 namespace {
-
-LiveMemoryOptions learning(const TeacherOptions& options) {
-  LiveMemoryOptions live;
-  live.learn = true;
-  live.memoriser = {.source = options.pictures,
-                    .signature = options.signature,
-                    .preprocessing = options.preprocessing};
-  return live;
-}
 
 std::filesystem::path new_file(std::filesystem::path path) {
   if (std::filesystem::exists(path)) {
@@ -30,62 +23,68 @@ std::filesystem::path new_file(std::filesystem::path path) {
 }  // namespace
 
 Teacher::Teacher(std::filesystem::path memory, const TeacherOptions& options)
-    : path_(new_file(std::move(memory))),
-      options_(options),
-      memory_(path_, learning(options)),
-      encoder_(options.pictures, {}) {}
+    : path_(new_file(std::move(memory))), options_(options), encoder_(options.pictures, {}) {}
 
-void Teacher::record(const Observation& seen, const Pose2& pose) {
-  if (!options_.route) return;
-  if (RouteRecorder::is_due(last_line_, pose, RouteRecorderOptions{}.every_m)) {
-    waiting_.push_back({pose, encoder_.line(seen)});
-    last_line_ = pose;
-    ++lines_;
-  }
-  if (memory_.recogniser() != nullptr) store_lines();
+void Teacher::make_mapper() {
+  Executor alone;
+  mapper_.emplace(
+      MemoryFile::create(path_, header_from_first(waiting_, options_.pictures, options_.signature,
+                                                  options_.preprocessing, alone)),
+      options_.pictures);
+  for (const Observation& seen : std::exchange(waiting_, {})) mapper_->add(seen);
 }
 
-void Teacher::store_lines() {
-  if (waiting_.empty()) return;
-  if (!recorder_) {
-    recorder_.emplace(
-        MemoryFile::open(path_, Access::read_write), options_.pictures,
-        RouteRecorderOptions{.name = *options_.route, .line = {}, .horizon_rows = {}});
+void Teacher::add(Observation seen) {
+  // Half of the spacing that grids of views are made with: steps so short are read from the views
+  // themselves, and wherever the robot comes again, a view is near.
+  constexpr double step_m = 0.25;
+  constexpr double turn_rad = 0.3;
+  const Pose2 pose = seen.odometry.value();
+  if (options_.route && (lines_.empty() || RouteRecorder::is_due(lines_.back().encoded.pose, pose,
+                                                                 RouteRecorderOptions{}.every_m))) {
+    lines_.push_back({{pose, encoder_.line(seen)}, nodes_.empty() ? 0 : nodes_.size() - 1});
   }
-  for (auto& line : std::exchange(waiting_, {})) recorder_->add(std::move(line));
+  if (!nodes_.empty() && distance(nodes_.back().position(), pose.position()) < step_m &&
+      std::abs(angle_difference(pose.heading_rad, nodes_.back().heading_rad)) < turn_rad) {
+    return;
+  }
+  if (mapper_) {
+    mapper_->add(seen);
+  } else {
+    waiting_.push_back(std::move(seen));
+    if (waiting_.size() == Memoriser::scale_views) make_mapper();
+  }
+  nodes_.push_back(pose);
 }
 
-LiveMemory::Answer Teacher::add(Observation seen) {
-  // A robot that stands or turns slowly shows a new memory the same again and again.
-  constexpr double min_way_m = 0.1;
-  constexpr double min_turn_rad = 0.3;
-  // Who is found by views of known places has to be near one: the spacing that grids are made with.
-  constexpr double max_spacing_m = 0.5;
-  const auto& known = seen.pose.value();
-  const Pose2 pose{known.x_m, known.y_m, known.heading_rad.value()};
-  LiveMemory::Answer answer = memory_.answer(seen);
-  record(seen, pose);
-  const auto nearer = [&](double way_m) {
-    return std::ranges::any_of(views_, [&](const Pose2& view) {
-      return distance(view.position(), pose.position()) < way_m;
-    });
-  };
-  const bool moved =
-      views_.empty() || distance(views_.back().position(), pose.position()) >= min_way_m ||
-      std::abs(angle_difference(pose.heading_rad, views_.back().heading_rad)) >= min_turn_rad;
-  answer.is_new = (answer.is_new && moved) || !nearer(max_spacing_m);
-  if (answer.is_new) {
-    memory_.learn(std::move(seen));
-    views_.push_back(pose);
+// A line moves as the nodes before and behind it do, by its share of the way between them.
+void Teacher::store_lines(const TopologicalMap& map) {
+  RouteRecorder recorder(
+      MemoryFile::open(path_, Access::read_write), options_.pictures,
+      RouteRecorderOptions{.name = *options_.route, .line = {}, .horizon_rows = {}});
+  for (Line& line : lines_) {
+    const std::size_t before = line.node;
+    const std::size_t behind = std::min(before + 1, nodes_.size() - 1);
+    Pose2& pose = line.encoded.pose;
+    const auto moved_with = [&](std::size_t node) {
+      return map.nodes[node].pose * inverse(nodes_[node]) * pose;
+    };
+    const double from_m = distance(nodes_[before].position(), pose.position());
+    const double to_m = distance(nodes_[behind].position(), pose.position());
+    const double share = from_m > 0.0 ? from_m / (from_m + to_m) : 0.0;
+    pose = interpolate(moved_with(before), moved_with(behind), share);
+    recorder.add(std::move(line.encoded));
   }
-  return answer;
+  (void)recorder.finish();
 }
 
-void Teacher::finish() {
-  if (memory_.learnt() == 0) throw ContractError("views that were learnt", 0.0, "1 or more");
-  memory_.finish();
-  store_lines();
-  if (recorder_) (void)recorder_->finish();
+Pose2 Teacher::finish() {
+  if (nodes_.empty()) throw ContractError("views that were learnt", 0.0, "1 or more");
+  if (!mapper_) make_mapper();
+  const TopologicalMap map = mapper_->finish().map;
+  mapper_.reset();  // the file is another one's now
+  if (options_.route) store_lines(map);
+  return map.nodes.back().pose * inverse(nodes_.back());
 }
 
 }  // namespace panonav::ros2

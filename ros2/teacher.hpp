@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "panonav/pipeline/live_memory.hpp"
+#include "panonav/pipeline/mapper.hpp"
 #include "panonav/pipeline/route_recorder.hpp"
 
 namespace panonav::ros2 {
@@ -17,35 +17,40 @@ struct TeacherOptions {
   PreprocessingOptions preprocessing;
 };
 
-/// Makes a new memory file of a robot's first drive: views of places that are new (`LiveMemory`) or
-/// half a metre from all others, with positions, and the drive as a route. One thread at a time.
+/// Makes a new memory file of a robot's first drive: a map whose loops are closed (`Mapper`), in
+/// whose frame the drive begins at the origin, and the drive as a route. One thread at a time.
 class Teacher {
  public:
-  /// Throws FileError when the file is there already, and as `LiveMemory`, `LineEncoder`.
+  /// Throws FileError when the file is there already, and as `LineEncoder`.
   Teacher(std::filesystem::path memory, const TeacherOptions& options);
 
-  /// An observation with pose and heading. Throws as `LiveMemory::answer` and `learn`.
-  LiveMemory::Answer add(Observation seen);
-  /// All is on the disk. Throws FileError; ContractError when nothing was added.
-  void finish();
+  /// An observation with odometry, which becomes a view where the robot moved on. Throws as
+  /// `Mapper::add` and `LineEncoder::line`.
+  void add(Observation seen);
+  /// Maps what was seen, stores all, and tells map_from_odometry at the end of the drive. Throws
+  /// FileError; ContractError when nothing was added.
+  Pose2 finish();
 
-  [[nodiscard]] std::size_t views() const noexcept { return memory_.learnt(); }
-  [[nodiscard]] std::size_t lines() const noexcept { return lines_; }
+  /// Until the drive ends: its beginning is the origin.
+  [[nodiscard]] Pose2 map_from_odometry() const { return inverse(nodes_.front()); }
+  [[nodiscard]] std::size_t views() const noexcept { return nodes_.size(); }
+  [[nodiscard]] std::size_t lines() const noexcept { return lines_.size(); }
 
  private:
-  void record(const Observation& seen, const Pose2& pose);
-  void store_lines();
+  struct Line {
+    RouteRecorder::EncodedLine encoded;  // with the pose of the odometry
+    std::size_t node = 0;                // the last one before
+  };
+  void make_mapper();
+  void store_lines(const TopologicalMap& map);
 
   std::filesystem::path path_;
   TeacherOptions options_;
-  LiveMemory memory_;
   LineEncoder encoder_;
-  std::vector<Pose2> views_;
-  std::optional<Pose2> last_line_;
-  /// A new memory has its file late: until then lines wait here.
-  std::vector<RouteRecorder::EncodedLine> waiting_;
-  std::optional<RouteRecorder> recorder_;
-  std::size_t lines_ = 0;
+  std::vector<Observation> waiting_;  // for the full scale of the new file
+  std::optional<Mapper> mapper_;
+  std::vector<Pose2> nodes_;  // by the odometry
+  std::vector<Line> lines_;
 };
 
 }  // namespace panonav::ros2

@@ -27,14 +27,18 @@ void RouteDriver::start_at(Point2 place) {
   // A route that ends where it begins is driven from its beginning.
   constexpr double reach_m = 0.5;
   const auto passes = places_on_route(poses(), place, reach_m);
-  start_m_ = passes.empty() ? place_on_route(poses(), place).along_m : passes.front().along_m;
+  const auto pass = std::ranges::min_element(passes, {}, [&](const auto& each) {
+    return options_.resume_m ? std::abs(each.along_m - *options_.resume_m) : each.along_m;
+  });
+  start_m_ = pass == passes.end() ? place_on_route(poses(), place).along_m : pass->along_m;
   // At its very end there still is a path.
   constexpr double least_way_m = 0.01;
   const double from_m = std::min(start_m_, std::max(0.0, length_m_ - least_way_m));
   path_.emplace(stretch_of_route(poses(), from_m, length_m_), options_.path);
 }
 
-RouteDriveStep RouteDriver::step(const Observation& observation) {
+RouteDriveStep RouteDriver::step(const Observation& observation,
+                                 const std::optional<Pose2>& elsewise) {
   if (!observation.odometry) {
     throw ContractError("odometry of the observation", "unknown", "known, to repeat a route");
   }
@@ -43,8 +47,11 @@ RouteDriveStep RouteDriver::step(const Observation& observation) {
   RouteDriveStep step;
   step.length_m = length_m_;
   step.fix = follower_.step(observation).fix;
-  blind_m_ = step.fix ? 0.0 : blind_m_ + std::hypot(moved.x_m, moved.y_m);
   const auto& robot = follower_.tracker().pose();
+  const bool confirmed =
+      robot && elsewise &&
+      distance(robot->position(), elsewise->position()) < options_.follower.tracker.recovery_m;
+  blind_m_ = step.fix || confirmed ? 0.0 : blind_m_ + std::hypot(moved.x_m, moved.y_m);
   if (!path_) {
     if (!step.fix) {
       if (++searches_ >= max_searches) step.state = RouteDriveState::lost;

@@ -14,6 +14,9 @@ struct RouteDriverOptions {
   RouteFollowerOptions follower;
   PathFollowerOptions path;
   BaseOptions base;
+  /// Where along the route the robot was when somebody else drove it last: of several places that a
+  /// route passes it goes on at the one next to it. Empty: at the first.
+  std::optional<double> resume_m;
 };
 
 enum class RouteDriveState {
@@ -39,7 +42,7 @@ struct RouteDriveStep {
 /// pursuit of the positions of its lines (`PathFollower`). One thread at a time.
 class RouteDriver {
  public:
-  /// Without a fix it drives no farther by odometry alone.
+  /// Without a fix it drives no farther by odometry that nobody confirms.
   static constexpr double max_blind_m = 1.0;
   /// Pictures after which a robot that stands is not on the route.
   static constexpr int max_searches = 10;
@@ -48,9 +51,12 @@ class RouteDriver {
   RouteDriver(const MemoryFile& memory, const std::optional<PictureSource>& source,
               const RouteDriverOptions& options = {});
 
-  /// To be called once in each period of the base, until it arrived or is lost. Throws as
-  /// `LineEncoder::line`, ContractError on an observation without odometry.
-  [[nodiscard]] RouteDriveStep step(const Observation& observation);
+  /// To be called once in each period of the base, until it arrived or is lost. `elsewise`: where
+  /// the robot is in the frame of the route as others find it (`Tracker`); as long as that agrees
+  /// with the odometry since the last fix, it is not lost. Throws as `LineEncoder::line`,
+  /// ContractError on an observation without odometry.
+  [[nodiscard]] RouteDriveStep step(const Observation& observation,
+                                    const std::optional<Pose2>& elsewise = std::nullopt);
 
   [[nodiscard]] const RouteFollower& follower() const noexcept { return follower_; }
 
