@@ -512,7 +512,10 @@ struct LocalisationNode::Implementation {
   struct Mission {
     std::optional<Pose2> goal;
     std::string route;
-    std::optional<double> along_m = {};  // of the route, when the file was written, as the next
+    // Of the route, when the file was written, as the next: where the robot was on it, and what was
+    // learnt of it, which takes a second.
+    std::optional<double> along_m = {};
+    double min_correlation = 0.0;
     Pose2 map_from_odom = {};
   };
 
@@ -534,11 +537,10 @@ struct LocalisationNode::Implementation {
       if (!map_from_path || !now) return;
       map_from_odom = *map_from_path * now->path_from_base * inverse(now->odom_from_base);
     }
-    write_file(
-        mission_file(),
-        words(map_from_odom) + (mission.goal ? "goal " + words(*mission.goal)
-                                             : "repeat " + to_text(mission.along_m.value_or(0.0)) +
-                                                   " " + mission.route));
+    std::string what = "repeat " + to_text(mission.along_m.value_or(0.0)) + " " +
+                       to_text(mission.min_correlation) + " " + mission.route;
+    if (mission.goal) what = "goal " + words(*mission.goal);
+    write_file(mission_file(), words(map_from_odom) + what);
   }
 
   void forget_mission() const {
@@ -565,7 +567,7 @@ struct LocalisationNode::Implementation {
       read.goal = goal;
     } else {
       double along_m = 0.0;
-      in >> along_m >> std::ws;
+      in >> along_m >> read.min_correlation >> std::ws;
       read.along_m = along_m;
       std::getline(in, read.route);
     }
@@ -609,11 +611,11 @@ struct LocalisationNode::Implementation {
       require_memory();
       driver.reset();
       if (!wanted.goal) {
-        driver.emplace(
-            *file, setup.tracker.source,
-            RouteDriverOptions{.follower = {.name = wanted.route, .tracker = {}, .fit = {}},
-                               .base = setup.navigator.base,
-                               .resume_m = wanted.along_m});
+        RouteDriverOptions along{.follower = {.name = wanted.route, .tracker = {}, .fit = {}},
+                                 .base = setup.navigator.base,
+                                 .resume_m = wanted.along_m};
+        along.follower.tracker.min_correlation = wanted.min_correlation;
+        driver.emplace(*file, setup.tracker.source, along);
       } else {
         const std::string name = tracker->memory().info(nearest_view(wanted.goal->position())).name;
         if (navigator) {
@@ -629,6 +631,7 @@ struct LocalisationNode::Implementation {
       throw;
     }
     mission = wanted;
+    if (driver) mission.min_correlation = driver->follower().tracker().min_correlation();
     mission_kept = {};
     const std::lock_guard lock(command_mutex);
     driving = true;

@@ -73,11 +73,14 @@ struct QosDeleter {
 using DdsQos = std::unique_ptr<dds_qos_t, QosDeleter>;
 
 DdsQos dds_qos(const Qos& wanted) {
+  // Not the usual 100 ms: what is as usual is not said to others, and some (@foxglove/ros2) hear
+  // only writers that say how reliable they are.
+  constexpr dds_duration_t max_blocking = DDS_MSECS(99);
   DdsQos qos(dds_create_qos());
   dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, wanted.depth);
   dds_qset_reliability(qos.get(),
                        wanted.reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT,
-                       DDS_MSECS(100));
+                       max_blocking);
   dds_qset_durability(
       qos.get(), wanted.transient_local ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
   dds_qset_writer_data_lifecycle(qos.get(), false);

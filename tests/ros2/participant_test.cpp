@@ -1,6 +1,8 @@
 #include "ros2/participant.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <cstdlib>
@@ -125,6 +127,29 @@ TEST(Participant, WhatWasSaidLastReachesThoseWhoComeLater) {
   const auto cdr = FastPeer::next(heard, 10s);
   ASSERT_FALSE(cdr.empty());
   EXPECT_EQ(ros::read_message<ros::String>(cdr, MessageEncoding::cdr).data, "new");
+}
+
+TEST(Participant, ProcessesOfOneMachineHearEachOtherWithLocalhostOnly) {
+  ParticipantOptions options;
+  options.localhost_only = true;
+  options.domain = 7;  // a process configures a domain once
+  Participant participant(options, [](const std::string& line) { ADD_FAILURE() << line; });
+  std::atomic<int> came = 0;
+  participant.subscribe("words", ros::String::type, {},
+                        [&](std::span<const std::uint8_t>) { ++came; });
+  const Served served(participant);
+  const pid_t child = fork();
+  if (child == 0) {
+    setenv("ROS_LOCALHOST_ONLY", "1", 1);
+    setenv("ROS_DOMAIN_ID", "7", 1);
+    execl("/proc/self/exe", "test_ros2", "--say-words", nullptr);
+    _exit(1);
+  }
+  for (int i = 0; i < 500 && came == 0; ++i) std::this_thread::sleep_for(20ms);
+  EXPECT_GT(came, 0);
+  int status = 1;
+  waitpid(child, &status, 0);
+  EXPECT_EQ(status, 0);
 }
 
 TEST(Participant, TheGraphNamesTheNodeAndItsEndpoints) {

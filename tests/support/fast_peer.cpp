@@ -163,7 +163,7 @@ FastPeer::Endpoint& FastPeer::talk(const std::string& topic, const std::string& 
       reliable ? dds::RELIABLE_RELIABILITY_QOS : dds::BEST_EFFORT_RELIABILITY_QOS;
   qos.durability().kind =
       transient_local ? dds::TRANSIENT_LOCAL_DURABILITY_QOS : dds::VOLATILE_DURABILITY_QOS;
-  qos.history().depth = 20;
+  qos.history().depth = 200;
   qos.endpoint().history_memory_policy =
       eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
   qos.publish_mode().kind = dds::ASYNCHRONOUS_PUBLISH_MODE;
