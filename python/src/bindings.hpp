@@ -33,6 +33,9 @@ void bind_signatures(py::module_& m);
 void bind_memories(py::module_& m);
 void bind_recordings(py::module_& m);
 void bind_localisation(py::module_& m);
+void bind_homing(py::module_& m);
+void bind_mapping(py::module_& m);
+void bind_routes(py::module_& m);
 void bind_measures(py::module_& m);
 
 // Arrays. A wrong dtype, shape or kind throws ContractError that names the argument `what`.

@@ -1,8 +1,10 @@
 #include "bindings.hpp"
 #include "memories.hpp"
+#include "panonav/core/error.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
 #include "panonav/pipeline/tracker.hpp"
+#include "panonav/pipeline/visual_motion.hpp"
 #include "recordings.hpp"
 
 namespace panonav::python {
@@ -94,7 +96,7 @@ std::vector<NamedPlace> localise_all(const SharedRecogniser& recogniser, const D
   return recogniser.read([&](const PlaceRecogniser& r) {
     InterruptibleExecutor executor(threads);
     std::vector<NamedPlace> places;
-    in_order(
+    make_in_order(
         recording.entries.size(), executor,
         [&](std::size_t i) {
           const DatasetEntry& entry = recording.entries[i];
@@ -202,6 +204,25 @@ void bind_recogniser(py::module_& m) {
           .c_str());
 }
 
+std::vector<NamedEstimate> track_recording(Tracker& tracker, Dataset run, std::size_t every,
+                                           int threads) {
+  InterruptibleExecutor executor(threads);
+  if (odometry_poses(run).empty()) {
+    (void)add_visual_odometry(run, tracker.memory(), tracker.encoder(), executor);
+  }
+  std::vector<NamedEstimate> estimates;
+  std::size_t moved = 0;
+  make_in_order((run.entries.size() + every - 1) / every, executor,
+                [&](std::size_t i) {
+                  return tracker.encoder().packed(read_observation(run.entries[i * every]));
+                },
+                [&](std::size_t i, PackedSignature&& view) {
+                  for (; moved <= i * every; ++moved) tracker.move_to(*run.entries[moved].odometry);
+                  estimates.push_back({tracker.observe(view), run.entries[i * every].file});
+                });
+  return estimates;
+}
+
 void bind_tracker(py::module_& m) {
   Record<PoseMode>(m, "PoseMode", "Particles that lie together.")
       .field("weight", &PoseMode::weight, "")
@@ -236,8 +257,9 @@ void bind_tracker(py::module_& m) {
       "Follows a moving robot through its pictures and odometry by a memory file. The robot starts "
       "anywhere in the memorised area.")
       .def(py::init([](const py::object& memory, const std::optional<PictureSource>& source,
-                       const py::kwargs& keywords) {
+                       bool visual_odometry, const py::kwargs& keywords) {
              TrackerOptions options{.source = source};
+             if (visual_odometry) options.odometry = visual_odometry_noise();
              Keywords(keywords).options(options.filter).options(options.odometry).finish();
              if (py::isinstance<SharedFile>(memory)) {
                return memory.cast<SharedFile&>().change(
@@ -247,8 +269,9 @@ void bind_tracker(py::module_& m) {
              const py::gil_scoped_release free;
              return std::make_unique<SharedTracker>(path, options);
            }),
-           py::arg("memory"), py::arg("source") = py::none(),
-           with_options("`memory`: the path of a memory file, or a MemoryFile.",
+           py::arg("memory"), py::arg("source") = py::none(), py::arg("visual_odometry") = false,
+           with_options("`memory`: the path of a memory file, or a MemoryFile. `visual_odometry`: "
+                        "the robot's motion is read from pictures, and as uncertain as that is.",
                         {options_of<MonteCarloOptions>(), options_of<OdometryNoise>()})
                .c_str())
       .def(
@@ -282,6 +305,23 @@ void bind_tracker(py::module_& m) {
                 [&](Tracker& t) { t.start_at(pose, deviation_m, heading_deviation_rad); });
           },
           py::arg("pose"), py::arg("deviation_m"), py::arg("heading_deviation_rad"))
+      .def(
+          "track",
+          [](SharedTracker& tracker, const py::object& recording, int every, int threads) {
+            require(every >= 1, "every", every, ">= 1");
+            const auto source =
+                tracker.read([](const Tracker& t) { return t.encoder().header().source; });
+            Dataset run = dataset_from(recording, source);
+            return tracker.change([&](Tracker& t) {
+              return track_recording(t, std::move(run), static_cast<std::size_t>(every), threads);
+            });
+          },
+          py::arg("recording"), py::kw_only(), py::arg("every") = 1, py::arg("threads") = 0,
+          "Follows the robot of a Dataset, or of what lies at a path, as `panonav track` does: "
+          "moves "
+          "with each picture's odometry and looks at every n-th picture. Without odometry motion "
+          "is "
+          "read from the pictures; a tracker for that is made with `visual_odometry`.")
       .def(
           "particles",
           [](const SharedTracker& tracker) {

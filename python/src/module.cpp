@@ -14,6 +14,9 @@ PYBIND11_MODULE(_core, m) {
   bind_memories(m);
   bind_recordings(m);
   bind_localisation(m);
+  bind_homing(m);
+  bind_mapping(m);
+  bind_routes(m);
   bind_measures(m);
   // People know these by the package's name.
   for (const auto& [name, value] : m.attr("__dict__").cast<py::dict>()) {

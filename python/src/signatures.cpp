@@ -38,6 +38,11 @@ void bind_compass(py::module_& m, const char* doc) {
 }  // namespace
 
 void bind_signatures(py::module_& m) {
+  // Named by what the other class gives.
+  py::class_<PackedSignature> packed(
+      m, "PackedSignature",
+      "A signature in 8 + 8 bit for each component and row. Arrays have "
+      "the shape (components, rows).");
   py::class_<FourierSignature>(m, "FourierSignature",
                                "The first Fourier components of every row of a panorama. Arrays "
                                "have the shape (components, rows).")
@@ -84,9 +89,7 @@ void bind_signatures(py::module_& m) {
            })
       .attr("__hash__") = py::none();
 
-  py::class_<PackedSignature>(m, "PackedSignature",
-                              "A signature in 8 + 8 bit for each component and row. Arrays have "
-                              "the shape (components, rows).")
+  packed
       .def(py::init([](const py::object& magnitudes, const py::object& phases) {
              const auto sizes = exact_array<std::uint8_t>(magnitudes, "magnitudes", {-1, -1});
              const auto angles =

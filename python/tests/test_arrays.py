@@ -1,5 +1,7 @@
 """Arrays of any layout are read right or refused; what is handed out looks at the object itself."""
+import ast
 import gc
+import pathlib
 
 import numpy
 import pytest
@@ -132,3 +134,12 @@ def test_camera_projects_and_unwraps():
         unwarper.unwrap(numpy.zeros((4, 8), numpy.uint8))
     with pytest.raises(panonav.ContractError, match="nonsense"):
         panonav.Camera("hyperboloidal", (320, 240), {"nonsense": 1})
+
+
+def test_stubs_know_every_name_and_option():
+    text = (pathlib.Path(panonav.__file__).parent / "_core.pyi").read_text()
+    told = {node.name for node in ast.parse(text).body if isinstance(node, (ast.ClassDef, ast.FunctionDef))}
+    assert told == {name for name in vars(panonav._core) if name[0] != "_"} - {"camera_models"}
+    assert "top: int = 10" in text and "::" not in text and "_core" not in text.replace("python/make_stubs", "")
+    documented = [name for name in told if not getattr(panonav, name).__doc__]
+    assert documented == []

@@ -52,25 +52,25 @@ def estimate_as_printed(estimate):
     return told
 
 
-def tracked(memory, run):
-    tracker = panonav.Tracker(memory)
-    return [tracker.observe(entry.observation()) for entry in panonav.Dataset(run).entries]
-
-
-def test_track_office(office):
-    memory, run = office / "office.panonav", office / "drive"
-    printed = [line for line in command_json("track", memory, run) if "file" in line]
-    ours = tracked(memory, run)
+def same_estimates(printed, ours):
+    printed = [line for line in printed if "file" in line]
     assert len(printed) == len(ours) > 5
     for one, other in zip(printed, ours):
         told = estimate_as_printed(other)
         for key, value in one.items():
-            if key not in ("modes", "pose", "stamp_s", "ground_truth"):
+            if key not in ("modes", "stamp_s", "ground_truth"):
                 assert told[key] == value, key
-        assert (one["pose"] is None) == (told["pose"] is None)
-        if one["pose"]:
-            assert all(told["pose"][key] == value for key, value in one["pose"].items())
-        assert [mode["weight"] for mode in one["modes"]] == [mode["weight"] for mode in told["modes"]]
+        modes = [{**mode.pop("mean"), **mode} for mode in told["modes"]]
+        assert one["modes"] == modes
+
+
+def test_track_office(office):
+    memory, run = office / "office.panonav", office / "drive"
+    printed = command_json("track", memory, run)
+    tracker = panonav.Tracker(memory)
+    same_estimates(printed, [tracker.observe(entry.observation()) for entry in panonav.Dataset(run).entries])
+    same_estimates(printed, panonav.Tracker(memory).track(run))
+    assert tracker.particles().shape[1] == 4
 
 
 def test_memorise_makes_the_same_views(office, tmp_path):
@@ -82,14 +82,6 @@ def test_memorise_makes_the_same_views(office, tmp_path):
     a, b = one.load(), other.load()
     assert all(a.packed(view) == b.packed(view) for view in a.views)
     assert panonav.memorise(office / "memory_run", ours).known_before == counts.appended
-
-
-@pytest.mark.parametrize("name", ["gantry_plants", "sussex_route"])
-def test_localise_real_recordings(data, tmp_path, name):
-    memory = tmp_path / "real.panonav"
-    panonav.memorise(data / name, memory)
-    places = panonav.PlaceRecogniser(memory).localise_all(data / name, exclude_same_file=True)
-    assert [plain(place) for place in places] == command_json("localise", memory, data / name, "--exclude-same-file")
 
 
 def test_trajectory_errors(office):
@@ -153,3 +145,124 @@ def test_results_read_well(office):
     assert set(place.to_dict()["matches"][0]) >= {"name", "dissimilarity", "heading_rad"}
     assert "top: int = 10" in panonav.localise.__doc__ and ">= 1" in panonav.localise.__doc__
     assert panonav.PlaceRecogniser.__module__ == "panonav" and COMMAND.exists()
+
+
+def way_as_printed(goal, way):
+    vector = way.vector
+    known = (lambda value: value) if way.known else (lambda value: None)
+    return {"goal": goal, "current": way.name, "known": way.known, "probability": way.probability,
+            "direction_rad": way.direction_rad, "length": known(vector.length), "xi": known(vector.xi),
+            "eta": known(vector.eta), "heading_rad": known(vector.heading_rad), "correlation": vector.correlation,
+            "residual": vector.residual, "confidence": known(vector.confidence), "frequencies": vector.frequencies}
+
+
+def same_ways_home(memory, goal, run, every=1):
+    ways = panonav.HomingGuide(goal, memory).home_all(panonav.Dataset(run).select(every))
+    assert [way_as_printed(goal, way) for way in ways] == command_json("home", goal, run, "--memory", memory,
+                                                                       "--every", every)
+
+
+def test_home_office(office):
+    same_ways_home(office / "office.panonav", "view_00003.png", office / "query_run")
+    run = panonav.Dataset(office / "query_run")
+    guide = panonav.HomingGuide(run[0], source=run.source, components=8)
+    way = guide.home(run[0])
+    assert way.direction_rad is None and way.vector.length < 1e-6 and way.vector.correlation > 0.999
+    with pytest.raises(panonav.ContractError, match="source"):
+        panonav.HomingGuide(run[0])
+    with pytest.raises(panonav.FileError):
+        panonav.HomingGuide("nowhere", office / "office.panonav")
+
+
+def mapped_as_printed(run):
+    sizes = [0] * (1 + max(node.component for node in run.map.nodes))
+    for node in run.map.nodes:
+        sizes[node.component] += 1
+    return {"nodes": len(run.map.nodes), "skipped": run.skipped, "connected_components": sizes,
+            "closures": sum(edge.kind == "closure" for edge in run.map.edges), "scale_m": run.scale_m,
+            "wheel_lengths": run.wheels}
+
+
+def same_map(recording, folder):
+    run = panonav.make_map(recording, folder / "ours.panonav", capture_difference=0.05, graph_max_iterations=15)
+    printed = command_json("map", recording, folder / "theirs.panonav", "--capture-difference", 0.05,
+                           "--graph-max-iterations", 15, "--tum", folder / "theirs.csv")[0]
+    told = mapped_as_printed(run)
+    assert told == {key: printed[key] for key in told}
+    one, other = (panonav.MemoryFile(folder / f"{whose}.panonav") for whose in ("ours", "theirs"))
+    assert panonav.read_map(one, "map").to_dict() == panonav.read_map(other, "map").to_dict() == run.map.to_dict()
+    assert numpy.array_equal(run.map.poses(), panonav.read_map(other).poses())
+    assert panonav.read_map(one, "nothing") is None
+
+
+def test_map_office(office, tmp_path):
+    same_map(office / "drive", tmp_path)
+
+
+def same_arrangement(memory, **odometry):
+    lattice = panonav.arrange(memory, neighbours=8, save=False, **odometry)
+    flags = ["--odometry", odometry["odometry"]] if odometry else []
+    printed = command_json("arrange", memory, "--no-save", "--neighbours", 8, *flags)[0]
+    assert [(node["view"], node["connected_component"], node["x"], node["y"], node["heading_rad"])
+            for node in printed["nodes"]] == [(node.view, node.component, *node.pose) for node in lattice.nodes]
+    for key in ("candidates", "metric", "iterations", "energy"):
+        assert printed[key] == getattr(lattice, key)
+    assert printed["springs"] == len(lattice.springs)
+    return lattice
+
+
+def test_arrange_office(office, tmp_path):
+    memory = tmp_path / "copy.panonav"
+    panonav.memorise(office / "drive", memory)
+    lattice = same_arrangement(memory)
+    assert same_arrangement(memory, odometry=office / "drive").metric
+    panonav.arrange(memory, neighbours=8)
+    stored = panonav.read_map(panonav.MemoryFile(memory), "lattice")
+    assert numpy.array_equal(stored.poses(), lattice.poses())
+
+
+def step_as_printed(step):
+    told = step.to_dict()
+    told["file"] = told.pop("name")
+    del told["line"]
+    told["columns"] = told["columns"] or 0
+    if step.on_route:
+        told["covariance"] = list(told["covariance"].ravel())
+    return told
+
+
+def same_route(recording, folder, every_m):
+    memory = folder / "route.panonav"
+    ours = panonav.record_route(recording, memory, every_m=every_m)
+    printed = command_json("route", "record", recording, folder / "theirs.panonav", "--every-m", every_m)[0]
+    assert (len(ours.route), ours.appended, ours.bytes, ours.bytes_per_km, ours.route.length_m) == tuple(
+        printed[key] for key in ("lines", "appended", "bytes", "bytes_per_km", "length_m"))
+    assert numpy.array_equal(panonav.read_route(panonav.MemoryFile(folder / "theirs.panonav")).lines(),
+                             ours.route.lines())
+    steps = panonav.follow_route(memory, recording)
+    followed = command_json("route", "follow", memory, recording)
+    assert [step_as_printed(step) for step in steps] == [
+        {key: value for key, value in line.items() if key not in ("stamp_s", "ground_truth")} for line in followed]
+    assert any(step.on_route for step in steps)
+
+
+def test_route_office(office, tmp_path):
+    same_route(office / "drive", tmp_path, 0.3)
+
+
+@pytest.mark.parametrize("name, every", [("gantry_plants", 2), ("sussex_route", 4)])
+def test_real_recordings(data, tmp_path, name, every):
+    """Pictures in memory are others than those that are asked."""
+    recording, memory = data / name, tmp_path / "real.panonav"
+    whole = panonav.Dataset(recording)
+    panonav.memorise(whole.select(every), memory)
+    places = panonav.PlaceRecogniser(memory).localise_all(whole.select(3), exclude_same_file=True)
+    assert [plain(place) for place in places] == command_json("localise", memory, recording, "--every", 3,
+                                                              "--exclude-same-file")
+    same_ways_home(memory, panonav.MemoryFile(memory).names()[7], recording, 20)
+    same_arrangement(memory)
+    if name == "sussex_route":
+        same_route(recording, tmp_path, 0.1)
+        same_map(recording, tmp_path)
+        tracker = panonav.Tracker(memory, visual_odometry=True)
+        same_estimates(command_json("track", memory, recording, "--every", 9), tracker.track(recording, every=9))

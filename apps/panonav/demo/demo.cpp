@@ -22,10 +22,10 @@
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/pipeline/arrangement.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "reports/report_page.hpp"
-#include "verbs/stored_lattice.hpp"
 
 namespace panonav::command {
 

@@ -12,10 +12,10 @@
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/trajectory_file.hpp"
 #include "panonav/mapping/lattice_map.hpp"
+#include "panonav/pipeline/arrangement.hpp"
 #include "panonav/pipeline/graph_file.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "verbs/recording.hpp"
-#include "verbs/stored_lattice.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES
 #include "reports/lattice_picture.hpp"
 #endif
@@ -39,21 +39,11 @@ struct ArrangeArguments {
 /// Motion between consecutive pictures of the data set that the memory knows by name.
 std::vector<CoarseMotion> motions_of(const ArrangeArguments& wanted, const PictureSource& source,
                                      const VisualMemory& memory, Session& session) {
-  std::vector<CoarseMotion> motions;
-  if (!wanted.odometry) return motions;
+  if (!wanted.odometry) return {};
   const Dataset recording =
       read_described(*wanted.odometry, wanted.pictures, source,
                      "odom_x_m,odom_y_m,odom_heading_deg", "1.5,0.25,90", session);
-  std::optional<std::pair<ViewId, Pose2>> before;
-  for (const DatasetEntry& entry : recording.entries) {
-    const auto view = memory.find(entry.file);
-    if (!view || !entry.odometry) continue;
-    if (before && before->first != *view) {
-      motions.push_back(coarse_motion(before->first, *view,
-                                      inverse(before->second) * *entry.odometry, wanted.motion));
-    }
-    before = {*view, *entry.odometry};
-  }
+  auto motions = motions_between(recording, memory, wanted.motion);
   if (motions.empty()) {
     throw FileError(*wanted.odometry,
                     "has no odometry between pictures that the memory knows by name");

@@ -9,13 +9,11 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/geometry/positions.hpp"
 #include "panonav/io/camera_file.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/jpeg_stream.hpp"
 #include "panonav/io/live_pictures.hpp"
 #include "panonav/io/video_file.hpp"
-#include "panonav/motion/headed_path.hpp"
 
 namespace panonav::command {
 
@@ -421,27 +419,6 @@ Dataset read_described(const std::string& folder, const PictureArguments& pictur
   Dataset recording = read_dataset(folder);
   select_part(recording, selection_of(pictures.part), folder);
   return recording;
-}
-
-std::vector<Pose2> dataset_poses(const Dataset& dataset) {
-  std::vector<Pose2> poses;
-  bool headings = true;
-  for (const auto& entry : dataset.entries) {
-    if (!entry.pose) return {};
-    headings = headings && entry.pose->heading_rad;
-    poses.push_back({entry.pose->x_m, entry.pose->y_m, entry.pose->heading_rad.value_or(0.0)});
-  }
-  if (headings || poses.size() < 2) return headings ? poses : std::vector<Pose2>{};
-  return headed_along_way(positions_of(poses));
-}
-
-std::vector<Pose2> odometry_poses(const Dataset& dataset) {
-  std::vector<Pose2> poses;
-  for (const auto& entry : dataset.entries) {
-    if (!entry.odometry) return {};
-    poses.push_back(*entry.odometry);
-  }
-  return poses;
 }
 
 }  // namespace panonav::command

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <algorithm>
-#include <exception>
 #include <optional>
 #include <string>
 #include <utility>
@@ -12,7 +10,7 @@
 #include "panonav/core/executor.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/recorded_dataset.hpp"
-#include "panonav/pipeline/observation.hpp"
+#include "panonav/pipeline/observation_source.hpp"
 #include "panonav/storage/memory_file.hpp"
 
 namespace panonav::command {
@@ -90,35 +88,5 @@ void declare_pictures(Arguments& arguments, PictureArguments& pictures);
                                      const std::optional<PictureSource>& remembered,
                                      const std::string& columns, const std::string& values,
                                      Session& session);
-
-/// Poses of all entries in the data set's frame. Where it knows positions but no headings, those
-/// along the way: the tangent fitted to the positions within 0.3 m of way to either side. Empty
-/// where it knows no positions.
-[[nodiscard]] std::vector<Pose2> dataset_poses(const Dataset& dataset);
-/// Likewise by its odometry; empty where it has none.
-[[nodiscard]] std::vector<Pose2> odometry_poses(const Dataset& dataset);
-
-/// `make(i)` for 0 .. count - 1 on all threads, some at a time, and `use(i, made)` in order on this
-/// one. What one of them throws comes when all before it were used.
-template <class Make, class Use>
-void make_in_order(std::size_t count, Executor& executor, const Make& make, const Use& use) {
-  constexpr std::size_t batch = 32;
-  for (std::size_t begin = 0; begin < count; begin += batch) {
-    const std::size_t some = std::min(batch, count - begin);
-    std::vector<std::optional<decltype(make(begin))>> made(some);
-    std::vector<std::exception_ptr> failures(some);
-    executor.for_chunks(some, 1, [&](std::size_t i, std::size_t, std::size_t) {
-      try {
-        made[i].emplace(make(begin + i));
-      } catch (const Error&) {
-        failures[i] = std::current_exception();
-      }
-    });
-    for (std::size_t i = 0; i < some; ++i) {
-      if (failures[i]) std::rethrow_exception(failures[i]);
-      use(begin + i, std::move(*made[i]));
-    }
-  }
-}
 
 }  // namespace panonav::command

@@ -304,7 +304,7 @@ ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Ses
     session.note("panonav track: " + readable_line(wanted.dataset) +
                  " has no odometry (columns odom_x_m,odom_y_m,odom_heading_deg); motion is read "
                  "from the pictures, " +
-                 add_visual_odometry(run, tracker, session.executor()));
+                 add_visual_odometry(run, tracker.memory(), tracker.encoder(), session.executor()));
   }
   start(tracker, wanted);
   TrackSettings settings{.every = wanted.every};

@@ -9,11 +9,11 @@
 #include "panonav/core/executor.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/localisation/monte_carlo.hpp"
-#include "panonav/mapping/visual_odometry.hpp"
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav/pipeline/run_messages.hpp"
 #include "panonav/pipeline/run_recorder.hpp"
 #include "panonav/pipeline/tracker.hpp"
+#include "panonav/pipeline/visual_motion.hpp"
 #include "panonav/storage/memory_file.hpp"
 
 namespace panonav::command {
@@ -65,16 +65,5 @@ struct TrackSettings {
 /// after each image, in order. Throws FileError on a picture that cannot be read.
 void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, Executor& executor,
            const std::function<void(TrackedImage&&)>& report);
-
-/// The noise of odometry that is read from pictures, as a map takes it to be.
-[[nodiscard]] OdometryNoise visual_odometry_noise();
-/// Reads motion from pictures in metres as views of the memory differ over known ways.
-[[nodiscard]] VisualOdometry visual_odometry(const VisualMemory& memory);
-/// Fills the odometry of all entries from the pictures themselves (`VisualOdometry`); metres as
-/// views of the memory differ over known ways. Says how many steps could not be read, where the
-/// robot then seems to stand, and which scale it took. Throws FileError on a picture that cannot be
-/// read.
-[[nodiscard]] std::string add_visual_odometry(Dataset& run, const Tracker& tracker,
-                                              Executor& executor);
 
 }  // namespace panonav::command

@@ -13,6 +13,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/observation_source.hpp"
 
 namespace panonav {
 
@@ -76,6 +77,16 @@ MemoryHeader header_from_first(std::span<const Observation> first, const Picture
                         " views are of one colour; a memory needs views with structure");
   }
   return header;
+}
+
+MemoryHeader header_from_first_views(const Dataset& recording, const SignatureOptions& wanted,
+                                     const PreprocessingOptions& preprocessing,
+                                     Executor& executor) {
+  const std::size_t count = std::min(Memoriser::scale_views, recording.entries.size());
+  std::vector<Observation> first(count, Observation(Image(1, 1)));
+  for_each_entry(executor, count,
+                 [&](std::size_t i) { first[i] = read_observation(recording.entries[i]); });
+  return header_from_first(first, recording.source, wanted, preprocessing, executor);
 }
 
 Memoriser::Memoriser(const std::filesystem::path& memory, MemoriserOptions options)

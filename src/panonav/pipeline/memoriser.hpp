@@ -37,6 +37,14 @@ struct MemoriserOptions {
                                              const PreprocessingOptions& preprocessing,
                                              Executor& executor);
 
+/// The same of a recording, whose first views decide the scale of the whole memory, so that nothing
+/// about light or scene need be known beforehand. Throws FileError also on pictures that cannot be
+/// read.
+[[nodiscard]] MemoryHeader header_from_first_views(const Dataset& recording,
+                                                   const SignatureOptions& wanted,
+                                                   const PreprocessingOptions& preprocessing,
+                                                   Executor& executor);
+
 /// Appends observations to a memory file, which is made where there is none:
 ///   panonav::Memoriser memoriser("office.panonav", {.source = source});
 ///   memoriser.add(observation);

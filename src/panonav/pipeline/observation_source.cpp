@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/geometry/positions.hpp"
+#include "panonav/motion/headed_path.hpp"
 
 namespace panonav {
 
@@ -19,6 +21,27 @@ Observation read_observation(const DatasetEntry& entry) {
   observation.pose = entry.pose;
   observation.tilt = entry.tilt;
   return observation;
+}
+
+std::vector<Pose2> dataset_poses(const Dataset& dataset) {
+  std::vector<Pose2> poses;
+  bool headings = true;
+  for (const auto& entry : dataset.entries) {
+    if (!entry.pose) return {};
+    headings = headings && entry.pose->heading_rad;
+    poses.push_back({entry.pose->x_m, entry.pose->y_m, entry.pose->heading_rad.value_or(0.0)});
+  }
+  if (headings || poses.size() < 2) return headings ? poses : std::vector<Pose2>{};
+  return headed_along_way(positions_of(poses));
+}
+
+std::vector<Pose2> odometry_poses(const Dataset& dataset) {
+  std::vector<Pose2> poses;
+  for (const auto& entry : dataset.entries) {
+    if (!entry.odometry) return {};
+    poses.push_back(*entry.odometry);
+  }
+  return poses;
 }
 
 DatasetObservations::DatasetObservations(Dataset dataset, Executor& executor)

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <exception>
@@ -18,6 +19,36 @@ namespace panonav {
 /// The picture of an entry and what the data set knows of it; several threads may read at a time.
 /// Throws FileError on a picture that is missing or damaged.
 [[nodiscard]] Observation read_observation(const DatasetEntry& entry);
+
+/// Poses of all entries in the data set's frame. Where it knows positions but no headings, those
+/// along the way: the tangent fitted to the positions within 0.3 m of way to either side. Empty
+/// where it knows no positions.
+[[nodiscard]] std::vector<Pose2> dataset_poses(const Dataset& dataset);
+/// Likewise by its odometry; empty where it has none.
+[[nodiscard]] std::vector<Pose2> odometry_poses(const Dataset& dataset);
+
+/// `make(i)` for 0 .. count - 1 on all threads, some at a time, and `use(i, made)` in order on this
+/// one. What one of them throws comes when all before it were used.
+template <class Make, class Use>
+void make_in_order(std::size_t count, Executor& executor, const Make& make, const Use& use) {
+  constexpr std::size_t batch = 32;
+  for (std::size_t begin = 0; begin < count; begin += batch) {
+    const std::size_t some = std::min(batch, count - begin);
+    std::vector<std::optional<decltype(make(begin))>> made(some);
+    std::vector<std::exception_ptr> failures(some);
+    executor.for_chunks(some, 1, [&](std::size_t i, std::size_t, std::size_t) {
+      try {
+        made[i].emplace(make(begin + i));
+      } catch (const Error&) {
+        failures[i] = std::current_exception();
+      }
+    });
+    for (std::size_t i = 0; i < some; ++i) {
+      if (failures[i]) std::rethrow_exception(failures[i]);
+      use(begin + i, std::move(*made[i]));
+    }
+  }
+}
 
 /// Where a robot's observations come from, one by one in the order in which they were made: a data
 /// set, a folder, a video, a camera.

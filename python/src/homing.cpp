@@ -1,0 +1,169 @@
+#include "memories.hpp"
+#include "panonav/pipeline/homing_guide.hpp"
+#include "panonav/pipeline/observation_source.hpp"
+#include "panonav/relative_pose/chance_match.hpp"
+#include "panonav/relative_pose/view_pair.hpp"
+#include "recordings.hpp"
+
+namespace panonav::python {
+
+namespace {
+
+/// An answer and what was asked.
+struct NamedWay : WayHome {
+  std::string name;
+};
+
+void bind_vectors(py::module_& m) {
+  Record<HomeVector>(m, "HomeVector", "The displacement and turn between two views.")
+      .field("xi", &HomeVector::xi, "Towards home, ahead of the robot, in units of R.")
+      .field("eta", &HomeVector::eta, "The same to its left.")
+      .field("heading_rad", &HomeVector::heading_rad, "Heading of home minus the current one.")
+      .field("correlation", &HomeVector::correlation, "Similarity of the views, -1 to 1.")
+      .field("residual", &HomeVector::residual, "Share of the energy that is left unexplained.")
+      .field("confidence", &HomeVector::confidence, "0 to 1; near 0 at home.")
+      .field("frequencies", &HomeVector::frequencies, "Effective number of them.")
+      .field("length", &HomeVector::length, "In units of R.")
+      .field("direction_rad", &HomeVector::direction_rad, "In the current robot frame.");
+  Record<ChanceMatch>(m, "ChanceMatch", "How well two views match, beside noise.")
+      .field("match", &ChanceMatch::match, "")
+      .field("chance", &ChanceMatch::chance, "")
+      .field("deviation", &ChanceMatch::deviation, "")
+      .field("beyond_chance", &ChanceMatch::beyond_chance, "The views have something in common.")
+      .field("direction_probability", &ChanceMatch::direction_probability,
+             "That the home vector points home within 45 degrees.");
+  Record<PhaseReading>(m, "PhaseReading", "Relative pose of two views from their phases.")
+      .field("turn_rad", &PhaseReading::turn_rad, "Heading of b minus heading of a.")
+      .field("direction_a_rad", &PhaseReading::direction_a_rad, "Towards b, in the frame of a.")
+      .field("direction_b_rad", &PhaseReading::direction_b_rad, "Towards a, in the frame of b.")
+      .field("length", &PhaseReading::length, "In units of R.")
+      .field("disagreement_rad", &PhaseReading::disagreement_rad, "Of the two directions.")
+      .field("turn_disagreement_rad", &PhaseReading::turn_disagreement_rad, "Of the two turns.")
+      .field("points", &PhaseReading::points, "False for pictures of one place.")
+      .field("residual", &PhaseReading::residual, "");
+  py::class_<HomingView>(m, "HomingView", "A view as homing needs it.")
+      .def(py::init([](const FourierSignature& signature, bool horizon) {
+             return horizon ? horizon_view(signature) : homing_view(signature);
+           }),
+           py::arg("signature"), py::arg("horizon") = false,
+           "All rows of a signature, or their mean near the horizon.")
+      .def_property_readonly("rows", &HomingView::rows)
+      .def_property_readonly("components", &HomingView::components);
+  const std::string options = with_options("", {options_of<FourierHomingOptions>()});
+  m.def(
+      "home_vector",
+      [](const HomingView& home, const HomingView& current, const py::kwargs& keywords) {
+        FourierHomingOptions wanted;
+        Keywords(keywords).options(wanted).finish();
+        return home_vector(home, current, wanted);
+      },
+      py::arg("home"), py::arg("current"),
+      ("The home vector by Fourier homing." + options).c_str());
+  m.def(
+      "chance_match",
+      [](const HomingView& home, const HomingView& current, const py::kwargs& keywords) {
+        FourierHomingOptions wanted;
+        Keywords(keywords).options(wanted).finish();
+        const py::gil_scoped_release free;
+        return chance_match(home, current, wanted);
+      },
+      py::arg("home"), py::arg("current"),
+      ("How well two views match, beside how well noise does." + options).c_str());
+  m.def(
+      "image_difference",
+      [](const HomingView& a, const HomingView& b, int highest) {
+        return image_difference(a, b, highest);
+      },
+      py::arg("home"), py::arg("current"), py::arg("highest") = 0,
+      "0 for the same place, about 1 for unrelated views; at the heading that fits best.");
+  m.def(
+      "read_phases", [](const HomingView& a, const HomingView& b) { return read_phases(a, b); },
+      py::arg("a"), py::arg("b"), "Reads both ways; None when either view has no structure.");
+}
+
+std::unique_ptr<HomingGuide> guide_to(const py::object& goal, const py::object& memory,
+                                      const std::optional<PictureSource>& source, bool horizon,
+                                      const py::kwargs& keywords) {
+  FourierHomingOptions homing;
+  HomingViewOptions views{.horizon = horizon};
+  Keywords taken(keywords);
+  taken.options(homing);
+  if (memory.is_none()) {
+    taken.options(views.signature).options(views.preprocessing).finish();
+    const Observation seen = observation_from(goal);
+    if (!source) throw ContractError("source", "None", "a PictureSource, without a memory");
+    const py::gil_scoped_release free;
+    return std::make_unique<HomingGuide>(seen, *source, views, homing);
+  }
+  taken.finish();
+  const auto name = goal.cast<std::string>();
+  const auto make = [&](const MemoryFile& file) {
+    return std::make_unique<HomingGuide>(file, name, source, homing, 0, horizon);
+  };
+  if (py::isinstance<SharedFile>(memory)) return memory.cast<SharedFile&>().change(make);
+  const auto path = memory.cast<std::filesystem::path>();
+  const py::gil_scoped_release free;
+  return make(MemoryFile::open(path, Access::read_only));
+}
+
+NamedWay way_from(const HomingGuide& guide, const Observation& seen) {
+  return {guide.home(seen), seen.name};
+}
+
+}  // namespace
+
+void bind_homing(py::module_& m) {
+  bind_vectors(m);
+  Record<NamedWay>(m, "WayHome", "What an observation tells of the way home.")
+      .field("name", &NamedWay::name, "Of the picture, where it has one.")
+      .field("known", &NamedWay::known, "Whether the views have more in common than chance gives.")
+      .field("direction_rad", &NamedWay::direction_rad,
+             "In the frame of the robot; None where nothing is known, and at home.")
+      .field("distance_r", &NamedWay::distance_r, "In units of R.")
+      .field("turn_rad", &NamedWay::turn_rad, "By which the robot has turned since.")
+      .field("probability", &NamedWay::probability,
+             "That the direction is right within 45 degrees.")
+      .field("vector", &NamedWay::vector, "All that was found, known or not.");
+  const std::string options =
+      with_options("", {options_of<FourierHomingOptions>(), options_of<SignatureOptions>(),
+                        options_of<PreprocessingOptions>()});
+  py::class_<HomingGuide>(m, "HomingGuide",
+                          "Tells the way back to a goal from one observation. Several threads may "
+                          "ask at a time.")
+      .def(py::init(&guide_to), py::arg("goal"), py::arg("memory") = py::none(),
+           py::arg("source") = py::none(), py::arg("horizon") = false,
+           ("`goal`: name or id of a view of `memory` (a path or a MemoryFile); without a memory "
+            "an observation made there, and `source` says how pictures lie. `horizon`: compare the "
+            "mean of the rows near the horizon alone. Options of signature and preprocessing go "
+            "without a memory only." +
+            options)
+               .c_str())
+      .def(
+          "home",
+          [](const HomingGuide& guide, const py::object& observation) {
+            const Observation seen = observation_from(observation);
+            const py::gil_scoped_release free;
+            return way_from(guide, seen);
+          },
+          py::arg("observation"), "The way home from where an observation was made.")
+      .def(
+          "home_all",
+          [](const HomingGuide& guide, const py::object& recording,
+             const std::optional<PictureSource>& source, int threads) {
+            const Dataset dataset = dataset_from(recording, source);
+            const py::gil_scoped_release free;
+            InterruptibleExecutor executor(threads);
+            std::vector<NamedWay> ways;
+            make_in_order(
+                dataset.entries.size(), executor,
+                [&](std::size_t i) {
+                  return way_from(guide, read_observation(dataset.entries[i]));
+                },
+                [&](std::size_t, NamedWay&& way) { ways.push_back(std::move(way)); });
+            return ways;
+          },
+          py::arg("recording"), py::arg("source") = py::none(), py::arg("threads") = 0,
+          "The same for each picture of a Dataset or of what lies at a path.");
+}
+
+}  // namespace panonav::python

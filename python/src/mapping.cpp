@@ -1,0 +1,209 @@
+#include "memories.hpp"
+#include "panonav/mapping/lattice_map.hpp"
+#include "panonav/mapping/map_measures.hpp"
+#include "panonav/pipeline/arrangement.hpp"
+#include "panonav/pipeline/known_views.hpp"
+#include "panonav/pipeline/mapper.hpp"
+#include "panonav/pipeline/memoriser.hpp"
+#include "panonav/pipeline/observation_source.hpp"
+#include "recordings.hpp"
+
+namespace panonav::python {
+
+namespace {
+
+constexpr std::array<const char*, 3> link_names{"sequence", "neighbour", "closure"};
+
+/// x_m, y_m, heading_rad of each.
+template <class Nodes>
+py::array_t<double> pose_rows(const Nodes& nodes) {
+  py::array_t<double> rows({static_cast<py::ssize_t>(nodes.size()), py::ssize_t{3}});
+  auto row = rows.template mutable_unchecked<2>();
+  for (py::ssize_t i = 0; i < rows.shape(0); ++i) {
+    const Pose2& pose = nodes[static_cast<std::size_t>(i)].pose;
+    row(i, 0) = pose.x_m;
+    row(i, 1) = pose.y_m;
+    row(i, 2) = pose.heading_rad;
+  }
+  return rows;
+}
+
+MapperOptions mapper_options(const py::kwargs& keywords, SignatureOptions* signature) {
+  MapperOptions options;
+  Keywords taken(keywords);
+  taken.options(options.mapping)
+      .options(options.odometry)
+      .options(options.closure, "closure")
+      .options(options.graph, "graph");
+  if (signature) taken.options(*signature);
+  taken.finish();
+  return options;
+}
+
+/// As the verb `map`: views that the file does not know are appended to it.
+MappedRun make_map(const Dataset& recording, const std::filesystem::path& path,
+                   const SignatureOptions& signature, const MapperOptions& options, int threads) {
+  InterruptibleExecutor executor(threads);
+  const bool there = std::filesystem::exists(path);
+  Mapper mapper(
+      there ? MemoryFile::open(path, Access::read_write)
+            : MemoryFile::create(path, header_from_first_views(recording, signature, {}, executor)),
+      recording.source, options);
+  if (there) check_known_views(recording, mapper.memory(), mapper.encoder(), executor);
+  make_in_order(
+      recording.entries.size(), executor,
+      [&](std::size_t i) { return mapper.encode(read_observation(recording.entries[i])); },
+      [&](std::size_t, Mapper::EncodedView&& seen) { mapper.add(std::move(seen)); });
+  return mapper.finish();
+}
+
+void bind_maps(py::module_& m) {
+  Record<MapNode>(m, "MapNode", "A node of a map: a view and its pose.")
+      .field("view", &MapNode::view, "")
+      .field("pose", &MapNode::pose, "In the frame of its connected component.")
+      .field("component", &MapNode::component, "");
+  Record<MapEdge>(m, "MapEdge", "Two nodes and the motion between them.")
+      .field("a", &MapEdge::a, "")
+      .field("b", &MapEdge::b, "")
+      .field("a_from_b", &MapEdge::a_from_b, "")
+      .field(
+          "kind", [](const MapEdge& e) { return link_names[static_cast<std::size_t>(e.kind)]; },
+          "'sequence', 'neighbour' or 'closure'.")
+      .field("weight", &MapEdge::weight, "Small where the rest of the map contradicts.");
+  Record<TopologicalMap>(m, "TopologicalMap", "A map of places with closed loops.")
+      .field("nodes", &TopologicalMap::nodes, "Ascending by view.")
+      .field("edges", &TopologicalMap::edges, "")
+      .type()
+      .def(
+          "poses", [](const TopologicalMap& map) { return pose_rows(map.nodes); },
+          "(n, 3) of x_m, y_m, heading_rad, a row a node.");
+  Record<MappedRun>(m, "MappedRun", "What a Mapper made of its observations.")
+      .field("map", &MappedRun::map, "")
+      .field("observations", &MappedRun::observations, "By node: its number, from 0.")
+      .field("skipped", &MappedRun::skipped, "Observations that differed too little.")
+      .field("scale_m", &MappedRun::scale_m, "Metres for a unit of length of the views.")
+      .field("wheels", &MappedRun::wheels, "Lengths come from odometry.")
+      .field("mapping_s", &MappedRun::mapping_s, "Time of the mapping itself.");
+  const std::string options = with_options(
+      "", {options_of<MappingOptions>(), options_of<VisualOdometryOptions>(),
+           options_of<LoopClosureOptions>("closure"), options_of<PoseGraphOptions>("graph")});
+  using SharedMapper = Shared<Mapper>;
+  py::class_<SharedMapper>(m, "Mapper",
+                           "Makes a map of observations in the order in which they were taken, and "
+                           "stores it in a memory file as \"map\".")
+      .def(py::init([](const std::filesystem::path& memory,
+                       const std::optional<PictureSource>& source, const py::kwargs& keywords) {
+             const MapperOptions wanted = mapper_options(keywords, nullptr);
+             return std::make_unique<SharedMapper>(MemoryFile::open(memory, Access::read_write),
+                                                   source, wanted);
+           }),
+           py::arg("memory"), py::arg("source") = py::none(),
+           ("`memory`: a memory file that is there." + options).c_str())
+      .def(
+          "add",
+          [](SharedMapper& mapper, const py::object& observation) {
+            const Observation seen = observation_from(observation);
+            return mapper.change([&](Mapper& one) { return one.add(seen); });
+          },
+          py::arg("observation"), "The next observation; whether it became a node.")
+      .def(
+          "finish",
+          [](SharedMapper& mapper) {
+            return mapper.change([](Mapper& one) { return one.finish(); });
+          },
+          "Optimises what is not yet, and stores the map. More observations may follow.");
+  m.def(
+      "make_map",
+      [](const py::object& recording, const std::filesystem::path& memory,
+         const std::optional<PictureSource>& source, bool thumbnails, int threads,
+         const py::kwargs& keywords) {
+        SignatureOptions signature;
+        MapperOptions wanted = mapper_options(keywords, &signature);
+        wanted.thumbnails = thumbnails;
+        const Dataset dataset = dataset_from(recording, source);
+        const py::gil_scoped_release free;
+        return make_map(dataset, memory, signature, wanted, threads);
+      },
+      py::arg("recording"), py::arg("memory"), py::arg("source") = py::none(),
+      py::arg("thumbnails") = true, py::arg("threads") = 0,
+      ("Makes a map of a recording in its order, as `panonav map` does. `memory` is made where "
+       "there is none; views that it does not know are appended." +
+       options)
+          .c_str());
+}
+
+void bind_lattices(py::module_& m) {
+  Record<LatticeNode>(m, "LatticeNode", "A view in an arrangement.")
+      .field("view", &LatticeNode::view, "")
+      .field("pose", &LatticeNode::pose, "In its component's frame.")
+      .field("component", &LatticeNode::component, "");
+  Record<LatticeSpring>(m, "LatticeSpring", "What two views say of where they lie.")
+      .field("a", &LatticeSpring::a, "Number of a node.")
+      .field("b", &LatticeSpring::b, "")
+      .field("dissimilarity", &LatticeSpring::dissimilarity, "")
+      .field("length", &LatticeSpring::length, "Rest length.")
+      .field("stiffness", &LatticeSpring::stiffness, "")
+      .field("weight", &LatticeSpring::weight, "Near 0: an outlier.");
+  Record<LatticeComponent>(m, "LatticeComponent", "Views that springs join.")
+      .field("views", &LatticeComponent::views, "")
+      .field("handedness_known", &LatticeComponent::handedness_known,
+             "False: it may be the mirror image.");
+  Record<Lattice>(m, "Lattice", "Views with the poses that their springs give them.")
+      .field("nodes", &Lattice::nodes, "One for each view, in its order.")
+      .field("springs", &Lattice::springs, "")
+      .field("components", &Lattice::components, "The largest first.")
+      .field("candidates", &Lattice::candidates, "")
+      .field("metric", &Lattice::metric, "Lengths are metres.")
+      .field("iterations", &Lattice::iterations, "")
+      .field("energy", &Lattice::energy, "")
+      .type()
+      .def(
+          "poses", [](const Lattice& lattice) { return pose_rows(lattice.nodes); },
+          "(n, 3) of x, y, heading_rad, a row a node.");
+  m.def(
+      "arrange",
+      [](const py::object& memory, const py::object& odometry, bool save, int threads,
+         const py::kwargs& keywords) {
+        LatticeOptions options;
+        CoarseMotionOptions motion;
+        Keywords taken(keywords);
+        taken.options(options);
+        if (!odometry.is_none()) taken.options(motion, "motion");
+        taken.finish();
+        const auto path = memory.cast<std::filesystem::path>();
+        std::optional<Dataset> recording;
+        if (!odometry.is_none()) recording = dataset_from(odometry, std::nullopt);
+        const py::gil_scoped_release free;
+        InterruptibleExecutor executor(threads);
+        auto file = MemoryFile::open(path, save ? Access::read_write : Access::read_only);
+        const VisualMemory views = file.load();
+        const auto motions =
+            recording ? motions_between(*recording, views, motion) : std::vector<CoarseMotion>{};
+        Lattice lattice = arrange(views, options, motions, executor);
+        if (save) store_lattice(lattice, views, file);
+        return lattice;
+      },
+      py::arg("memory"), py::arg("odometry") = py::none(), py::kw_only(), py::arg("save") = true,
+      py::arg("threads") = 0,
+      with_options("Arranges the views of a memory file as they lie in space, by their similarity "
+                   "alone, and with `save` stores the arrangement in it as \"lattice\". "
+                   "`odometry`: a Dataset or path that tells of the motion between views, by name; "
+                   "only then there are options motion_*.",
+                   {options_of<LatticeOptions>(), options_of<CoarseMotionOptions>("motion")})
+          .c_str());
+  m.def(
+      "read_map",
+      [](SharedFile& memory, const std::string& name) {
+        return memory.change([&](MemoryFile& file) { return file.map(name); });
+      },
+      py::arg("memory"), py::arg("name") = map_name, "A map of a MemoryFile, or None.");
+}
+
+}  // namespace
+
+void bind_mapping(py::module_& m) {
+  bind_maps(m);
+  bind_lattices(m);
+}
+
+}  // namespace panonav::python

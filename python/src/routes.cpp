@@ -1,0 +1,250 @@
+#include "memories.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/pipeline/memoriser.hpp"
+#include "panonav/pipeline/observation_source.hpp"
+#include "panonav/pipeline/route_follower.hpp"
+#include "panonav/pipeline/route_recorder.hpp"
+#include "recordings.hpp"
+
+namespace panonav::python {
+
+namespace {
+
+constexpr std::array<const char*, 3> origin_names{"prediction", "recovery", "search"};
+
+struct NamedStep : RouteStep {
+  std::string name;
+};
+
+template <class Value>
+std::optional<Value> of_fix(const NamedStep& step, const Value TrackedRouteFix::*member) {
+  return step.fix ? std::optional((*step.fix).*member) : std::nullopt;
+}
+template <class Value>
+auto fix_field(Value RouteFix::*member) {
+  return [member](const NamedStep& step) -> std::optional<Value> {
+    if (!step.fix) return std::nullopt;
+    return step.fix->fix.*member;
+  };
+}
+
+RouteFollowerOptions follower_options(const std::optional<std::string>& name, bool use_odometry,
+                                      const py::kwargs& keywords) {
+  RouteFollowerOptions options{.name = name, .use_odometry = use_odometry};
+  Keywords(keywords).options(options.tracker).options(options.fit).finish();
+  return options;
+}
+
+void bind_following(py::module_& m) {
+  Record<AzimuthRange>(m, "AzimuthRange", "Azimuths in the robot's frame.")
+      .field("from_rad", &AzimuthRange::from_rad, "")
+      .field("to_rad", &AzimuthRange::to_rad, "Counter-clockwise from the first.");
+  Record<NamedStep>(m, "RouteStep", "Where a robot is beside a route.")
+      .field("name", &NamedStep::name, "Of the picture, where it has one.")
+      .field(
+          "on_route", [](const NamedStep& s) { return s.fix.has_value(); },
+          "Where not, all else is None.")
+      .field("pose", fix_field(&RouteFix::pose), "")
+      .field(
+          "origin",
+          [](const NamedStep& s) -> std::optional<std::string> {
+            if (!s.fix) return std::nullopt;
+            return origin_names[static_cast<std::size_t>(s.fix->origin)];
+          },
+          "'prediction', 'recovery' or 'search'.")
+      .field(
+          "along_m",
+          [](const NamedStep& s) { return of_fix<double>(s, &TrackedRouteFix::along_m); },
+          "Way along the route.")
+      .field(
+          "lateral_m",
+          [](const NamedStep& s) { return of_fix<double>(s, &TrackedRouteFix::lateral_m); },
+          "From the route to the robot; positive to the left.")
+      .field("correlation", fix_field(&RouteFix::correlation), "")
+      .field("residual", fix_field(&RouteFix::residual), "")
+      .field("columns", fix_field(&RouteFix::columns), "")
+      .field(
+          "covariance",
+          [](const NamedStep& s) -> std::optional<py::array_t<double>> {
+            if (!s.fix) return std::nullopt;
+            return py::array_t<double>({3, 3}, s.fix->fix.covariance.data());
+          },
+          "(3, 3) of x, y in m and heading in rad.")
+      .field("changed", &NamedStep::changed, "Where the scene is not as remembered.")
+      .field(
+          "line",
+          [](const NamedStep& s) {
+            return py::array_t<float>(static_cast<py::ssize_t>(s.line.size()), s.line.data());
+          },
+          "What was seen, float32.");
+  const std::string options =
+      with_options("", {options_of<RouteTrackerOptions>(), options_of<RouteFitOptions>()});
+  using SharedFollower = Shared<RouteFollower>;
+  py::class_<SharedFollower>(m, "RouteFollower",
+                             "Says where a robot is beside a recorded route, one observation after "
+                             "the other.")
+      .def(py::init([](const std::filesystem::path& memory, const std::optional<std::string>& name,
+                       const std::optional<PictureSource>& source, bool use_odometry,
+                       const py::kwargs& keywords) {
+             const auto wanted = follower_options(name, use_odometry, keywords);
+             const py::gil_scoped_release free;
+             return std::make_unique<SharedFollower>(MemoryFile::open(memory, Access::read_only),
+                                                     source, wanted);
+           }),
+           py::arg("memory"), py::arg("name") = py::none(), py::arg("source") = py::none(),
+           py::arg("use_odometry") = true,
+           ("`name`: of the route; None: the only one that there is." + options).c_str())
+      .def(
+          "step",
+          [](SharedFollower& follower, const py::object& observation) {
+            const Observation seen = observation_from(observation);
+            return follower.change([&](RouteFollower& one) {
+              return NamedStep{one.step(seen), seen.name};
+            });
+          },
+          py::arg("observation"), "The next observation.");
+  m.def(
+      "follow_route",
+      [](const std::filesystem::path& memory, const py::object& recording,
+         const std::optional<std::string>& name, const std::optional<PictureSource>& source,
+         bool use_odometry, int threads, const py::kwargs& keywords) {
+        auto wanted = follower_options(name, use_odometry, keywords);
+        const Dataset dataset = dataset_from(recording, source);
+        const py::gil_scoped_release free;
+        InterruptibleExecutor executor(threads);
+        wanted.use_odometry = use_odometry && !odometry_poses(dataset).empty();
+        RouteFollower follower(MemoryFile::open(memory, Access::read_only), dataset.source, wanted);
+        std::vector<NamedStep> steps;
+        make_in_order(
+            dataset.entries.size(), executor,
+            [&](std::size_t i) { return follower.encode(read_observation(dataset.entries[i])); },
+            [&](std::size_t i, std::vector<float>&& line) {
+              const DatasetEntry& entry = dataset.entries[i];
+              steps.push_back({follower.step(std::move(line), entry.odometry), entry.file});
+            });
+        return steps;
+      },
+      py::arg("memory"), py::arg("recording"), py::arg("name") = py::none(),
+      py::arg("source") = py::none(), py::kw_only(), py::arg("use_odometry") = true,
+      py::arg("threads") = 0,
+      ("Where the robot of a recording is beside a route, as `panonav route follow` says." +
+       options)
+          .c_str());
+}
+
+RecordedRoute record_route(const Dataset& dataset, const std::filesystem::path& memory,
+                           RouteRecorderOptions options, int threads) {
+  InterruptibleExecutor executor(threads);
+  std::vector<Pose2> poses = options.odometry ? std::vector<Pose2>{} : dataset_poses(dataset);
+  if (poses.empty()) {
+    poses = odometry_poses(dataset);
+    options.odometry = true;
+  }
+  if (poses.empty()) throw FileError(dataset.folder.string(), "has neither positions nor odometry");
+  RouteRecorder recorder(
+      std::filesystem::exists(memory)
+          ? MemoryFile::open(memory, Access::read_write)
+          : MemoryFile::create(memory, header_from_first_views(dataset, {}, {}, executor)),
+      dataset.source, options);
+  std::vector<std::size_t> chosen;
+  std::vector<Pose2> drive;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const auto last = drive.empty() ? std::nullopt : std::optional(drive.back());
+    if (!RouteRecorder::is_due(last, poses[i], options.every_m)) continue;
+    chosen.push_back(i);
+    drive.push_back(poses[i]);
+  }
+  const std::size_t first = recorder.skip_recorded(drive);
+  make_in_order(
+      chosen.size() - first, executor,
+      [&](std::size_t i) {
+        Observation seen = read_observation(dataset.entries[chosen[first + i]]);
+        const Pose2& pose = drive[first + i];
+        if (!options.odometry) seen.pose = ReferencePose{pose.x_m, pose.y_m, pose.heading_rad};
+        return recorder.encode(seen);
+      },
+      [&](std::size_t, RouteRecorder::EncodedLine&& line) { recorder.add(std::move(line)); });
+  return recorder.finish();
+}
+
+void bind_recording(py::module_& m) {
+  py::class_<RoutePanorama>(
+      m, "RoutePanorama", "What a robot saw at its camera's height along a route: a line a place.")
+      .def("__len__", &RoutePanorama::size)
+      .def_property_readonly("columns", &RoutePanorama::columns)
+      .def_property_readonly("length_m", &RoutePanorama::length_m)
+      .def(
+          "lines",
+          [](const RoutePanorama& route) {
+            py::array_t<std::uint8_t> rows({static_cast<py::ssize_t>(route.size()),
+                                            static_cast<py::ssize_t>(route.columns())});
+            for (std::size_t i = 0; i < route.size(); ++i) {
+              std::ranges::copy(route.line(i), rows.mutable_data(static_cast<py::ssize_t>(i), 0));
+            }
+            return rows;
+          },
+          "uint8 of (places, columns), from straight ahead counter-clockwise.")
+      .def(
+          "poses",
+          [](const RoutePanorama& route) {
+            py::array_t<double> rows({static_cast<py::ssize_t>(route.size()), py::ssize_t{3}});
+            auto row = rows.mutable_unchecked<2>();
+            for (py::ssize_t i = 0; i < rows.shape(0); ++i) {
+              const Pose2& pose = route.poses()[static_cast<std::size_t>(i)];
+              row(i, 0) = pose.x_m;
+              row(i, 1) = pose.y_m;
+              row(i, 2) = pose.heading_rad;
+            }
+            return rows;
+          },
+          "(places, 3) of x_m, y_m, heading_rad.")
+      .def("__repr__", [](const RoutePanorama& route) {
+        return "RoutePanorama(" + std::to_string(route.size()) + " lines, " +
+               std::to_string(route.columns()) + " columns)";
+      });
+  Record<RecordedRoute>(m, "RecordedRoute", "What a memory file has of a route.")
+      .field("route", &RecordedRoute::route, "")
+      .field("appended", &RecordedRoute::appended, "Lines.")
+      .field("bytes", &RecordedRoute::bytes, "Of its lines and poses as they are kept.")
+      .field("bytes_per_km", &RecordedRoute::bytes_per_km, "");
+  m.def(
+      "record_route",
+      [](const py::object& recording, const std::filesystem::path& memory, const std::string& name,
+         const std::optional<PictureSource>& source, double every_m,
+         const std::optional<std::pair<int, int>>& horizon_rows, bool odometry, int threads,
+         const py::kwargs& keywords) {
+        RouteRecorderOptions options{
+            .name = name, .every_m = every_m, .horizon_rows = horizon_rows, .odometry = odometry};
+        HorizonScanlineOptions line;
+        Keywords(keywords).options(line).finish();
+        if (py::len(keywords) > 0) options.line = line;
+        const Dataset dataset = dataset_from(recording, source);
+        const py::gil_scoped_release free;
+        return record_route(dataset, memory, options, threads);
+      },
+      py::arg("recording"), py::arg("memory"), py::arg("name") = "route",
+      py::arg("source") = py::none(), py::kw_only(), py::arg("every_m") = 0.1,
+      py::arg("horizon_rows") = py::none(), py::arg("odometry") = false, py::arg("threads") = 0,
+      with_options(
+          "Remembers a route as one line of pixels a step, as `panonav route record` does. "
+          "`horizon_rows`: (first, last) that show the horizon, of panoramas whose "
+          "elevations are not known. `odometry`: remember its poses, even where the "
+          "recording knows positions.",
+          {options_of<HorizonScanlineOptions>()})
+          .c_str());
+  m.def(
+      "read_route",
+      [](SharedFile& memory, const std::string& name) {
+        return memory.change([&](MemoryFile& file) { return file.route(name); });
+      },
+      py::arg("memory"), py::arg("name") = "route", "A route of a MemoryFile, or None.");
+}
+
+}  // namespace
+
+void bind_routes(py::module_& m) {
+  bind_recording(m);
+  bind_following(m);
+}
+
+}  // namespace panonav::python

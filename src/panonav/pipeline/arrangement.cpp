@@ -1,0 +1,44 @@
+#include "panonav/pipeline/arrangement.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "panonav/mapping/lattice_map.hpp"
+
+namespace panonav {
+
+void store_lattice(const Lattice& lattice, const VisualMemory& memory, MemoryFile& file) {
+  std::set<std::pair<ViewId, ViewId>> known;
+  for (const Link& link : memory.links()) known.insert(std::minmax(link.a, link.b));
+  const TopologicalMap map = map_of(lattice);
+  std::vector<Link> links;
+  for (const MapEdge& edge : map.edges) {
+    if (edge.weight < min_spring_weight || known.contains(std::minmax(edge.a, edge.b))) continue;
+    links.push_back({edge.a, edge.b, edge.kind});
+  }
+  file.change([&] {
+    file.link(links);
+    file.save_map("lattice", map);
+  });
+}
+
+std::vector<CoarseMotion> motions_between(const Dataset& recording, const VisualMemory& memory,
+                                          const CoarseMotionOptions& options) {
+  std::vector<CoarseMotion> motions;
+  std::optional<std::pair<ViewId, Pose2>> before;
+  for (const DatasetEntry& entry : recording.entries) {
+    const auto view = memory.find(entry.file);
+    if (!view || !entry.odometry) continue;
+    if (before && before->first != *view) {
+      motions.push_back(
+          coarse_motion(before->first, *view, inverse(before->second) * *entry.odometry, options));
+    }
+    before = {*view, *entry.odometry};
+  }
+  return motions;
+}
+
+}  // namespace panonav
