@@ -3,7 +3,7 @@
 // kills the node in the middle of its way. In a network of its own:
 //   panonav simulate WORLD places --grid 0.5 --kind panorama
 //   unshare -rn sh -c 'ip link set lo up multicast on; ip route add 224.0.0.0/4 dev lo;
-//     ros2_loop PANONAV WORLD places/poses.csv NEW.panonav 60 REPEATS MISSIONS KIDNAPPINGS FACTOR'
+//     ros2_loop PANONAV WORLD places/poses.csv NEW.panonav 60 20 20 10 6 --rows 48 --columns 320'
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -187,9 +187,6 @@ struct Judge {
                                  for (const auto& [key, value] : message.status.at(0).values) {
                                    way += " " + std::string(key) + " " + std::string(value);
                                  }
-                                 if (std::getenv("WAY") && feedback % 10 == 0)
-                                   printf("  %s | truth %.2f %.2f told %.2f %.2f\n", way.c_str(),
-                                          truth.x_m, truth.y_m, told().x_m, told().y_m);
                                });
     hear<ros::String>("panonav/command/result",
                       [this](const ros::String& message) { answer = message.data; });
@@ -343,6 +340,8 @@ int main(int count, char** words) {
   }
   if (taught.empty()) return 1;
   auto node = std::make_unique<Process>(node_words);
+  judge.last_transform_s = 0.0;
+  judge.gaps_ms.clear();
   judge.pictures = 0;
   judge.until(60.0, [&] { return judge.pictures > 2; });
   judge.until(2.0, [] { return false; });
@@ -359,6 +358,7 @@ int main(int count, char** words) {
     if (kill) {
       judge.until(10.0, [&] { return !judge.result.empty(); });
       node->end(SIGKILL);
+      judge.last_transform_s = 0.0;
       judge.until(3.0, [] { return false; });
       const double before_s = wall_s();
       node = std::make_unique<Process>(node_words);
@@ -417,8 +417,9 @@ int main(int count, char** words) {
   printf("repeated %d of %d, reached %d of %d, found %d of %d\n", repeated, repeats, reached,
          missions, found, kidnappings);
   if (!judge.gaps_ms.empty()) {
-    printf("map -> odom: median %.1f ms, 99.9 %% %.1f ms\n", quantile(judge.gaps_ms, 0.5),
-           quantile(judge.gaps_ms, 0.999));
+    printf("map -> odom each %.1f ms, at 99.9 %% within %.1f ms, at most %.1f ms, %zu times\n",
+           quantile(judge.gaps_ms, 0.5), quantile(judge.gaps_ms, 0.999),
+           std::ranges::max(judge.gaps_ms), judge.gaps_ms.size());
   }
   return 0;
 }
