@@ -112,5 +112,30 @@ TEST_F(RouteDriving, ARobotThatIsNowhereOnItStands) {
   EXPECT_THROW((void)driver.step(picture(start)), ContractError);
 }
 
+TEST_F(RouteDriving, GoesOnWhereItWasAndBelievesAWitness) {
+  Observation first(picture(start));
+  first.odometry = Pose2{};
+  for (const bool resumed : {false, true}) {  // the round ends where it begins
+    RouteDriverOptions options;
+    if (resumed) options.resume_m = 100.0;
+    RouteDriver driver(MemoryFile::open(memory, Access::read_only), std::nullopt, options);
+    const RouteDriveStep step = driver.step(first);
+    EXPECT_EQ(step.along_m > 0.5 * step.length_m, resumed) << step.along_m;
+  }
+  for (const bool witness : {false, true}) {
+    RouteDriver driver(MemoryFile::open(memory, Access::read_only), std::nullopt);
+    RouteDriveStep step = driver.step(first);
+    for (int i = 1; i < 30; ++i) {  // 1.5 m without a line that fits
+      Observation blind(picture({6.8, 1.0, 0.5}));
+      blind.odometry = Pose2{0.05 * i, 0.0, 0.0};
+      const auto robot = driver.follower().tracker().pose();
+      if (step.state != RouteDriveState::lost) {
+        step = driver.step(blind, witness ? robot : std::nullopt);
+      }
+    }
+    EXPECT_EQ(step.state, witness ? RouteDriveState::driving : RouteDriveState::lost);
+  }
+}
+
 }  // namespace
 }  // namespace panonav::testing
