@@ -355,6 +355,31 @@ TEST(Navigator, SaysHowProbableItsPlaceIsAndStopsWhereNoneIs) {
   });
 }
 
+// What stands in the way stands in the picture, too, and makes the robot's own place improbable.
+TEST(Navigator, IsNotLostBehindAScreen) {
+  ToyWorld world = two_rooms(1, false);
+  const RememberedWorld remembered(world, high, spacing_m, 1);
+  world.add_wall({3.55, 2.1}, {3.55, 3.5}, Texture(world.random(), 0.15), 0.8);
+  const MemoryViewSource source(remembered.memory);
+  const NavigatorOptions options;
+  Navigator navigator(source, phase_planner(remembered.memory), options);
+  ViewId goal = remembered.memory.views().front();
+  for (const ViewId view : remembered.memory.views()) {
+    if (remembered.pose_of(view).x_m > 6.0) goal = view;
+  }
+  navigator.set_goal(goal);
+  Random random(1);
+  int improbable = 0;
+  NavigationDecision decision;
+  do {
+    const Pose2 pose{random.uniform(3.3, 3.35), random.uniform(2.7, 2.9), 0.0};
+    decision = navigator.observe(two_rooms_signature(world, pose, random), {.obstacle = true});
+    improbable += decision.probability < 0.5;
+  } while (decision.state == NavigationState::moving);
+  EXPECT_GT(improbable, options.lost_patience);
+  EXPECT_EQ(decision.state, NavigationState::unreachable) << describe(decision);
+}
+
 TEST(Navigator, GoesNowhereWithoutAWay) {
   const ToyWorld world = two_rooms(1, false);
   RememberedWorld remembered(world, high, spacing_m, 1);

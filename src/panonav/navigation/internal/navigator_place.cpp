@@ -165,8 +165,12 @@ void Navigator::Core::judge_place(Step& step) {
   };
   step.decision.probability = probability();
   int& improbable_steps = place.doubt.improbable_steps;
-  // Between references that stand far apart no place is probable.
-  if (step.decision.probability < 0.5 && !plan.under_way && !line_tells()) ++improbable_steps;
+  // Between references that stand far apart no place is probable, nor where something stands in
+  // the way and in the picture: what ends such a run is that every way was tried.
+  if (step.decision.probability < 0.5 && !plan.under_way && !line_tells() &&
+      obstruction.level == 0) {
+    ++improbable_steps;
+  }
   const bool sought = std::ranges::find(step.decision.events, NavigationEvent::relocalised) !=
                       step.decision.events.end();
   if (state == NavigationState::moving && improbable_steps > 0 && !sought &&
