@@ -1,10 +1,11 @@
 #include "cli/stop_signals.hpp"
 
 #include <fcntl.h>
-#include <poll.h>
 #include <unistd.h>
 
-#include <chrono>
+#include <atomic>
+#include <cstdint>
+#include <ctime>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -13,18 +14,39 @@ namespace panonav::command {
 
 namespace {
 
-volatile std::sig_atomic_t signal_pipe = -1;  // what a handler may use is static
+// What a handler may use is static.
+volatile std::sig_atomic_t signal_pipe = -1;
+std::atomic<std::int64_t> asked_at_ns = 0;  // 0: not yet
+
+std::int64_t steady_ns() {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+}
+
+// A program that ends others may send a signal to this one and then to its group: one request,
+// also where the run has ended in between.
+void on_signal(int number) {
+  constexpr std::int64_t one_request_ns = 500'000'000;
+  const std::int64_t now_ns = steady_ns();
+  std::int64_t first_ns = 0;
+  if (asked_at_ns.compare_exchange_strong(first_ns, now_ns)) {
+    const char asked = 's';
+    (void)!write(signal_pipe, &asked, 1);
+  } else if (now_ns - first_ns >= one_request_ns) {
+    signal(number, SIG_DFL);
+    raise(number);
+  }
+}
 
 }  // namespace
 
 StopSignals::StopSignals(std::function<void()> stop) : stop_(std::move(stop)) {
   if (pipe2(pipe_.data(), O_CLOEXEC) != 0) throw Error("no pipe can be made");
   signal_pipe = pipe_[1];
+  asked_at_ns = 0;
   struct sigaction action {};
-  action.sa_handler = [](int) {
-    const char asked = 's';
-    (void)!write(signal_pipe, &asked, 1);
-  };
+  action.sa_handler = on_signal;
   action.sa_flags = SA_RESTART;
   sigaction(SIGINT, &action, &interrupt_);
   sigaction(SIGTERM, &action, &terminate_);
@@ -32,22 +54,15 @@ StopSignals::StopSignals(std::function<void()> stop) : stop_(std::move(stop)) {
     char asked = 0;
     while (read(pipe_[0], &asked, 1) < 0) {
     }
-    if (asked != 's') return;
-    stop_();
-    // A program that ends others may send a signal to this one and then to its group: one request.
-    const auto until = std::chrono::steady_clock::now() + std::chrono::milliseconds(500);
-    while (std::chrono::steady_clock::now() < until) {
-      pollfd again{pipe_[0], POLLIN, 0};
-      if (poll(&again, 1, 50) == 1 && read(pipe_[0], &asked, 1) == 1 && asked == 'o') return;
-    }
-    signal(SIGINT, SIG_DFL);
-    signal(SIGTERM, SIG_DFL);
+    if (asked == 's') stop_();
   });
 }
 
 StopSignals::~StopSignals() {
-  sigaction(SIGINT, &interrupt_, nullptr);
-  sigaction(SIGTERM, &terminate_, nullptr);
+  if (asked_at_ns == 0) {
+    sigaction(SIGINT, &interrupt_, nullptr);
+    sigaction(SIGTERM, &terminate_, nullptr);
+  }
   const char over = 'o';
   (void)!write(pipe_[1], &over, 1);
   waiting_.join();

@@ -8,7 +8,8 @@
 namespace panonav::command {
 
 /// Calls `stop` on another thread when the user or the system asks the program to end; a second
-/// time ends it at once. One at a time.
+/// time, half a second later or more, ends it at once, also when this object is gone: what the run
+/// has to store comes after it. One at a time.
 class StopSignals {
  public:
   /// Throws Error.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <ctime>
 #include <utility>
 
@@ -71,15 +72,23 @@ std::optional<Observation> LiveObservations::next() {
   if (!seen) return std::nullopt;
   Observation observation(std::move(seen->picture));
   observation.encoded = std::move(seen->encoded);
-  observation.stamp_s = seen->stamp_s;
+  // Names are unique in a memory. Pictures that come in one piece have the same time, to the
+  // microsecond; a clock that is set back leaves more between.
+  constexpr std::int64_t second_us = 1'000'000;
+  auto stamp_us = static_cast<std::int64_t>(std::floor(1e6 * seen->stamp_s));
+  if (last_us_ && stamp_us <= *last_us_ && *last_us_ - stamp_us < second_us) {
+    stamp_us = *last_us_ + 1;
+  }
+  last_us_ = stamp_us;
+  observation.stamp_s = 1e-6 * static_cast<double>(stamp_us);
   timing_ = {seen->arrived, seen->decoding};
-  const auto whole_s = static_cast<std::time_t>(std::floor(seen->stamp_s));
+  const auto micro = (stamp_us % second_us + second_us) % second_us;
+  const auto whole_s = static_cast<std::time_t>((stamp_us - micro) / second_us);
   std::tm utc{};
   gmtime_r(&whole_s, &utc);
   std::array<char, 40> text{};
   const std::size_t length = std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%S", &utc);
-  const auto micro = static_cast<int>(1e6 * (seen->stamp_s - std::floor(seen->stamp_s)));
-  const std::string digits = std::to_string(1'000'000 + micro);
+  const std::string digits = std::to_string(second_us + micro);
   observation.name = std::string(text.data(), length) + "." + digits.substr(1) + "Z";
   return observation;
 }

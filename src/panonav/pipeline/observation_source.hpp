@@ -110,6 +110,7 @@ class LiveObservations final : public ObservationSource {
   PictureSource pictures_;
   LivePictures live_;
   Timing timing_;
+  std::optional<std::int64_t> last_us_;  ///< stamp of the last picture, in microseconds
 };
 
 }  // namespace panonav
