@@ -2,13 +2,17 @@
 // each remembered with all and with few references, of all and of few components,
 // asked for its own places, as memorised and with other light and a tenth hidden, for places of
 // other variants of its scene and for places of other scenes. Logistic regression; own places,
-// variants and other scenes count a third each. About five minutes.
+// variants and other scenes count a third each. First the coefficients of the columns, then those
+// of the local features, from the queries at which the columns leave doubt by the coefficients that
+// are in use: where the former have changed, run again with them. About eight minutes.
 
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,6 +49,9 @@ constexpr int min_learnt_components = 6;
 constexpr double max_others_known = 0.005;
 constexpr int queries = 40;
 constexpr std::size_t asked_of_others = 6;
+// Of variants, for what is learnt of features: hardly a sixth of them leave doubt, and most of
+// these are of one kind.
+constexpr std::size_t asked_of_variants = 20;
 
 enum class Whose { own, variant, other };
 struct Place {
@@ -55,12 +62,24 @@ struct Place {
 struct Sample {
   PlaceEvidence evidence;
   Whose whose;
+  std::size_t kind;  // of the memory
+  bool disturbed;
+  bool for_features;  // asked for what is learnt of features alone
 };
-constexpr int learnt_features = place_features - 1;  // without that of the components
-using Vector = Eigen::Matrix<double, learnt_features, 1>;
+template <int size>
+using Vector = Eigen::Matrix<double, size, 1>;
+constexpr int column_features = place_features - 1;  // without that of the components
 
-Vector learnt_features_of(const PlaceEvidence& evidence) {
-  return Eigen::Map<const Vector>(features_of(evidence).data());
+std::optional<Vector<column_features>> column_features_of(const PlaceEvidence& evidence) {
+  return Eigen::Map<const Vector<column_features>>(features_of(evidence).data());
+}
+// None where columns leave no doubt.
+std::optional<Vector<doubtful_features>> doubtful_features_of_query(const PlaceEvidence& evidence) {
+  if (!evidence.features) return std::nullopt;
+  return Eigen::Map<const Vector<doubtful_features>>(doubtful_features_of(evidence).data());
+}
+double logistic(double z) {
+  return 1.0 / (1.0 + std::exp(-z));
 }
 
 PackedSignature truncated(PackedSignature view, SignatureShape shape) {
@@ -84,51 +103,84 @@ std::vector<Sample> ask(const std::vector<Place>& places, const Place& place,
   for (const ViewId view : all.views()) {
     memory.append(truncated(all.packed(view), shape), all.info(view));
   }
-  const Localiser localiser(memory);
+  Localiser localiser(memory);
+  localiser.use_features(features_of_references(place.recording, memory, executor), false);
   struct Query {
     const Panorama* view;
     Whose whose;
+    bool disturbed;
+    bool for_features = false;
   };
   std::vector<Query> asked;
   for (const Place& other : places) {
-    for (const auto* const views : {&other.recording.queries, &other.disturbed}) {
+    for (const bool disturbed : {false, true}) {
+      const auto* const views = disturbed ? &other.disturbed : &other.recording.queries;
       for (std::size_t i = 0; i < views->size(); ++i) {
         const PlacedView& view = (*views)[i];
         if (&other == &place) {
           const bool is_near = std::ranges::any_of(kept, [&](Point2 position) {
             return distance(position, view.pose.position()) <= place.recording.spacing_m;
           });
-          if (is_near) asked.push_back({&view.panorama, Whose::own});
-        } else if (i < asked_of_others) {
-          asked.push_back(
-              {&view.panorama, other.kind == place.kind ? Whose::variant : Whose::other});
+          if (is_near) asked.push_back({&view.panorama, Whose::own, disturbed});
+        } else if (i < (other.kind == place.kind ? asked_of_variants : asked_of_others)) {
+          asked.push_back({&view.panorama, other.kind == place.kind ? Whose::variant : Whose::other,
+                           disturbed, i >= asked_of_others});
         }
       }
     }
   }
   return make_each(executor, asked.size(), [&](std::size_t i) {
     const PackedSignature query = truncated(signature_for(*asked[i].view, all), shape);
-    return Sample{localiser.localise(query).evidence, asked[i].whose};
+    return Sample{localiser.localise(query, {}, features_of_query(*asked[i].view)).evidence,
+                  asked[i].whose, place.kind, asked[i].disturbed, asked[i].for_features};
   });
 }
 
-Vector learn(const std::vector<Sample>& samples) {
+std::array<double, 3> counts_of(const std::vector<Sample>& samples) {
   std::array<double, 3> counts{};
   for (const Sample& sample : samples) counts[static_cast<std::size_t>(sample.whose)] += 1.0;
-  Vector weights = Vector::Zero();
+  return counts;
+}
+
+// What one query teaches, and how much it counts.
+template <int size>
+struct Lesson {
+  Vector<size> x;
+  bool own;
+  double share;
+  std::size_t kind;
+};
+
+// Of the samples with numbers; shares are those of all.
+template <int size>
+std::vector<Lesson<size>> lessons_of(
+    const std::vector<Sample>& samples,
+    std::optional<Vector<size>> (*numbers_of)(const PlaceEvidence&)) {
+  const std::array<double, 3> counts = counts_of(samples);
+  std::vector<Lesson<size>> lessons;
+  for (const Sample& sample : samples) {
+    const auto x = numbers_of(sample.evidence);
+    if (!x) continue;
+    const double all = static_cast<double>(samples.size()) / 3.0;
+    lessons.push_back({*x, sample.whose == Whose::own,
+                       all / counts[static_cast<std::size_t>(sample.whose)], sample.kind});
+  }
+  return lessons;
+}
+
+template <int size>
+Vector<size> learn(const std::vector<Lesson<size>>& lessons) {
+  Vector<size> weights = Vector<size>::Zero();
   for (int step = 0; step < 50; ++step) {
-    Vector slope = -1e-3 * weights;
-    Eigen::Matrix<double, learnt_features, learnt_features> curvature =
-        1e-3 * decltype(curvature)::Identity();
-    for (const auto& [evidence, whose] : samples) {
-      const Vector x = learnt_features_of(evidence);
-      const double probability = 1.0 / (1.0 + std::exp(-weights.dot(x)));
-      const double share =
-          static_cast<double>(samples.size()) / 3.0 / counts[static_cast<std::size_t>(whose)];
-      slope += share * ((whose == Whose::own ? 1.0 : 0.0) - probability) * x;
-      curvature += share * probability * (1.0 - probability) * x * x.transpose();
+    Vector<size> slope = -1e-3 * weights;
+    Eigen::Matrix<double, size, size> curvature = 1e-3 * decltype(curvature)::Identity();
+    for (const Lesson<size>& lesson : lessons) {
+      const double probability = logistic(weights.dot(lesson.x));
+      slope += lesson.share * ((lesson.own ? 1.0 : 0.0) - probability) * lesson.x;
+      curvature +=
+          lesson.share * probability * (1.0 - probability) * lesson.x * lesson.x.transpose();
     }
-    Vector change = curvature.ldlt().solve(slope);
+    Vector<size> change = curvature.ldlt().solve(slope);
     change *= std::min(1.0, 3.0 / change.norm());
     weights += change;
     if (change.norm() < 1e-6) break;
@@ -136,30 +188,63 @@ Vector learn(const std::vector<Sample>& samples) {
   return weights;
 }
 
-// Of answers in each tenth: how many, weighted as in `learn`, and how many of them are own places.
-void report(const Remembering& how, const std::vector<Sample>& samples, const Vector& weights,
-            double last) {
-  std::array<double, 3> counts{};
-  for (const Sample& sample : samples) counts[static_cast<std::size_t>(sample.whose)] += 1.0;
+// What features tell differs more from one kind of scene to another than what columns tell. The log
+// odds are shrunk as much as those learnt without a kind must be to be right of it.
+Vector<doubtful_features> learn_of_features(const std::vector<Lesson<doubtful_features>>& lessons) {
+  std::vector<Lesson<2>> left_out;
+  for (std::size_t kind = 0; kind < kinds.size(); ++kind) {
+    std::vector<Lesson<doubtful_features>> rest;
+    std::ranges::copy_if(lessons, std::back_inserter(rest),
+                         [&](const auto& lesson) { return lesson.kind != kind; });
+    const auto without = learn(rest);
+    for (const auto& lesson : lessons) {
+      if (lesson.kind != kind) continue;
+      left_out.push_back(
+          {Vector<2>(1.0, without.dot(lesson.x)), lesson.own, lesson.share, lesson.kind});
+    }
+  }
+  const Vector<2> shrinkage = learn(left_out);
+  Vector<doubtful_features> weights = learn(lessons);
+  std::printf("features, not shrunk:");
+  for (const double weight : weights) std::printf(" %.2f", weight);
+  std::printf("; shrinkage %.2f, %.2f\n", shrinkage[0], shrinkage[1]);
+  weights *= shrinkage[1];
+  weights[0] += shrinkage[0];
+  return weights;
+}
+
+// Of answers in each tenth: how many, weighted as in `learn`, and how many of them are own places;
+// and what is known of each scene.
+template <class Probability>
+void report(const char* title, const std::vector<Sample>& samples, const Probability& probability) {
+  const std::array<double, 3> counts = counts_of(samples);
   std::array<std::array<double, 3>, 10> tenths{};
   std::array<double, 3> taken{};
-  for (const auto& [evidence, whose] : samples) {
-    const double z =
-        weights.dot(learnt_features_of(evidence)) + last * features_of(evidence).back();
-    const double probability = 1.0 / (1.0 + std::exp(-z));
-    const auto w = static_cast<std::size_t>(whose);
-    taken[w] += (probability >= 0.5 ? 1.0 : 0.0) / counts[w];
-    tenths[std::min<std::size_t>(9, static_cast<std::size_t>(10.0 * probability))][w] +=
+  std::array<std::array<std::array<int, 2>, 4>, kinds.size()> scenes{};  // asked, known
+  for (const Sample& sample : samples) {
+    const double p = probability(sample.evidence);
+    const auto w = static_cast<std::size_t>(sample.whose);
+    taken[w] += (p >= 0.5 ? 1.0 : 0.0) / counts[w];
+    tenths[std::min<std::size_t>(9, static_cast<std::size_t>(10.0 * p))][w] +=
         1.0 / 3.0 / counts[w];
+    const std::size_t column = sample.whose == Whose::own ? (sample.disturbed ? 1 : 0) : w + 1;
+    ++scenes[sample.kind][column][0];
+    scenes[sample.kind][column][1] += p >= 0.5 ? 1 : 0;
   }
-  std::printf(
-      "one of %d references, %d components: known are %.3f of own, %.3f of variants, %.4f of "
-      "others\n",
-      static_cast<int>(how.one_of), how.components, taken[0], taken[1], taken[2]);
+  std::printf("  %s: known are %.3f of own, %.3f of variants, %.4f of others\n", title, taken[0],
+              taken[1], taken[2]);
   for (std::size_t t = 0; t < tenths.size(); ++t) {
     const double all = tenths[t][0] + tenths[t][1] + tenths[t][2];
-    std::printf("  %.1f .. %.1f: %.4f of answers, %.2f of them own\n", 0.1 * static_cast<double>(t),
-                0.1 * static_cast<double>(t + 1), all, tenths[t][0] / all);
+    std::printf("    %.1f .. %.1f: %.4f of answers, %.2f of them own\n",
+                0.1 * static_cast<double>(t), 0.1 * static_cast<double>(t + 1), all,
+                tenths[t][0] / all);
+  }
+  for (std::size_t k = 0; k < kinds.size(); ++k) {
+    std::printf("    %-14s own, hidden, variants, others:", kinds[k].scene);
+    for (const auto& [asked, known] : scenes[k]) {
+      std::printf(" %.3f", static_cast<double>(known) / std::max(1, asked));
+    }
+    std::printf("\n");
   }
 }
 
@@ -183,26 +268,45 @@ int main() {
     }
   }
   std::vector<std::vector<Sample>> samples(rememberings.size());
-  std::vector<Sample> learnt_from;
+  std::vector<Sample> for_columns;
+  std::vector<Sample> for_features;
   for (std::size_t h = 0; h < rememberings.size(); ++h) {
     for (const Place& place : places) {
       const auto more = ask(places, place, rememberings[h], executor);
       samples[h].insert(samples[h].end(), more.begin(), more.end());
     }
+    // Features do not depend on the components.
+    if (rememberings[h].components == full_components) {
+      for_features.insert(for_features.end(), samples[h].begin(), samples[h].end());
+    }
     if (rememberings[h].components < min_learnt_components) continue;
-    learnt_from.insert(learnt_from.end(), samples[h].begin(), samples[h].end());
+    std::ranges::remove_copy_if(samples[h], std::back_inserter(for_columns), &Sample::for_features);
   }
-  const Vector weights = learn(learnt_from);
+  const auto columns = learn(lessons_of(for_columns, column_features_of));
   std::vector<double> others;
-  for (const auto& [evidence, whose] : samples.back()) {
-    if (whose == Whose::other) others.push_back(weights.dot(learnt_features_of(evidence)));
+  for (const Sample& sample : samples.back()) {
+    if (sample.whose == Whose::other) {
+      others.push_back(columns.dot(*column_features_of(sample.evidence)));
+    }
   }
   const double last = std::max(0.0, quantile(others, 1.0 - max_others_known)) /
                       std::log(double{full_components} / rememberings.back().components);
-  for (const double weight : weights) std::printf("%.2f\n", weight);
-  std::printf("%.2f\n", last);
+  const auto doubtful = learn_of_features(lessons_of(for_features, doubtful_features_of_query));
+  for (const double weight : columns) std::printf("%.2f\n", weight);
+  std::printf("%.2f\nwhere columns leave doubt:\n", last);
+  for (const double weight : doubtful) std::printf("%.2f\n", weight);
+  const auto by_columns = [&](const PlaceEvidence& evidence) {
+    return logistic(columns.dot(*column_features_of(evidence)) +
+                    last * features_of(evidence).back());
+  };
   for (std::size_t h = 0; h < rememberings.size(); ++h) {
-    report(rememberings[h], samples[h], weights, last);
+    std::printf("one of %d references, %d components\n", static_cast<int>(rememberings[h].one_of),
+                rememberings[h].components);
+    report("columns", samples[h], by_columns);
+    report("and features", samples[h], [&](const PlaceEvidence& evidence) {
+      const auto numbers = doubtful_features_of_query(evidence);
+      return numbers ? logistic(doubtful.dot(*numbers)) : by_columns(evidence);
+    });
   }
   return 0;
 }

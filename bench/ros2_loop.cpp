@@ -151,6 +151,13 @@ std::vector<Point2> drive_of(const std::vector<Point2>& places, double length_m,
   return path;
 }
 
+ros::PoseStamped in_map(const Pose2& pose) {
+  ros::PoseStamped message;
+  message.header.frame_id = "map";
+  message.pose = ros::pose_of(pose);
+  return message;
+}
+
 struct Judge {
   explicit Judge()
       : participant({.node = "judge"}, [](const std::string& line) { puts(line.c_str()); }) {
@@ -211,7 +218,7 @@ struct Judge {
     }
   }
   void carry(const Pose2& to) {
-    set_pose.publish({{0, "map"}, ros::pose_of(to)});
+    set_pose.publish(in_map(to));
     until(1.0, [] { return false; });
   }
   [[nodiscard]] Pose2 told() const { return map_from_odom * odom_from_base; }
@@ -406,10 +413,7 @@ int main(int count, char** words) {
   for (int i = 0; i < missions; ++i) {
     const Taught& place = taught[random.index(taught.size())];
     reached += drives(
-                   "mission",
-                   [&] {
-                     judge.goal.publish({{0, "map"}, ros::pose_of(place.map)});
-                   },
+                   "mission", [&] { judge.goal.publish(in_map(place.map)); },
                    place.truth.position(), i == 1, 600.0)
                    ? 1
                    : 0;

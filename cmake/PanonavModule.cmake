@@ -6,6 +6,8 @@
 # folder `internal`, unless SOURCES names others. Headers are included as "panonav/NAME/x.hpp"; those in `internal` are
 # the module's own and are not installed. Each module has an export set of its own, so that users of a module need
 # only the packages of that module and of those before it.
+# With BUILD_SHARED_LIBS the modules are parts of one libpanonav (panonav_one_library), and panonav::NAME is that library
+# with the headers of the module and of those before it.
 function(panonav_module name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;LINK;LINK_PRIVATE;PACKAGES" ${ARGN})
   set(target panonav_${name})
@@ -13,20 +15,37 @@ function(panonav_module name)
     file(GLOB ARG_SOURCES CONFIGURE_DEPENDS *.cpp internal/*.cpp)
   endif()
   add_library(${target} STATIC ${ARG_SOURCES})
-  add_library(panonav::${name} ALIAS ${target})
-  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
   target_compile_features(${target} PUBLIC cxx_std_20)
   target_include_directories(${target} PUBLIC
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src>
     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
-  list(TRANSFORM ARG_DEPENDS PREPEND panonav:: OUTPUT_VARIABLE libraries)
+  list(TRANSFORM ARG_DEPENDS PREPEND panonav_ OUTPUT_VARIABLE libraries)
   target_link_libraries(${target} PUBLIC ${libraries} ${ARG_LINK} PRIVATE ${ARG_LINK_PRIVATE})
   panonav_warnings(${target})
   panonav_precompile(${target})
-  install(TARGETS ${target} EXPORT panonav_${name} ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
-  install(EXPORT panonav_${name} NAMESPACE panonav:: FILE panonav-${name}.cmake DESTINATION ${PANONAV_PACKAGE_FOLDER})
+  if(BUILD_SHARED_LIBS)
+    set(user_target panonav_shared_${name})
+    add_library(${user_target} INTERFACE)
+    target_compile_features(${user_target} INTERFACE cxx_std_20)
+    target_include_directories(${user_target} INTERFACE
+      $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src>
+      $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+    list(TRANSFORM ARG_DEPENDS PREPEND panonav_shared_ OUTPUT_VARIABLE libraries)
+    target_link_libraries(${user_target} INTERFACE panonav_library ${libraries} ${ARG_LINK})
+    list(FILTER ARG_SOURCES INCLUDE REGEX TARGET_OBJECTS)
+    set_property(GLOBAL APPEND PROPERTY PANONAV_OBJECTS $<TARGET_OBJECTS:${target}> ${ARG_SOURCES})
+    set(ARG_PACKAGES "")  # the library knows where its own are
+  else()
+    set(user_target ${target})
+  endif()
+  add_library(panonav::${name} ALIAS ${user_target})
+  set_target_properties(${user_target} PROPERTIES EXPORT_NAME ${name})
+  install(TARGETS ${user_target} EXPORT panonav_${name}
+          ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development)
+  install(EXPORT panonav_${name} NAMESPACE panonav:: FILE panonav-${name}.cmake
+          DESTINATION ${PANONAV_PACKAGE_FOLDER} COMPONENT development)
   install(DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/panonav/${name}
-          FILES_MATCHING PATTERN "*.hpp" PATTERN internal EXCLUDE)
+          COMPONENT development FILES_MATCHING PATTERN "*.hpp" PATTERN internal EXCLUDE)
   set_property(GLOBAL APPEND PROPERTY PANONAV_MODULE_NAMES ${name})
   set_property(GLOBAL PROPERTY PANONAV_DEPENDS_${name} ${ARG_DEPENDS})
   set_property(GLOBAL PROPERTY PANONAV_PACKAGES_${name} ${ARG_PACKAGES})
@@ -44,6 +63,22 @@ function(panonav_library name)
   target_link_libraries(panonav_${name} PUBLIC ${ARG_DEPENDS} PRIVATE ${ARG_LINK_PRIVATE})
   panonav_warnings(panonav_${name})
   panonav_precompile(panonav_${name})
+endfunction()
+
+# panonav_embed(TARGET NAME NAMESPACE GLOB): the files as string views in NAME.hpp, for this target; a.css is a_css.
+function(panonav_embed target name namespace glob)
+  file(GLOB files CONFIGURE_DEPENDS ${glob})
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${files})
+  set(header "#pragma once\n#include <string_view>\nnamespace ${namespace} {\n")
+  foreach(embedded IN LISTS files)
+    get_filename_component(variable ${embedded} NAME)
+    string(REPLACE "." "_" variable ${variable})
+    file(READ ${embedded} text)
+    string(APPEND header "inline constexpr std::string_view ${variable} = R\"embedded(${text})embedded\";\n")
+  endforeach()
+  string(APPEND header "}  // namespace ${namespace}\n")
+  file(CONFIGURE OUTPUT embedded/${name}.hpp CONTENT "@header@" @ONLY)
+  target_include_directories(${target} PRIVATE ${CMAKE_CURRENT_BINARY_DIR}/embedded)
 endfunction()
 
 # panonav_compile_quickly(TARGET): for what takes longer to compile than to run: the command and tests.
@@ -140,10 +175,35 @@ endfunction()
 # The target panonav::panonav links every module that was built.
 function(panonav_umbrella)
   get_property(names GLOBAL PROPERTY PANONAV_MODULE_NAMES)
-  list(TRANSFORM names PREPEND panonav_)
+  if(BUILD_SHARED_LIBS)
+    panonav_one_library(${names})
+  endif()
+  list(TRANSFORM names PREPEND panonav::)
   add_library(panonav INTERFACE)
   add_library(panonav::panonav ALIAS panonav)
   target_link_libraries(panonav INTERFACE ${names})
+endfunction()
+
+# panonav_one_library(module ...): libpanonav of all these modules. What it exports stands in exports.map.
+function(panonav_one_library)
+  set(exports ${PROJECT_SOURCE_DIR}/cmake/exports.map)
+  get_property(objects GLOBAL PROPERTY PANONAV_OBJECTS)
+  add_library(panonav_library SHARED ${objects})
+  list(TRANSFORM ARGN PREPEND panonav_ OUTPUT_VARIABLE modules)
+  target_link_libraries(panonav_library PRIVATE ${modules})  # for what these link
+  target_link_options(panonav_library PRIVATE -Wl,--version-script=${exports} -Wl,-z,defs -Wl,--as-needed)
+  set_target_properties(panonav_library PROPERTIES OUTPUT_NAME panonav EXPORT_NAME library
+    VERSION ${PANONAV_ABI}.${PROJECT_VERSION} SOVERSION ${PANONAV_ABI} LINK_DEPENDS ${exports}
+    LINKER_LANGUAGE CXX LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib)
+  install(TARGETS panonav_library EXPORT panonav_library
+          LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT development)
+  install(EXPORT panonav_library NAMESPACE panonav:: FILE panonav-library.cmake
+          DESTINATION ${PANONAV_PACKAGE_FOLDER} COMPONENT development)
+  # pkg-config: paths are relative to where the file lies, so that the whole tree may move.
+  file(RELATIVE_PATH PANONAV_PC_PREFIX /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
+  configure_file(${PROJECT_SOURCE_DIR}/cmake/panonav.pc.in ${PROJECT_BINARY_DIR}/panonav.pc @ONLY)
+  install(FILES ${PROJECT_BINARY_DIR}/panonav.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig
+          COMPONENT development)
 endfunction()
 
 # The CMake package that `find_package(panonav)` finds after an installation.
@@ -164,5 +224,5 @@ function(panonav_install_package)
   write_basic_package_version_file(${PROJECT_BINARY_DIR}/panonavConfigVersion.cmake
     COMPATIBILITY SameMinorVersion)
   install(FILES ${PROJECT_BINARY_DIR}/panonavConfig.cmake ${PROJECT_BINARY_DIR}/panonavConfigVersion.cmake
-          DESTINATION ${PANONAV_PACKAGE_FOLDER})
+          DESTINATION ${PANONAV_PACKAGE_FOLDER} COMPONENT development)
 endfunction()

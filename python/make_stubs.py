@@ -78,7 +78,8 @@ def members(kind: type) -> list:
 
 def stubs(module) -> str:
     lines = ["# Made by python/make_stubs.py.", "import os", "from typing import Any, Dict, Iterator, List, Optional, "
-             "Tuple, Union, overload", "", "import numpy", "", "__version__: str", "camera_models: Tuple[str, ...]"]
+             "Tuple, Union, overload", "", "import numpy", "", "__version__: str"]
+    lines += [f"{name}: Tuple[str, ...]" for name, value in sorted(vars(module).items()) if isinstance(value, tuple)]
     for name, value in sorted(vars(module).items()):
         if inspect.isclass(value):
             bases = ", ".join(base.__name__ for base in value.__bases__ if base.__module__ in ("builtins", "panonav")

@@ -11,7 +11,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
-#include "panonav/motion/velocity.hpp"
+#include "panonav/motion/simulated_base.hpp"
 
 namespace panonav::ros2 {
 
@@ -33,7 +33,9 @@ struct SimulatedRobot::Implementation {
                  Participant::Note hears)
       : options((validate(wanted), wanted)),
         surroundings(std::move(in)),
-        odometry(noise, picture_seed),
+        base(
+            surroundings.start, [this](Point2, Point2 to) { return surroundings.is_free(to); },
+            noise, picture_seed),
         seed(picture_seed),
         note(std::move(hears)),
         participant(setup, note),
@@ -41,8 +43,7 @@ struct SimulatedRobot::Implementation {
         odometries(participant, "odom", {.depth = 50}),
         transforms(participant, "/tf", {.depth = 100}),
         pictures(participant, "image"),
-        truths(participant, "ground_truth", {.depth = 50}),
-        pose(surroundings.start) {
+        truths(participant, "ground_truth", {.depth = 50}) {
     listen<ros::Twist>("cmd_vel", [this](const ros::Twist& twist) {
       const Velocity wished{twist.linear.x, twist.linear.y, twist.angular.z};
       if (!std::isfinite(wished.forward_m_s) || !std::isfinite(wished.left_m_s) ||
@@ -59,7 +60,7 @@ struct SimulatedRobot::Implementation {
                             "a free one");
       }
       const std::lock_guard lock(mutex);
-      pose = wished;
+      base.carry_to(wished);
     });
   }
 
@@ -78,14 +79,12 @@ struct SimulatedRobot::Implementation {
   void step(double step_s) {
     now_s += step_s;
     if (now_s > velocity_until_s) velocity = {};
-    const Pose2 moved = motion_after(velocity, step_s);
-    Pose2 true_move = moved;
-    if (!surroundings.is_free((pose * moved).position())) true_move = {0, 0, moved.heading_rad};
-    const Pose2 read = odometry.advance(true_move);
+    Pose2 true_move;
     {
       const std::lock_guard lock(mutex);
-      pose = pose * true_move;
+      true_move = base.drive(velocity, step_s).moved;
     }
+    const Pose2& read = base.odometry();
     const std::int64_t ns = std::llround(1e9 * now_s);
     clocks.publish({ns});
     ros::Odometry message;
@@ -96,12 +95,12 @@ struct SimulatedRobot::Implementation {
     message.angular_velocity = {0.0, 0.0, true_move.heading_rad / step_s};
     odometries.publish(message);
     transforms.publish({{{{ns, "odom"}, "base_link", ros::pose_of(read)}}});
-    truths.publish({{ns, "map"}, ros::pose_of(pose)});
+    truths.publish({{ns, "map"}, ros::pose_of(base.pose())});
     const std::lock_guard lock(mutex);
     if (now_s >= next_picture_s && !wanted_ns) {
       next_picture_s = std::max(next_picture_s + 1.0 / options.picture_rate_hz, now_s);
       wanted_ns = ns;
-      wanted_pose = pose;
+      wanted_pose = base.pose();
       wanted.notify_all();
     }
   }
@@ -164,7 +163,7 @@ struct SimulatedRobot::Implementation {
 
   SimulatedRobotOptions options;
   SimulatedSurroundings surroundings;
-  SimulatedOdometry odometry;
+  SimulatedBase base;  // changed under `mutex`, by the thread of `run` alone
   std::uint64_t seed;
   Participant::Note note;
   Participant participant;
@@ -178,9 +177,8 @@ struct SimulatedRobot::Implementation {
   double now_s = 0.0;
   double velocity_until_s = 0.0;
   double next_picture_s = 0.0;
-  std::mutex mutex;  // of what follows; `pose` is changed by the thread of `run` alone
+  std::mutex mutex;  // of what follows
   std::condition_variable wanted;
-  Pose2 pose;
   std::optional<std::int64_t> wanted_ns;
   Pose2 wanted_pose;
 };

@@ -5,6 +5,8 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <system_error>
+#include <utility>
 
 #include "experiments/elsewhere/experiments.hpp"
 #include "experiments/runs/make_each.hpp"
@@ -45,15 +47,30 @@ bool is_near(const std::vector<Recorded>& views, std::size_t asked, std::size_t 
 PlaceRecogniser memorise(const std::filesystem::path& file, const Dataset& dataset, bool features,
                          Executor& executor) {
   std::filesystem::remove(file);
-  Memoriser memoriser(file, {.source = dataset.source, .thumbnails = false, .features = features});
-  std::vector<Observation> observations;
-  for (const DatasetEntry& entry : dataset.entries) {
-    observations.push_back(read_observation(entry));
+  {
+    Memoriser memoriser(file,
+                        {.source = dataset.source, .thumbnails = false, .features = features});
+    std::vector<Observation> observations;
+    for (const DatasetEntry& entry : dataset.entries) {
+      observations.push_back(read_observation(entry));
+    }
+    memoriser.add(std::move(observations), executor);
+    memoriser.finish(executor);
   }
-  memoriser.add(std::move(observations), executor);
-  memoriser.finish(executor);
   return PlaceRecogniser(file);
 }
+
+/// Removes a memory file when nobody reads it any more.
+struct RemovedInTheEnd {
+  explicit RemovedInTheEnd(std::filesystem::path path) : file(std::move(path)) {}
+  RemovedInTheEnd(const RemovedInTheEnd&) = delete;
+  RemovedInTheEnd& operator=(const RemovedInTheEnd&) = delete;
+  ~RemovedInTheEnd() {
+    std::error_code ignored;
+    std::filesystem::remove(file, ignored);
+  }
+  std::filesystem::path file;
+};
 
 /// The rows of the picture that the memory keeps, as fine as they were recorded.
 Panorama sharp_view(const DatasetEntry& entry, const PictureSource& source,
@@ -91,11 +108,10 @@ void reproduce_leave_one_out(const ElsewhereReproductionOptions& options,
                              Executor& executor, Reproduction& result) {
   const Dataset dataset = read_dataset(recording);
   const std::string name = recording.filename().string();
-  const std::filesystem::path file = options.out / (name + ".panonav");
-  const PlaceRecogniser by_columns = memorise(file, dataset, false, executor);
-  const PlaceRecogniser recogniser = memorise(file, dataset, true, executor);
-  const double file_bytes = static_cast<double>(std::filesystem::file_size(file));
-  std::filesystem::remove(file);
+  const RemovedInTheEnd memory{options.out / (name + ".panonav")};
+  const PlaceRecogniser by_columns = memorise(memory.file, dataset, false, executor);
+  const PlaceRecogniser recogniser = memorise(memory.file, dataset, true, executor);
+  const double file_bytes = static_cast<double>(std::filesystem::file_size(memory.file));
   std::vector<Recorded> views;
   for (const DatasetEntry& entry : dataset.entries) {
     Panorama panorama = recogniser.encoder().panorama(read_observation(entry));

@@ -225,7 +225,7 @@ void reproduce_first_set(const MappingReproductionOptions& options, Executor& ex
   add_median(result, "f11.loop.closed", what + ": shape difference with closure", "", errors.closed,
              at_most(0.006));
   add_median(result, "f11.loop.closed_wheels",
-             what + ": shape difference with closure and lengths from wheels", "",
+             what + ": shape difference with closure and steps from wheels", "",
              errors.closed_with_wheels, at_most(0.002));
   errors.report("f11.loop", what, result);
   add_median(result, "f11.loop.published",
@@ -322,7 +322,7 @@ void reproduce_second_set(const MappingReproductionOptions& options, Executor& e
   add_median(result, "f11.lab.closed", what + ": shape difference with closure", "", errors.closed,
              at_most(0.01));
   add_median(result, "f11.lab.closed_wheels",
-             what + ": shape difference with closure and lengths from wheels", "",
+             what + ": shape difference with closure and steps from wheels", "",
              errors.closed_with_wheels);
   errors.report("f11.lab", what, result);
   add_median(result, "f11.lab.published",

@@ -293,7 +293,7 @@ void reproduce_identical_doors(const MappingReproductionOptions& options, Execut
            what + ": closures between views at most 1 m apart", right,
            std::max<std::size_t>(1, right + wrong));
   add_median(result, "f11.corridor.closed_wheels",
-             what + ": shape difference with closure and lengths from wheels", "", errors);
+             what + ": shape difference with closure and steps from wheels", "", errors);
 }
 
 void reproduce_mapping_in_world(const MappingReproductionOptions& options, const std::string& name,
@@ -351,7 +351,7 @@ void reproduce_mapping_in_world(const MappingReproductionOptions& options, const
       map.layers.push_back({.label = "views alone",
                             .colour = PlotColour::blue,
                             .lines = {laid_over(with_ground.estimate, with_ground.truth)}});
-      map.layers.push_back({.label = "views, lengths from wheels",
+      map.layers.push_back({.label = "views, steps from wheels",
                             .colour = PlotColour::green,
                             .lines = {laid_over(with_wheels.estimate, with_wheels.truth)}});
       maps.push_back(std::move(map));
@@ -372,10 +372,9 @@ void reproduce_mapping_in_world(const MappingReproductionOptions& options, const
   add_median(result, id + ".ground",
              what + ": of the views alone, height of the camera known, loops closed", "m",
              ground_m);
-  add_median(result, id + ".closed_wheels",
-             what + ": of the views with lengths from these wheels, loops closed", "m",
-             with_wheels_m);
-  add_rate(result, id + ".better", what + ": paths on which ours, lengths from wheels, is better",
+  add_median(result, id + ".closed_wheels", what + ": with steps from these wheels, loops closed",
+             "m", with_wheels_m);
+  add_rate(result, id + ".better", what + ": paths on which ours, steps from wheels, is better",
            better, runs, at_least(0.5));
   add_rate(result, id + ".better_without",
            what + ": paths on which ours, views and height of the camera alone, is better",

@@ -318,8 +318,8 @@ class Voyage {
   }
 
   MissionRun run(Navigator& navigator, ViewId goal_view, const std::optional<Pose2>& kidnapped_to,
-                 const StepReport& report_step) {
-    const Point2 goal = remembered_.truth.at(*remembered_.graph.node_of(goal_view)).position();
+                 const StepReport& report_step, const GoalSource& other_goal) {
+    Point2 goal = remembered_.truth.at(*remembered_.graph.node_of(goal_view)).position();
     const FreeSpace& space = *place_.free_space;
     MissionRun run;
     run.shortest_m = shortest_way_m(space, robot_.pose().position(), goal);
@@ -334,6 +334,13 @@ class Voyage {
       if (decision.state != NavigationState::moving) {
         run.end = decision.state;
         break;
+      }
+      if (const auto other = other_goal ? other_goal() : std::nullopt) {
+        const Point2 here = robot_.pose().position();
+        const Point2 there = remembered_.truth.at(*remembered_.graph.node_of(*other)).position();
+        run.shortest_m += shortest_way_m(space, here, there) - shortest_way_m(space, here, goal);
+        goal = there;
+        continue;  // it looks again from here
       }
       move(decision);
       if (kidnapped_to && !run.kidnapped_at && robot_.travelled_m() >= kidnapped_at_m) {
@@ -421,11 +428,12 @@ std::string other_ends(const std::map<NavigationState, std::size_t>& ends, std::
 
 MissionRun run_mission(const MissionPlace& place, const RememberedPlace& remembered,
                        Navigator& navigator, const Mission& mission, const MissionOptions& options,
-                       std::uint64_t seed, const StepReport& report_step) {
+                       std::uint64_t seed, const StepReport& report_step,
+                       const GoalSource& other_goal) {
   require_goal(remembered, mission.goal);
   navigator.forget_place();
   return Voyage(place, remembered, mission.start, options, seed)
-      .run(navigator, mission.goal, mission.kidnapped_to, report_step);
+      .run(navigator, mission.goal, mission.kidnapped_to, report_step, other_goal);
 }
 
 std::vector<MissionRun> run_tour(const MissionPlace& place, const RememberedPlace& remembered,
@@ -437,7 +445,7 @@ std::vector<MissionRun> run_tour(const MissionPlace& place, const RememberedPlac
   Voyage voyage(place, remembered, start, options, seed);
   std::vector<MissionRun> runs;
   for (const ViewId goal : goals) {
-    runs.push_back(voyage.run(navigator, goal, std::nullopt, {}));
+    runs.push_back(voyage.run(navigator, goal, std::nullopt, {}, {}));
     // A robot that ended lost must not begin from a place in which it did not believe itself.
     if (runs.back().end == NavigationState::lost) navigator.forget_place();
   }

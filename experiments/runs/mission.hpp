@@ -168,7 +168,8 @@ struct MissionRun {
   std::optional<std::size_t> kidnapped_at;  ///< the step after which the robot was kidnapped
   double end_distance_m = 0.0;              ///< from where the goal's view was taken; NaN: unknown
   double travelled_m = 0.0;
-  /// Shortest way through free places, in components when kidnapped; NaN: unknown.
+  /// Shortest way through free places, in components when kidnapped or sent to another goal; NaN:
+  /// unknown.
   double shortest_m = 0.0;
 
   /// The robot says that it arrived, and is within `radius_m` of the goal.
@@ -186,6 +187,9 @@ struct MissionRun {
 /// Called after each step, with the true pose.
 using StepReport = std::function<void(const NavigationDecision& decision, const Pose2& pose)>;
 
+/// Asked after each step that goes on: another goal, which the navigator has already; empty: none.
+using GoalSource = std::function<std::optional<ViewId>()>;
+
 /// Sends a robot over what is remembered; `place` may differ from the place that was remembered.
 /// Where it is not known where the goal's view was taken, nobody carries the robot away. The robot
 /// takes lines when the navigator has routes. The same seed gives the same run. Cost: a picture a
@@ -193,7 +197,8 @@ using StepReport = std::function<void(const NavigationDecision& decision, const 
 [[nodiscard]] MissionRun run_mission(const MissionPlace& place, const RememberedPlace& remembered,
                                      Navigator& navigator, const Mission& mission,
                                      const MissionOptions& options, std::uint64_t seed,
-                                     const StepReport& report_step = {});
+                                     const StepReport& report_step = {},
+                                     const GoalSource& other_goal = {});
 
 /// One goal after the other: each run begins where the one before ended, with the place known that
 /// the robot then believes in. A goal that was not reached does not end the tour. Otherwise as

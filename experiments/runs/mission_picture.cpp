@@ -77,9 +77,9 @@ MapLayer driven_layer(const MissionRun& run) {
 
 }  // namespace
 
-void write_mission_picture(const std::filesystem::path& path, const std::string& title,
-                           const MissionPlace& place, const RememberedPlace& remembered,
-                           const PlannerOptions& options, ViewId goal, const MissionRun& run) {
+MapPlot mission_plot(const std::string& title, const MissionPlace& place,
+                     const RememberedPlace& remembered, const PlannerOptions& options, ViewId goal,
+                     const MissionRun& run) {
   const std::vector<MapLayer> scene = scene_layers(place.scene);
   MapPlot plot{.title = title, .layers = {scene.front()}};
   for (MapLayer& layer : field_layers(remembered, options.field, goal)) {
@@ -100,7 +100,13 @@ void write_mission_picture(const std::filesystem::path& path, const std::string&
     plot.layers.push_back(
         {.label = "goal", .colour = PlotColour::black, .crosses = {at_goal.position()}});
   }
-  write_plot(path, plot);
+  return plot;
+}
+
+void write_mission_picture(const std::filesystem::path& path, const std::string& title,
+                           const MissionPlace& place, const RememberedPlace& remembered,
+                           const PlannerOptions& options, ViewId goal, const MissionRun& run) {
+  write_plot(path, mission_plot(title, place, remembered, options, goal, run));
 }
 
 }  // namespace panonav

@@ -4,12 +4,16 @@
 #include <string>
 
 #include "experiments/runs/mission.hpp"
+#include "reporting/plot.hpp"
 
 namespace panonav {
 
-/// Draws a run from above into a PNG or SVG file: what stands around, the references with the
-/// direction that each has towards the goal, the way planned and the way driven. References whose
-/// place nobody knows are left out. Throws as `write_plot`.
+/// A run from above: what stands around, the references with the direction that each has towards
+/// the goal, the way planned and the way driven. References whose place nobody knows are left out.
+[[nodiscard]] MapPlot mission_plot(const std::string& title, const MissionPlace& place,
+                                   const RememberedPlace& remembered, const PlannerOptions& options,
+                                   ViewId goal, const MissionRun& run);
+/// The same as a PNG or SVG file. Throws as `write_plot`.
 void write_mission_picture(const std::filesystem::path& path, const std::string& title,
                            const MissionPlace& place, const RememberedPlace& remembered,
                            const PlannerOptions& options, ViewId goal, const MissionRun& run);

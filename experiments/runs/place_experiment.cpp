@@ -14,18 +14,21 @@ namespace panonav {
 
 namespace {
 
-/// A recorded place in a memory, with what answers queries, as the command's defaults have it.
+/// A recorded place in a memory, with what answers queries, as the command's defaults have it where
+/// columns find the places: local features are evidence, but do not rank.
 /// Neither copied nor moved: the localiser looks at the memory.
 class AskedPlace {
  public:
   AskedPlace(const PlaceRecording& place, Executor& executor)
-      : memory_(memory_of_references(place, executor)), localiser_(memory_) {}
+      : memory_(memory_of_references(place, executor)), localiser_(memory_) {
+    localiser_.use_features(features_of_references(place, memory_, executor), false);
+  }
   AskedPlace(const AskedPlace&) = delete;
   AskedPlace& operator=(const AskedPlace&) = delete;
 
   [[nodiscard]] const VisualMemory& memory() const noexcept { return memory_; }
   [[nodiscard]] Localisation ask(const Panorama& view) const {
-    return localiser_.localise(signature_for(view, memory_));
+    return localiser_.localise(signature_for(view, memory_), {}, features_of_query(view));
   }
 
  private:

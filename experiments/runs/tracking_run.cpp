@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <utility>
 
 #include "experiments/runs/make_each.hpp"
@@ -76,6 +77,24 @@ VisualMemory memory_of_references(const PlaceRecording& place, Executor& executo
     views.push_back(&view.panorama);
   }
   return memory_of_views(poses, views, executor);
+}
+
+FeatureSource features_of_references(const PlaceRecording& place, const VisualMemory& memory,
+                                     Executor& executor) {
+  const std::span<const ViewId> views = memory.views();
+  auto features = make_each(executor, views.size(), [&](std::size_t i) {
+    const Point2 at = memory.info(views[i]).pose->position();
+    return extract_features(place.references[place.nearest_reference(at)].panorama);
+  });
+  const auto kept = std::make_shared<std::map<ViewId, std::optional<LocalFeatures>>>();
+  for (std::size_t i = 0; i < views.size(); ++i) kept->emplace(views[i], std::move(features[i]));
+  return [kept](ViewId view) { return kept->at(view); };
+}
+
+QueryFeatures features_of_query(const Panorama& view) {
+  return [&view](Handedness handedness) {
+    return extract_features(handedness == Handedness::as_seen ? view : mirrored(view));
+  };
 }
 
 std::shared_ptr<const TrackingPlace> remember_views(std::span<const ReferencePose> poses,

@@ -57,6 +57,12 @@ class TrackingPlace {
 [[nodiscard]] VisualMemory memory_of_references(const PlaceRecording& place, Executor& executor,
                                                 const std::function<bool(Point2)>& kept = nullptr);
 
+/// The local features of the references that this memory holds.
+[[nodiscard]] FeatureSource features_of_references(const PlaceRecording& place,
+                                                   const VisualMemory& memory, Executor& executor);
+/// What `Localiser::localise` asks for. The view must outlive it.
+[[nodiscard]] QueryFeatures features_of_query(const Panorama& view);
+
 /// The same with all that localises in them. `spacing_m` as TrackingPlace.
 [[nodiscard]] std::shared_ptr<const TrackingPlace> remember_views(
     std::span<const ReferencePose> poses, std::span<const Panorama* const> views, double spacing_m,

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "experiments/baselines/expected_image_homing.hpp"
-#include "experiments/runs/homing_survey.hpp"
 #include "panonav/core/executor.hpp"
+#include "panonav/homing/homing_survey.hpp"
 #include "panonav/simulation/free_space.hpp"
 #include "panonav/simulation/renderer.hpp"
 #include "panonav/simulation/scene.hpp"

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "experiments/rows.hpp"
-#include "experiments/runs/homing_survey.hpp"
 #include "experiments/s06/arena.hpp"
 #include "panonav/core/executor.hpp"
+#include "panonav/homing/homing_survey.hpp"
 
 namespace panonav {
 

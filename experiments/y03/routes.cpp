@@ -237,7 +237,9 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
     run.truth.push_back(robot);
     run.lateral_m.push_back(off_part_m(robot.position(), way, follower.along_m()));
     unknown = found ? 0 : unknown + 1;
+    run.sightings.emplace_back();
     if (found) {
+      run.sightings.back() = RouteSighting{found->fix.pose, found->along_m};
       run.position_m.push_back(distance(found->fix.pose.position(), robot.position()));
     } else {
       ++run.off_route;

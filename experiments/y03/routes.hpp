@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -55,9 +56,16 @@ struct RouteRunOptions {
   double step_m = 0.15;      ///< driven between two lines
 };
 
+/// Where a line put a robot.
+struct RouteSighting {
+  Pose2 pose;
+  double along_m = 0.0;  ///< way along the route
+};
+
 /// What a robot did that repeated a route.
 struct RouteRun {
   std::vector<Pose2> truth;
+  std::vector<std::optional<RouteSighting>> sightings;  ///< at these poses; empty: off the route
   std::vector<double> lateral_m;   ///< from the true place to the part of the way it should be at
   std::vector<double> position_m;  ///< error of the fixes
   std::size_t off_route = 0;       ///< lines that it took for not on this route

@@ -127,10 +127,40 @@ template py::array_t<std::uint8_t, py::array::c_style> exact_array(const py::han
 template py::array_t<float, py::array::c_style> exact_array(const py::handle&, const char*,
                                                             std::vector<py::ssize_t>);
 
+namespace {
+
+/// Of structured poses, as many as columns: x_m, y_m, heading_rad, or stamp_s first.
+py::list field_names(py::ssize_t columns) {
+  py::list names;
+  if (columns == 4) names.append("stamp_s");
+  names.append("x_m");
+  names.append("y_m");
+  if (columns > 2) names.append("heading_rad");
+  return names;
+}
+
+/// The fields of structured poses side by side; another array is handed through.
+py::object without_structure(const py::handle& given, const char* what, py::ssize_t columns) {
+  auto array = py::reinterpret_borrow<py::object>(given);
+  if (!py::isinstance<py::array>(given) || array.attr("dtype").attr("names").is_none())
+    return array;
+  const py::list wanted = field_names(columns);
+  if (!py::list(array.attr("dtype").attr("names")).equal(wanted)) {
+    throw ContractError(std::string("fields of ") + what,
+                        std::string(py::str(array.attr("dtype").attr("names"))),
+                        std::string(py::str(py::tuple(wanted))));
+  }
+  py::list fields;
+  for (const auto& name : wanted) fields.append(array[name]);
+  return py::module_::import("numpy").attr("stack")(fields, py::arg("axis") = -1);
+}
+
+}  // namespace
+
 py::array_t<double, py::array::c_style> number_rows(const py::handle& given, const char* what,
                                                     py::ssize_t columns) {
-  const auto numbers =
-      py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(given);
+  const auto numbers = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(
+      without_structure(given, what, columns));
   if (!numbers) {
     PyErr_Clear();
     throw ContractError(what, std::string(py::str(py::type::of(given).attr("__name__"))),
@@ -147,6 +177,18 @@ py::array_t<std::uint8_t> array_of(const Image& image) {
   std::vector<py::ssize_t> shape{image.height(), image.width()};
   if (image.channels() == 3) shape.push_back(3);
   return py::array_t<std::uint8_t>(shape, image.pixels().data());
+}
+
+py::array_t<double> pose_rows(std::span<const Pose2> poses) {
+  py::array_t<double> rows({static_cast<py::ssize_t>(poses.size()), py::ssize_t{3}});
+  auto row = rows.mutable_unchecked<2>();
+  for (py::ssize_t i = 0; i < rows.shape(0); ++i) {
+    const Pose2& pose = poses[static_cast<std::size_t>(i)];
+    row(i, 0) = pose.x_m;
+    row(i, 1) = pose.y_m;
+    row(i, 2) = pose.heading_rad;
+  }
+  return rows;
 }
 
 Observation observation_from(const py::handle& seen) {
@@ -259,7 +301,7 @@ class Lister final : public OptionVisitor {
 
 }  // namespace
 
-Keywords::Keywords(const py::kwargs& given) : given_(given.attr("copy")()) {}
+Keywords::Keywords(const py::kwargs& given) : all_(given), given_(given.attr("copy")()) {}
 
 void Keywords::apply(const std::string& prefix, const std::function<void(OptionVisitor&)>& visit) {
   Taker taker(given_, known_, joined(prefix));
@@ -281,7 +323,7 @@ void Keywords::finish() const {
   throw OptionError(line);
 }
 
-std::string with_options(const std::string& text, std::initializer_list<ListedOptions> listed) {
+std::string with_options(const std::string& text, const std::vector<ListedOptions>& listed) {
   std::string all = text + "\n\nOptions:";
   for (const ListedOptions& options : listed) {
     Lister lister(all, joined(options.prefix));
@@ -449,6 +491,23 @@ void bind_basics(py::module_& m) {
   py::implicitly_convertible<py::tuple, ReferencePose>();
   py::implicitly_convertible<py::list, ReferencePose>();
   py::implicitly_convertible<Pose2, ReferencePose>();
+
+  m.def(
+      "structured_poses",
+      [](const py::array_t<double, py::array::c_style | py::array::forcecast>& rows) {
+        if (rows.ndim() != 2 || rows.shape(1) < 2 || rows.shape(1) > 4) {
+          throw ContractError("shape of rows", shape_text(rows), "(n, 2), (n, 3) or (n, 4)");
+        }
+        py::list fields;
+        for (const auto& name : field_names(rows.shape(1))) {
+          fields.append(py::make_tuple(name, "f8"));
+        }
+        return py::array(rows.attr("view")(fields).attr("reshape")(-1));
+      },
+      py::arg("rows"),
+      "An array of (n, 2), (n, 3) or (n, 4) as a structured one of n poses with the fields x_m, "
+      "y_m, heading_rad and, of four, stamp_s first; it looks at the same numbers where they are "
+      "float64 side by side. Functions that take rows of poses take such arrays, too.");
 }
 
 }  // namespace panonav::python

@@ -5,17 +5,19 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
-#include <initializer_list>
 #include <mutex>
 #include <optional>
 #include <shared_mutex>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "panonav/camera/camera.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/core/image.hpp"
 #include "panonav/core/options.hpp"
+#include "panonav/motion/trajectory.hpp"
 #include "panonav/panorama/panorama.hpp"
 #include "panonav/panorama/picture.hpp"
 #include "panonav/pipeline/observation.hpp"
@@ -37,6 +39,11 @@ void bind_homing(py::module_& m);
 void bind_mapping(py::module_& m);
 void bind_routes(py::module_& m);
 void bind_measures(py::module_& m);
+void bind_navigation(py::module_& m);
+void bind_calibration(py::module_& m);
+#ifdef PANONAV_PYTHON_SIMULATES
+void bind_simulation(py::module_& m);
+#endif
 
 // Arrays. A wrong dtype, shape or kind throws ContractError that names the argument `what`.
 
@@ -65,6 +72,8 @@ template <class Value>
 [[nodiscard]] py::array_t<double, py::array::c_style> number_rows(const py::handle& array,
                                                                   const char* what,
                                                                   py::ssize_t columns);
+/// Of (n, 4): stamp_s, x_m, y_m, heading_rad. Throws ContractError.
+[[nodiscard]] Trajectory trajectory_of(const py::array_t<double, py::array::c_style>& rows);
 /// A read-only array of what `owner` holds; it keeps the owner alive.
 template <class Value>
 [[nodiscard]] py::array_t<Value> read_only(std::vector<py::ssize_t> shape, const Value* data,
@@ -74,6 +83,12 @@ template <class Value>
   return array;
 }
 [[nodiscard]] py::array_t<std::uint8_t> array_of(const Image& image);
+/// (n, 3) of x_m, y_m, heading_rad.
+[[nodiscard]] py::array_t<double> pose_rows(std::span<const Pose2> poses);
+
+/// The model of that name with these parameters, all of which must be its own.
+[[nodiscard]] CameraModel camera_model_from(const std::string& name, const py::dict& parameters);
+[[nodiscard]] ColumnDirection direction_of(const std::string& name);
 
 /// An `Observation`, a `Panorama`, an array of pixels, or the path of a picture.
 [[nodiscard]] Observation observation_from(const py::handle& seen);
@@ -92,12 +107,15 @@ class Keywords {
     validate(values);
     return *this;
   }
+  /// Whether the caller gave this argument, taken or not.
+  [[nodiscard]] bool given(const std::string& name) const { return all_.contains(name); }
   /// Throws OptionError on arguments that nothing took, with the nearest name.
   void finish() const;
 
  private:
   void apply(const std::string& prefix, const std::function<void(OptionVisitor&)>& visit);
-  py::dict given_;
+  py::kwargs all_;
+  py::dict given_;  // and not taken yet
   std::vector<std::string> known_;
 };
 
@@ -116,7 +134,7 @@ template <class Options>
 }
 /// `text`, and a line for each option: name, type, default, range, meaning.
 [[nodiscard]] std::string with_options(const std::string& text,
-                                       std::initializer_list<ListedOptions> listed);
+                                       const std::vector<ListedOptions>& listed);
 
 // Long work.
 

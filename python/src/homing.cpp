@@ -1,4 +1,6 @@
 #include "memories.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/pipeline/catchment_survey.hpp"
 #include "panonav/pipeline/homing_guide.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/relative_pose/chance_match.hpp"
@@ -110,10 +112,135 @@ NamedWay way_from(const HomingGuide& guide, const Observation& seen) {
   return {guide.home(seen), seen.name};
 }
 
+/// A survey and the pictures that it is about.
+struct NamedSurvey : CatchmentResult {
+  std::vector<std::string> goal_names;
+  std::vector<std::string> place_names;
+};
+
+/// Of (goals, places).
+template <class Value>
+py::array_t<Value> by_pair(const NamedSurvey& found, const std::vector<Value>& values) {
+  return py::array_t<Value>({static_cast<py::ssize_t>(found.survey.goals.size()),
+                             static_cast<py::ssize_t>(found.survey.places.size())},
+                            values.data());
+}
+
+NamedSurvey survey(const Dataset& homes, const std::optional<Dataset>& current,
+                   const HomingViewOptions& wanted, const CatchmentSettings& settings,
+                   std::optional<std::uint64_t> turn_seed, int threads) {
+  InterruptibleExecutor executor(threads);
+  const auto goals = read_views(homes, wanted, std::nullopt, executor);
+  const Dataset& there = current ? *current : homes;
+  const auto places = current || turn_seed ? read_views(there, wanted, turn_seed, executor) : goals;
+  return {survey_catchment(goals, places, settings, there.folder.string(), executor), goals.files,
+          places.files};
+}
+
+void bind_catchment(py::module_& m) {
+  Record<CatchmentBin>(m, "CatchmentBin", "Pairs of a range of distances.")
+      .field(
+          "distance_m", [](const CatchmentBin& b) { return b.homeward.distance_m; },
+          "Middle of the range.")
+      .field(
+          "pairs", [](const CatchmentBin& b) { return b.homeward.pairs; }, "")
+      .field(
+          "homeward_component", [](const CatchmentBin& b) { return b.homeward.component; },
+          "Mean cosine between home vector and true direction.")
+      .field("orientation_error_rad", &CatchmentBin::orientation_error_rad,
+             "Circular standard deviation.");
+  Record<NamedSurvey>(m, "CatchmentSurvey", "From how far the views of a recording lead home.")
+      .field("goal_names", &NamedSurvey::goal_names, "Of the views that are homes.")
+      .field("place_names", &NamedSurvey::place_names, "Of the views to go home from.")
+      .field(
+          "goals", [](const NamedSurvey& s) { return pose_rows(s.survey.goals); },
+          "(goals, 3) of x_m, y_m, heading_rad.")
+      .field(
+          "places", [](const NamedSurvey& s) { return pose_rows(s.survey.places); },
+          "(places, 3) of x_m, y_m, heading_rad, as the robot was turned.")
+      .field("spacing_m", &NamedSurvey::spacing_m, "Of the places.")
+      .field("typical_distance_m", &NamedSurvey::typical_distance_m,
+             "What a home vector of length 1 is worth.")
+      .field("pairs", &NamedSurvey::pairs, "At different places.")
+      .field("homeward_component", &NamedSurvey::component,
+             "Mean cosine between home vector and true direction: 1 straight home, 0 chance.")
+      .field("orientation_error_rad", &NamedSurvey::orientation_error_rad,
+             "Circular standard deviation.")
+      .field("bins", &NamedSurvey::bins, "By distance.")
+      .field("accepted_m", &NamedSurvey::accepted_m, "")
+      .field("areas", &NamedSurvey::areas,
+             "Mean number of places from which runs end so near, for each of accepted_m.")
+      .field(
+          "homeward", [](const NamedSurvey& s) { return by_pair(s, s.survey.homeward); },
+          "float32 of (goals, places): cosine between home vector and true direction; nan at home.")
+      .field(
+          "next", [](const NamedSurvey& s) { return by_pair(s, s.survey.next); },
+          "uint32 of (goals, places): the place to which the step leads.")
+      .field(
+          "end_m", [](const NamedSurvey& s) { return by_pair(s, s.final_m); },
+          "float32 of (goals, places): how far from home the run from this place ends.")
+      .type()
+      .def(
+          "places_within",
+          [](const NamedSurvey& s, std::size_t goal, double accepted_m) {
+            require(goal < s.survey.goals.size(), "goal", static_cast<double>(goal),
+                    "0 to " + std::to_string(s.survey.goals.size() - 1));
+            return catchment_of(s, goal, accepted_m);
+          },
+          py::arg("goal"), py::arg("accepted_m"),
+          "Number of places from which runs to this goal end so near.");
+  m.def(
+      "survey_catchment",
+      [](const py::object& recording, const py::object& current,
+         const std::optional<PictureSource>& source, bool horizon, std::optional<int> published,
+         const std::vector<int>& stages, std::optional<double> up_to_m, std::optional<double> bin_m,
+         std::optional<std::uint64_t> turn_seed, int threads, const py::kwargs& keywords) {
+        HomingViewOptions views{.horizon = horizon};
+        CatchmentSettings settings{.stages = stages, .bin_m = bin_m, .up_to_m = up_to_m};
+        Keywords taken(keywords);
+        settings.typical_distance_given = taken.given("typical_distance_m");
+        settings.longest_step_given = taken.given("max_step_m");
+        settings.obstacle_given = taken.given("obstacle_m");
+        taken.options(views.signature).options(views.preprocessing).options(settings.run);
+        taken.options(settings.homing).finish();
+        if (published) {
+          const int iterations = std::exchange(settings.homing.iterations, 0);
+          if (settings.homing != FourierHomingOptions{}) {
+            throw ContractError("published", *published,
+                                "no option of homing but iterations beside");
+          }
+          settings.homing = published_homing(*published, iterations);
+        }
+        const Dataset homes = dataset_from(recording, source);
+        std::optional<Dataset> second;
+        if (!current.is_none()) second = dataset_from(current, source);
+        const py::gil_scoped_release free;
+        return survey(homes, second, views, settings, turn_seed, threads);
+      },
+      py::arg("recording"), py::arg("current") = py::none(), py::arg("source") = py::none(),
+      py::kw_only(), py::arg("horizon") = false, py::arg("published") = py::none(),
+      py::arg("stages") = std::vector<int>{}, py::arg("up_to_m") = py::none(),
+      py::arg("bin_m") = py::none(), py::arg("turn_seed") = py::none(), py::arg("threads") = 0,
+      with_options(
+          "Measures from how far the views of a recording lead home, as `panonav catchment` does: "
+          "home vectors between all pairs of views, and runs from place to place.\n\n"
+          "`current`: the recording of the views to go home from; None: the same. `horizon`: "
+          "compare the mean of the rows near the horizon alone. `published`: the rule as published "
+          "with so many frequencies, in place of the options of homing. `stages`: the highest "
+          "frequency of each stage of a run. `up_to_m`: leave pairs that are farther apart out of "
+          "the averages. `turn_seed`: turn the robot before each current view at random. Where "
+          "they are not given, max_step_m is twice the spacing of the places, obstacle_m 0.8 of "
+          "it, and typical_distance_m is learnt from near pairs.",
+          {options_of<FourierHomingOptions>(), options_of<SignatureOptions>(),
+           options_of<PreprocessingOptions>(), options_of<HomingSurveyOptions>()})
+          .c_str());
+}
+
 }  // namespace
 
 void bind_homing(py::module_& m) {
   bind_vectors(m);
+  bind_catchment(m);
   Record<NamedWay>(m, "WayHome", "What an observation tells of the way home.")
       .field("name", &NamedWay::name, "Of the picture, where it has one.")
       .field("known", &NamedWay::known, "Whether the views have more in common than chance gives.")

@@ -5,6 +5,7 @@
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/mapper.hpp"
 #include "panonav/pipeline/memoriser.hpp"
+#include "panonav/pipeline/memory_merge.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "recordings.hpp"
 
@@ -16,16 +17,10 @@ constexpr std::array<const char*, 3> link_names{"sequence", "neighbour", "closur
 
 /// x_m, y_m, heading_rad of each.
 template <class Nodes>
-py::array_t<double> pose_rows(const Nodes& nodes) {
-  py::array_t<double> rows({static_cast<py::ssize_t>(nodes.size()), py::ssize_t{3}});
-  auto row = rows.template mutable_unchecked<2>();
-  for (py::ssize_t i = 0; i < rows.shape(0); ++i) {
-    const Pose2& pose = nodes[static_cast<std::size_t>(i)].pose;
-    row(i, 0) = pose.x_m;
-    row(i, 1) = pose.y_m;
-    row(i, 2) = pose.heading_rad;
-  }
-  return rows;
+py::array_t<double> poses_of(const Nodes& nodes) {
+  std::vector<Pose2> poses;
+  for (const auto& node : nodes) poses.push_back(node.pose);
+  return pose_rows(poses);
 }
 
 MapperOptions mapper_options(const py::kwargs& keywords, SignatureOptions* signature) {
@@ -50,11 +45,7 @@ MappedRun make_map(const Dataset& recording, const std::filesystem::path& path,
             : MemoryFile::create(path, header_from_first_views(recording, signature, {}, executor)),
       recording.source, options);
   if (there) check_known_views(recording, mapper.memory(), mapper.encoder(), executor);
-  make_in_order(
-      recording.entries.size(), executor,
-      [&](std::size_t i) { return mapper.encode(read_observation(recording.entries[i])); },
-      [&](std::size_t, Mapper::EncodedView&& seen) { mapper.add(std::move(seen)); });
-  return mapper.finish();
+  return mapper.map(recording, executor);
 }
 
 void bind_maps(py::module_& m) {
@@ -75,14 +66,14 @@ void bind_maps(py::module_& m) {
       .field("edges", &TopologicalMap::edges, "")
       .type()
       .def(
-          "poses", [](const TopologicalMap& map) { return pose_rows(map.nodes); },
+          "poses", [](const TopologicalMap& map) { return poses_of(map.nodes); },
           "(n, 3) of x_m, y_m, heading_rad, a row a node.");
   Record<MappedRun>(m, "MappedRun", "What a Mapper made of its observations.")
       .field("map", &MappedRun::map, "")
       .field("observations", &MappedRun::observations, "By node: its number, from 0.")
       .field("skipped", &MappedRun::skipped, "Observations that differed too little.")
       .field("scale_m", &MappedRun::scale_m, "Metres for a unit of length of the views.")
-      .field("wheels", &MappedRun::wheels, "Lengths come from odometry.")
+      .field("wheels", &MappedRun::wheels, "Steps come from odometry.")
       .field("mapping_s", &MappedRun::mapping_s, "Time of the mapping itself.");
   const std::string options = with_options(
       "", {options_of<MappingOptions>(), options_of<VisualOdometryOptions>(),
@@ -158,7 +149,7 @@ void bind_lattices(py::module_& m) {
       .field("energy", &Lattice::energy, "")
       .type()
       .def(
-          "poses", [](const Lattice& lattice) { return pose_rows(lattice.nodes); },
+          "poses", [](const Lattice& lattice) { return poses_of(lattice.nodes); },
           "(n, 3) of x, y, heading_rad, a row a node.");
   m.def(
       "arrange",
@@ -199,10 +190,49 @@ void bind_lattices(py::module_& m) {
       py::arg("memory"), py::arg("name") = map_name, "A map of a MemoryFile, or None.");
 }
 
+void bind_merging(py::module_& m) {
+  Record<SessionAlignment>(m, "SessionAlignment", "How the maps of two sessions lie to each other.")
+      .field("first_from_second", &SessionAlignment::first_from_second, "")
+      .field("places", &SessionAlignment::places, "That lead to this frame.")
+      .field("other_places", &SessionAlignment::other_places, "That lead to the next best.")
+      .field("expected_places", &SessionAlignment::expected_places,
+             "Where both maps lie upon each other.")
+      .field("confirmed_places", &SessionAlignment::confirmed_places, "Of these, that match.")
+      .field("refuted", &SessionAlignment::refuted, "Matches that lead elsewhere.");
+  Record<MergedMemory>(m, "MergedMemory", "What merge_memories made.")
+      .field("views", &MergedMemory::views, "Of the new memory.")
+      .field("shared", &MergedMemory::shared, "Views that both had, kept once.")
+      .field("renamed", &MergedMemory::renamed,
+             "Views and routes of the second whose names the first had for others.")
+      .field("alignment", &MergedMemory::alignment, "None where no place in common was found.")
+      .field("connected_components", &MergedMemory::connected_components, "Of the new map.")
+      .field("without_position", &MergedMemory::without_position,
+             "Views of the second whose positions were in a frame of their own.");
+  m.def(
+      "merge_memories",
+      [](const std::filesystem::path& first, const std::filesystem::path& second,
+         const std::filesystem::path& memory, const py::kwargs& keywords) {
+        MemoryMergeOptions options;
+        Keywords taken(keywords);
+        taken.options(options.alignment).options(options.graph, "graph");
+        taken.finish();
+        const py::gil_scoped_release free;
+        return merge_memories(first, second, memory, options, check_signals);
+      },
+      py::arg("first"), py::arg("second"), py::arg("memory"),
+      with_options("Makes one memory file of two, as `panonav merge` does: places in common are "
+                   "found by appearance, and the second is moved into the frame of the first. "
+                   "Without any, both stay connected components, and the views of the second lose "
+                   "their positions.",
+                   {options_of<SessionAlignmentOptions>(), options_of<PoseGraphOptions>("graph")})
+          .c_str());
+}
+
 }  // namespace
 
 void bind_mapping(py::module_& m) {
   bind_maps(m);
+  bind_merging(m);
   bind_lattices(m);
 }
 

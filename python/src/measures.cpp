@@ -15,14 +15,6 @@ std::vector<Point2> points_of(const Rows& rows) {
   return points;
 }
 
-Trajectory trajectory_of(const Rows& rows) {
-  std::vector<StampedPose> poses;
-  for (py::ssize_t i = 0; i < rows.shape(0); ++i) {
-    poses.push_back({rows.at(i, 0), {rows.at(i, 1), rows.at(i, 2), rows.at(i, 3)}});
-  }
-  return Trajectory(std::move(poses));
-}
-
 Rows rows_of(const std::vector<StampedPose>& poses) {
   Rows rows({static_cast<py::ssize_t>(poses.size()), py::ssize_t{4}});
   auto row = rows.mutable_unchecked<2>();
@@ -37,6 +29,14 @@ Rows rows_of(const std::vector<StampedPose>& poses) {
 }
 
 }  // namespace
+
+Trajectory trajectory_of(const Rows& rows) {
+  std::vector<StampedPose> poses;
+  for (py::ssize_t i = 0; i < rows.shape(0); ++i) {
+    poses.push_back({rows.at(i, 0), {rows.at(i, 1), rows.at(i, 2), rows.at(i, 3)}});
+  }
+  return Trajectory(std::move(poses));
+}
 
 void bind_measures(py::module_& m) {
   Record<Alignment>(m, "Alignment", "to = scale R(rotation) from + translation.")

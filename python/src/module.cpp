@@ -18,6 +18,11 @@ PYBIND11_MODULE(_core, m) {
   bind_mapping(m);
   bind_routes(m);
   bind_measures(m);
+  bind_navigation(m);
+  bind_calibration(m);
+#ifdef PANONAV_PYTHON_SIMULATES
+  bind_simulation(m);
+#endif
   // People know these by the package's name.
   for (const auto& [name, value] : m.attr("__dict__").cast<py::dict>()) {
     if (py::hasattr(value, "__module__")) value.attr("__module__") = "panonav";

@@ -9,13 +9,29 @@
 
 namespace panonav::python {
 
-namespace {
-
 ColumnDirection direction_of(const std::string& name) {
   if (name == "clockwise") return ColumnDirection::clockwise;
   if (name == "counter-clockwise") return ColumnDirection::counter_clockwise;
   throw ContractError("direction", "'" + name + "'", "'clockwise', 'counter-clockwise'");
 }
+
+CameraModel camera_model_from(const std::string& name, const py::dict& parameters) {
+  auto model = model_of_name(name);
+  if (!model) throw ContractError("model", "'" + name + "'", "a name of `camera_models`");
+  py::dict left = parameters.attr("copy")();
+  visit_parameters(*model, [&](const auto& parameter, auto& value) {
+    const py::str key{std::string(parameter)};
+    if (!left.contains(key)) return;
+    value = left.attr("pop")(key).template cast<std::remove_cvref_t<decltype(value)>>();
+  });
+  if (!left.empty()) {
+    throw ContractError("parameter", std::string(py::repr(left.begin()->first)),
+                        "those of the model '" + name + "'");
+  }
+  return *model;
+}
+
+namespace {
 
 std::string name_of(ColumnDirection direction) {
   return direction == ColumnDirection::clockwise ? "clockwise" : "counter-clockwise";
@@ -28,20 +44,6 @@ PictureKind kind_of(const std::string& name) {
     if (name == kind_names[i]) return static_cast<PictureKind>(i);
   }
   throw ContractError("kind", "'" + name + "'", "'panorama', 'equirectangular', 'mirror'");
-}
-
-/// Sets the named parameters of a camera model; all that are given must be the model's.
-void set_parameters(CameraModel& model, const py::dict& given) {
-  py::dict left = given.attr("copy")();
-  visit_parameters(model, [&](const auto& name, auto& value) {
-    const py::str key{std::string(name)};
-    if (!left.contains(key)) return;
-    value = left.attr("pop")(key).template cast<std::remove_cvref_t<decltype(value)>>();
-  });
-  if (!left.empty()) {
-    throw ContractError("parameter", std::string(py::repr(left.begin()->first)),
-                        "those of the model '" + std::string(model_name(model)) + "'");
-  }
 }
 
 py::dict parameters_of(const CameraModel& model) {
@@ -59,10 +61,7 @@ void bind_cameras(py::module_& m) {
                        const py::dict& parameters, std::pair<double, double> centre,
                        double rim_radius_px, double inner_radius_px, const std::string& direction,
                        double forward_angle_rad, double forward_column) {
-             const auto known = model_of_name(model);
-             if (!known)
-               throw ContractError("model", "'" + model + "'", "a name of `camera_models`");
-             Camera camera{.model = *known,
+             Camera camera{.model = camera_model_from(model, parameters),
                            .image_size = {image_size.first, image_size.second},
                            .centre = {centre.first, centre.second},
                            .rim_radius_px = rim_radius_px,
@@ -70,7 +69,6 @@ void bind_cameras(py::module_& m) {
                            .direction = direction_of(direction),
                            .forward_angle_rad = forward_angle_rad,
                            .forward_column = forward_column};
-             set_parameters(camera.model, parameters);
              validate(camera);
              return camera;
            }),

@@ -146,25 +146,7 @@ RecordedRoute record_route(const Dataset& dataset, const std::filesystem::path& 
           ? MemoryFile::open(memory, Access::read_write)
           : MemoryFile::create(memory, header_from_first_views(dataset, {}, {}, executor)),
       dataset.source, options);
-  std::vector<std::size_t> chosen;
-  std::vector<Pose2> drive;
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    const auto last = drive.empty() ? std::nullopt : std::optional(drive.back());
-    if (!RouteRecorder::is_due(last, poses[i], options.every_m)) continue;
-    chosen.push_back(i);
-    drive.push_back(poses[i]);
-  }
-  const std::size_t first = recorder.skip_recorded(drive);
-  make_in_order(
-      chosen.size() - first, executor,
-      [&](std::size_t i) {
-        Observation seen = read_observation(dataset.entries[chosen[first + i]]);
-        const Pose2& pose = drive[first + i];
-        if (!options.odometry) seen.pose = ReferencePose{pose.x_m, pose.y_m, pose.heading_rad};
-        return recorder.encode(seen);
-      },
-      [&](std::size_t, RouteRecorder::EncodedLine&& line) { recorder.add(std::move(line)); });
-  return recorder.finish();
+  return recorder.record(dataset, poses, executor);
 }
 
 void bind_recording(py::module_& m) {
@@ -185,18 +167,7 @@ void bind_recording(py::module_& m) {
           },
           "uint8 of (places, columns), from straight ahead counter-clockwise.")
       .def(
-          "poses",
-          [](const RoutePanorama& route) {
-            py::array_t<double> rows({static_cast<py::ssize_t>(route.size()), py::ssize_t{3}});
-            auto row = rows.mutable_unchecked<2>();
-            for (py::ssize_t i = 0; i < rows.shape(0); ++i) {
-              const Pose2& pose = route.poses()[static_cast<std::size_t>(i)];
-              row(i, 0) = pose.x_m;
-              row(i, 1) = pose.y_m;
-              row(i, 2) = pose.heading_rad;
-            }
-            return rows;
-          },
+          "poses", [](const RoutePanorama& route) { return pose_rows(route.poses()); },
           "(places, 3) of x_m, y_m, heading_rad.")
       .def("__repr__", [](const RoutePanorama& route) {
         return "RoutePanorama(" + std::to_string(route.size()) + " lines, " +

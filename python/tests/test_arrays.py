@@ -2,6 +2,8 @@
 import ast
 import gc
 import pathlib
+import re
+import subprocess
 
 import numpy
 import pytest
@@ -136,10 +138,39 @@ def test_camera_projects_and_unwraps():
         panonav.Camera("hyperboloidal", (320, 240), {"nonsense": 1})
 
 
+def test_structured_poses_are_rows():
+    rows = numpy.array([[i, 0.5 * i, 1.0, 0.1] for i in range(5)])
+    poses = panonav.structured_poses(rows)
+    assert poses.dtype.names == ("stamp_s", "x_m", "y_m", "heading_rad") and poses.shape == (5,)
+    assert numpy.shares_memory(poses, rows) and numpy.array_equal(poses["x_m"], rows[:, 1])
+    assert panonav.trajectory_error(poses, rows, align=False).position_m.rms == 0
+    assert panonav.structured_poses(rows[:, 1:])["heading_rad"][2] == 0.1
+    assert panonav.align(panonav.structured_poses(rows[:, 1:3]), rows[:, 1:3]).rms_m == pytest.approx(0)
+    for wrong in (lambda: panonav.structured_poses(rows[0]), lambda: panonav.align(poses, poses)):
+        with pytest.raises(panonav.ContractError):
+            wrong()
+
+
 def test_stubs_know_every_name_and_option():
     text = (pathlib.Path(panonav.__file__).parent / "_core.pyi").read_text()
     told = {node.name for node in ast.parse(text).body if isinstance(node, (ast.ClassDef, ast.FunctionDef))}
-    assert told == {name for name in vars(panonav._core) if name[0] != "_"} - {"camera_models"}
+    assert told == {name for name in vars(panonav._core) if name[0] != "_"} - {"camera_models", "scenes"}
     assert "top: int = 10" in text and "::" not in text and "_core" not in text.replace("python/make_stubs", "")
     documented = [name for name in told if not getattr(panonav, name).__doc__]
     assert documented == []
+
+
+def test_the_source_archive_holds_what_the_build_reads():
+    root = pathlib.Path(__file__).resolve().parents[2]
+    read = set(re.findall(r"add_subdirectory\(([a-z0-9]+)", (root / "CMakeLists.txt").read_text())) - {"bench", "tests"}
+    packed = re.findall(r"^graft (\w+)$", (root / "MANIFEST.in").read_text(), re.MULTILINE)
+    assert read | {"cmake"} == set(packed) and "src" in packed
+
+
+def test_a_wheel_links_what_its_page_says():
+    page = (pathlib.Path(__file__).resolve().parents[2] / "docs" / "python.md").read_text()
+    folder = pathlib.Path(panonav.__file__).parent
+    for binary in (panonav._core.__file__, folder / "panonav"):
+        printed = subprocess.run(["readelf", "-d", binary], capture_output=True, text=True, check=True).stdout
+        needed = re.findall(r"NEEDED.*\[(lib[\w+-]*?)\d?\.", printed)
+        assert len(needed) > 8 and [name for name in needed if name not in page] == []

@@ -7,6 +7,7 @@
 #include "panonav/storage/memory_file.hpp"
 #include "support/command_runner.hpp"
 #include "support/landmark_pictures.hpp"
+#include "support/report_pages.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -30,6 +31,34 @@ class Arrange : public ::testing::Test {
   std::vector<Pose2> poses;
   std::string memory = folder / "run.panonav";
 };
+
+#ifdef PANONAV_COMMAND_SIMULATES
+TEST_F(Arrange, TheReportUnfolds) {
+  const std::string report = folder / "report";
+  run_well({"arrange", memory, "--no-save", "--report", report});
+  const std::string page = bytes_of(report + "/index.html");
+  (void)text_of_page(page);
+  EXPECT_EQ(plots_of(page),
+            (std::vector<std::string>{"The arrangement as it unfolds", "as they were taken",
+                                      "as the views arrange themselves"}));
+  const json frames = panels_of(page).front().data["frames"];
+  ASSERT_GE(frames.size(), 5U);
+  const auto views = [](const json& frame) {
+    std::size_t count = 0;
+    for (const json& layer : frame["layers"]) {
+      if (layer.contains("circles")) count += layer["circles"].size() / 2;
+    }
+    return count;
+  };
+  EXPECT_LT(views(frames.front()), views(frames.back()));
+  EXPECT_EQ(frames.back()["title"], "the arrangement");
+  const auto largest =
+      answer_of({"arrange", memory, "--no-save", "--json"})["connected_components"][0]["views"];
+  EXPECT_EQ(views(frames.back()), largest.get<std::size_t>());
+  EXPECT_TRUE(contains(refusal({"arrange", memory, "--report", folder / "run"}),
+                       "not made by panonav arrange"));
+}
+#endif
 
 TEST_F(Arrange, StoresAndTellsTheMap) {
   const auto answer = answer_of({"arrange", memory, "--json", "--graphml", folder / "map.graphml",

@@ -11,6 +11,7 @@
 #include "support/command_runner.hpp"
 #include "support/landmark_pictures.hpp"
 #include "support/random_views.hpp"
+#include "support/report_pages.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -239,9 +240,13 @@ TEST_F(Home, BadInputIsOneLine) {
 TEST_F(Home, TheReportHasItsPictures) {
   const std::filesystem::path report = folder / "report";
   run_well({"home", folder / "home.png", folder / "run", "--report", report});
-  for (const auto* file : {"index.html", "home_1.png", "home_4.png", "field.svg"}) {
-    EXPECT_TRUE(std::filesystem::exists(report / file)) << file;
-  }
+  const std::string page = bytes_of(report / "index.html");
+  (void)text_of_page(page);
+  EXPECT_EQ(pictures_of(page), 8U);  // of four views, each below the one at home
+  EXPECT_EQ(plots_of(page), std::vector<std::string>{"Home vectors from above"});
+  const auto layers = panels_of(page).front().data["frames"][0]["layers"];
+  EXPECT_GE(layers[0]["lines"].size(), 4U);
+  run_well({"home", folder / "home.png", folder / "run", "--report", report});  // its own page
   EXPECT_TRUE(
       contains(refusal({"home", folder / "home.png", folder / "run", "--report", folder / "run"}),
                "not made by panonav home"));

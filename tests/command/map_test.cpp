@@ -13,6 +13,7 @@
 #include "support/command_runner.hpp"
 #include "support/landmark_pictures.hpp"
 #include "support/recorded_messages.hpp"
+#include "support/report_pages.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -47,11 +48,11 @@ class Map : public ::testing::Test {
 TEST_F(Map, EveryPictureBecomesANodeOfTheMap) {
   const json said = map({"--tum", folder_ / "m.tum", "--graphml", folder_ / "m.graphml"});
   for (const char* key : {"memory", "pictures", "nodes", "skipped", "connected_components",
-                          "closures", "scale_m", "wheel_lengths", "step_ms", "ground_truth"}) {
+                          "closures", "scale_m", "wheels", "step_ms", "ground_truth"}) {
     EXPECT_TRUE(said.contains(key)) << key;
   }
   EXPECT_EQ(said["nodes"], 100);
-  EXPECT_EQ(said["wheel_lengths"], false);
+  EXPECT_EQ(said["wheels"], false);
   std::ifstream tum(folder_ / "m.tum");
   std::size_t lines = 0;
   for (std::string line; std::getline(tum, line);) lines += line.empty() || line[0] == '#' ? 0 : 1;
@@ -143,8 +144,15 @@ TEST_F(Map, TheLibraryMakesTheSameMapOnePictureAtATime) {
 
 TEST_F(Map, SaysWhatItWroteAndWhatAPictureShows) {
   const auto result = run_panonav({"map", folder_ / "run", memory(), "--tum", folder_ / "m.tum",
-                                   "--picture", folder_ / "m.svg"});
+                                   "--picture", folder_ / "m.svg", "--report", folder_ / "report"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
+  const std::string page = bytes_of(folder_ / "report/index.html");
+  (void)text_of_page(page);
+  ASSERT_EQ(panels_of(page).size(), 2U);
+  const nlohmann::json run = panels_of(page).front().data;
+  EXPECT_GE(run["moments"].size(), 5U);
+  EXPECT_FALSE(run["moments"][0].contains("truth")) << "it is in another frame";
+  EXPECT_GE(run["staying"]["references"].size(), 4U);
   EXPECT_TRUE(contains(result.out, memory() + " holds the map"));
   EXPECT_TRUE(contains(result.out, std::string(folder_ / "m.tum") + " holds the poses"));
   EXPECT_TRUE(contains(result.out, std::string(folder_ / "m.svg") + " shows the"));
@@ -187,7 +195,7 @@ TEST(MapOfADrive, TheHeightOfTheCameraTellsMetres) {
   run_well({"simulate", "loop", run, "--path", "tour", "--heading", "path", "--spacing-m", "0.2",
             "--kind", "panorama", "--columns", "256"});
   const auto scale_with = [&](const std::string& memory, std::vector<std::string> more) {
-    std::vector<std::string> arguments{"map",   run,      memory,      "--wheel-lengths",
+    std::vector<std::string> arguments{"map",   run,      memory,      "--wheels",
                                        "false", "--json", "--scale-m", "4"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     const auto result = run_panonav(arguments);

@@ -14,6 +14,7 @@
 #include "support/command_runner.hpp"
 #include "support/landmark_pictures.hpp"
 #include "support/recorded_messages.hpp"
+#include "support/report_pages.hpp"
 #include "support/toy_world.hpp"
 
 namespace panonav::testing {
@@ -72,9 +73,9 @@ class Navigate : public ::testing::Test {
 };
 
 TEST_F(Navigate, ArrivesAndReportsEachStep) {
-  const auto result =
-      run_panonav(there(with_route, {"--json", "--log", *folder / "run.log", "--picture",
-                                     *folder / "run.png", "--route", "rows"}));
+  const auto result = run_panonav(
+      there(with_route, {"--json", "--log", *folder / "run.log", "--picture", *folder / "run.png",
+                         "--route", "rows", "--report", *folder / "report"}));
   ASSERT_EQ(result.exit_code, 0) << result.err << result.out;
   const auto told = objects(result.out);
   ASSERT_GT(told.size(), 5U);
@@ -108,6 +109,12 @@ TEST_F(Navigate, ArrivesAndReportsEachStep) {
   std::string start(8, '\0');
   picture.read(start.data(), 8);
   EXPECT_EQ(start, "\x89PNG\r\n\x1a\n");
+  const std::string page = bytes_of(*folder / "report/index.html");
+  (void)text_of_page(page);
+  const json run = panels_of(page).front().data;
+  EXPECT_EQ(run["moments"].size(), told.size() - 1);
+  EXPECT_EQ(run["moments"].back()["state"], "arrived");
+  EXPECT_TRUE(run["staying"].contains("goal"));
 }
 
 TEST_F(Navigate, IsLostInAnotherBuilding) {

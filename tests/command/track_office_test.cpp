@@ -6,11 +6,11 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <regex>
 
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "support/command_runner.hpp"
+#include "support/report_pages.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -142,36 +142,24 @@ TEST_F(TrackOffice, TheReportHoldsPicturesAndARunToPlay) {
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_TRUE(contains(result.out, out + "/index.html"));
   const std::string page = bytes_of(fs::path(out) / "index.html");
-  EXPECT_TRUE(contains(page, "href=\"track.html\""));
-  EXPECT_FALSE(contains(page, "http")) << "the page needs the network";
-  EXPECT_FALSE(contains(page, "nan"));
-  const std::regex source("<img src=\"([^\"]+)\"");
-  int pictures = 0;
-  for (std::sregex_iterator i(page.begin(), page.end(), source), end; i != end; ++i) {
-    EXPECT_TRUE(contains(bytes_of(fs::path(out) / (*i)[1].str()), "</svg>"));
-    ++pictures;
-  }
-  EXPECT_EQ(pictures, 4);
-
-  const std::string played = bytes_of(fs::path(out) / "track.html");
-  EXPECT_FALSE(contains(played, "http")) << "the animation needs the network";
-  EXPECT_FALSE(contains(played, " src=")) << "the animation needs other files";
-  const std::string begin = "const run = ";
-  const auto at = played.find(begin);
-  ASSERT_NE(at, std::string::npos);
-  const auto data =
-      json::parse(played.substr(at + begin.size(), played.find(";\n", at) - at - begin.size()));
+  (void)text_of_page(page);
+  const auto panels = panels_of(page);
+  ASSERT_EQ(panels.size(), 4U);
+  EXPECT_EQ(panels[0].name, "run");
+  const json& data = panels[0].data;
   const auto images = follow({memory(), run()}).images;
-  ASSERT_EQ(data["images"].size(), images.size());
+  ASSERT_EQ(data["moments"].size(), images.size());
   const auto info = answer_of({"info", memory(), "--json"});
-  EXPECT_EQ(data["references"].size(), info["views"].get<std::size_t>());
+  EXPECT_EQ(data["staying"]["references"].size(), 2 * info["views"].get<std::size_t>());
   for (std::size_t i = 0; i < images.size(); ++i) {
-    const json& shown = data["images"][i];
-    EXPECT_EQ(shown["file"], images[i]["file"]);
+    const json& shown = data["moments"][i];
+    EXPECT_EQ(shown["values"]["picture"], images[i]["file"]);
+    EXPECT_TRUE(
+        shown["data"]["panorama"].get<std::string>().starts_with("data:image/jpeg;base64,"));
     EXPECT_EQ(shown["state"], images[i]["state"]);
-    EXPECT_NEAR(shown["ground_truth"][0], images[i]["ground_truth"]["x_m"], 0.001);
-    EXPECT_GE(shown["particles"].size(), 2U * 100U);
-    EXPECT_LE(shown["particles"].size(), 2U * 300U);
+    EXPECT_NEAR(shown["truth"][0], images[i]["ground_truth"]["x_m"], 0.001);
+    EXPECT_GE(shown["particles"].size(), 3U * 100U);
+    EXPECT_LE(shown["particles"].size(), 3U * 300U);
   }
 
   // Again into the same folder, and never into somebody else's.

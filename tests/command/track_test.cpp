@@ -89,6 +89,16 @@ class Track : public ::testing::Test {
   inline static std::optional<ToyWorld> world_;
 };
 
+TEST_F(Track, IsShownAtAddressesOfThisMachineAlone) {
+  for (const std::string wrong :
+       {"page", "-1", "65536", "80 ", "80:", ":80", "localhost:80", "1.2.3:80", "::1:80"}) {
+    EXPECT_TRUE(contains(refusal({"track", memory(), run(), "--view", wrong}),
+                         "--view is " + wrong + "; allowed: a port, 0 to 65535"));
+  }
+  EXPECT_TRUE(contains(refusal({"track", memory(), run(), "--view", "192.0.2.1:0"}),
+                       "cannot listen at 192.0.2.1, port 0"));
+}
+
 TEST_F(Track, JsonLinesHaveExactlyTheDocumentedFields) {
   const auto all = tracked({run()});
   const auto truth = circle_poses(count);

@@ -5,9 +5,14 @@
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
+#include <utility>
+#include <vector>
 
+#include "experiments/runs/tracking_run.hpp"
+#include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/localisation/localiser.hpp"
 #include "panonav/simulation/load_gazebo.hpp"
 #include "support/skips.hpp"
 
@@ -96,6 +101,67 @@ TEST(PlaceExperiment, OfOnePlaceTellsItFromOthersAndIsTheSameOnAnyNumberOfThread
     EXPECT_EQ(a[i].position_median_m, b[i].position_median_m);
   }
   EXPECT_GE(a[0].nearest_or_next.value, 0.95);
+}
+
+// A ring of alike walls: columns alone leave doubt about every fifth place of its own.
+TEST(PlaceExperiment, LocalFeaturesKnowOwnPlacesAtWhichColumnsLeaveDoubt) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  Executor executor(2);
+  const auto record = [&](const char* scene, std::uint64_t seed, int queries) {
+    return record_place(
+        {.scene = scene, .seed = seed, .spacing_m = 0.5, .queries = queries, .columns = 256},
+        executor);
+  };
+  const PlaceRecording place = record("loop", 41, 40);
+  const VisualMemory memory = memory_of_references(place, executor);
+  const Localiser plain(memory);
+  Localiser informed = plain;
+  informed.use_features(features_of_references(place, memory, executor), false);
+  int known_by_columns = 0;
+  const auto known = [&](const Panorama& view) {
+    int computed = 0;
+    const QueryFeatures features = [&, make = features_of_query(view)](Handedness handedness) {
+      ++computed;
+      return make(handedness);
+    };
+    const PackedSignature query = signature_for(view, memory);
+    const Localisation by_columns = plain.localise(query);
+    known_by_columns += by_columns.known ? 1 : 0;
+    // A memory without features, or a query without: the same bits.
+    for (const Localisation& same :
+         {plain.localise(query, {}, features), informed.localise(query)}) {
+      EXPECT_EQ(same.known_probability, by_columns.known_probability);
+      EXPECT_EQ(same.known, by_columns.known);
+    }
+    EXPECT_EQ(computed, 0);
+    const Localisation found = informed.localise(query, {}, features);
+    EXPECT_EQ(computed, leave_doubt(by_columns.evidence) ? 2 : 0);
+    EXPECT_EQ(found.matches[0].view, by_columns.matches[0].view);
+    if (!leave_doubt(by_columns.evidence)) {
+      EXPECT_EQ(found.known_probability, by_columns.known_probability);
+    }
+    if (found.known && !by_columns.known) {
+      EXPECT_GE(found.position->radius_m, informed.position_model().neighbourhood_m);
+    }
+    return found.known ? 1 : 0;
+  };
+  int own = 0;
+  for (const PlacedView& query : place.queries) own += known(query.panorama);
+  EXPECT_GE(own, 39);
+  EXPECT_LE(known_by_columns, 36);
+  int foreign = 0;
+  for (const auto& [scene, seed] : {std::pair{"loop", 42}, {"corridor", 41}, {"office", 41}}) {
+    for (const PlacedView& query : record(scene, static_cast<std::uint64_t>(seed), 12).queries) {
+      foreign += known(query.panorama);
+    }
+  }
+  Random random(3);
+  for (int i = 0; i < 12; ++i) {
+    Panorama noise = place.queries[0].panorama;
+    for (float& value : noise.values()) value = static_cast<float>(random.uniform(0.0, 1.0));
+    foreign += known(noise);
+  }
+  EXPECT_EQ(foreign, 0);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <bit>
 #include <cmath>
 #include <vector>
@@ -60,43 +61,57 @@ TEST(NearestDescriptors, AgreeWithTheirDefinitionOnEveryInstructionSet) {
 // A landmark whose bearings were computed from its place is explained by the true direction.
 TEST(CountExplained, CountsLandmarksAndNothingElseAlikeOnEveryInstructionSet) {
   Random random(2);
-  constexpr std::size_t count = 32;
-  std::vector<float> directions;
-  for (std::size_t d = 0; d < count; ++d) {
-    directions.push_back(static_cast<float>(std::cos(0.19634954 * static_cast<double>(d))));
-    directions.push_back(static_cast<float>(std::sin(0.19634954 * static_cast<double>(d))));
+  constexpr std::size_t axis_count = motion_axes;
+  MotionAxes axes;
+  for (std::size_t d = 0; d < axis_count; ++d) {
+    axes.cosine[d] = static_cast<float>(std::cos(0.19634954 * static_cast<double>(d)));
+    axes.sine[d] = static_cast<float>(std::sin(0.19634954 * static_cast<double>(d)));
   }
   for (const std::size_t moved : {0, 5, 17, 31}) {
-    std::vector<BearingLane> lanes(3);
-    for (auto& lane : lanes) {
-      for (int i = 0; i < BearingLane::size; ++i) {
+    for (const double turn_rad : {0.0, 1.3, -2.9}) {
+      std::array<std::vector<float>, 8> bearings;
+      std::ptrdiff_t within_right_angle = 0;
+      for (int i = 0; i < 45; ++i) {
         const double x = random.uniform(-6.0, 6.0);
         const double y = random.uniform(-6.0, 6.0);
         const double height = random.uniform(-1.0, 2.0);
-        const double dx = x - directions[2 * moved];
-        const double dy = y - directions[2 * moved + 1];
-        const double far = std::hypot(x, y);
-        const double from_query = std::hypot(dx, dy);
-        const double sign = (dy * x - dx * y) < 0.0 ? -1.0 : 1.0;
-        lane.query_sine[i] = static_cast<float>(sign * dy / from_query);
-        lane.query_cosine[i] = static_cast<float>(sign * dx / from_query);
-        lane.query_tangent[i] = static_cast<float>(height / from_query);
-        lane.reference_sine[i] = static_cast<float>(sign * y / far);
-        lane.reference_cosine[i] = static_cast<float>(sign * x / far);
-        lane.reference_tangent[i] = static_cast<float>(height / far);
-        lane.min_sine[i] = i == 15 ? 2.0F : -1e-4F;
+        const double angle = 0.19634954 * static_cast<double>(moved);
+        const double dx = x - std::cos(angle);
+        const double dy = y - std::sin(angle);
+        // The frame of the directions lies between both, half the turn from either.
+        const double of_query = std::atan2(dy, dx) - 0.5 * turn_rad;
+        const double of_reference = std::atan2(y, x) + 0.5 * turn_rad;
+        const double apart = of_query - of_reference;
+        const std::array numbers{
+            std::sin(of_query),     std::cos(of_query),     height / std::hypot(dx, dy),
+            std::sin(of_reference), std::cos(of_reference), height / std::hypot(x, y),
+            std::sin(apart),        std::cos(apart)};
+        for (std::size_t n = 0; n < numbers.size(); ++n) {
+          bearings[n].push_back(static_cast<float>(numbers[n]));
+        }
+        within_right_angle += std::cos(apart + turn_rad) > 0.0 ? 1 : 0;
       }
+      const MatchedBearings matched{bearings[0].data(), bearings[1].data(), bearings[2].data(),
+                                    bearings[3].data(), bearings[4].data(), bearings[5].data(),
+                                    bearings[6].data(), bearings[7].data(), 45};
+      const ViewTurn turn{static_cast<float>(std::sin(turn_rad)),
+                          static_cast<float>(std::cos(turn_rad)),
+                          static_cast<float>(std::sin(0.5 * turn_rad)),
+                          static_cast<float>(std::cos(0.5 * turn_rad))};
+      const BearingTolerance tolerance{1e-3F, 1.0F, 1e6F};
+      std::vector<std::int32_t> first;
+      for (const Instructions set : available_instructions()) {
+        std::vector<std::int32_t> counts(2 * axis_count);
+        count_explained(matched, turn, axes, tolerance, counts, set);
+        if (first.empty()) first = counts;
+        EXPECT_EQ(counts, first) << name(set);
+      }
+      EXPECT_EQ(first[moved], within_right_angle) << moved << " " << turn_rad;
+      EXPECT_LT(first[(moved + axis_count) % (2 * axis_count)], 20);
     }
-    std::vector<std::int32_t> first;
-    for (const Instructions set : available_instructions()) {
-      std::vector<std::int32_t> counts(count);
-      count_explained(lanes, directions, 1e-6F, counts, set);
-      if (first.empty()) first = counts;
-      EXPECT_EQ(counts, first) << name(set);
-    }
-    EXPECT_EQ(first[moved], 45);
-    EXPECT_LT(first[(moved + 16) % count], 20);
   }
+  std::vector<std::int32_t> counts(3);
+  EXPECT_THROW(count_explained({}, {}, axes, {}, counts, Instructions::scalar), ContractError);
 }
 
 }  // namespace

@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "panonav/core/error.hpp"
@@ -223,6 +225,41 @@ TEST(PlaceModel, ProbabilityFallsWithTheDifferenceAndIsNoneWhereNothingIsSeen) {
   EXPECT_EQ(found.known_probability, 0.0);
   EXPECT_FALSE(found.known);
   EXPECT_FALSE(found.matches.empty());
+}
+
+TEST(PlaceModel, VerifiedFeaturesCountWhereColumnsLeaveDoubtAlone) {
+  PlaceEvidence doubtful{.difference = 0.42,
+                         .of_all_columns = 0.5,
+                         .tenth = 0.48,
+                         .chance = 0.62,
+                         .views = 200,
+                         .components = 15};
+  const double by_columns = place_probability(doubtful);
+  ASSERT_TRUE(leave_doubt(doubtful));
+  double last = 0.0;
+  for (const int verified : {0, 5, 10, 20, 40}) {
+    doubtful.features = {.verified = verified, .chance = 5, .neighbour = 30, .seen = 100};
+    EXPECT_GT(place_probability(doubtful), last);
+    last = place_probability(doubtful);
+  }
+  EXPECT_GT(last, std::max(0.9, by_columns));
+  // As many by chance, or many more between neighbours, and it is another, similar place.
+  for (const auto& [chance, neighbour] : {std::pair{30, 30}, {5, 200}}) {
+    doubtful.features = {.verified = 25, .chance = chance, .neighbour = neighbour, .seen = 250};
+    EXPECT_LT(place_probability(doubtful), 0.5);
+  }
+  // A view of few corners is no worse for having them counted.
+  doubtful.features = {.verified = 2, .chance = 2, .neighbour = 2, .seen = 4};
+  EXPECT_EQ(place_probability(doubtful), by_columns);
+  for (const double difference : {0.1, 0.7}) {
+    PlaceEvidence certain = doubtful;
+    certain.difference = certain.of_all_columns = difference;
+    certain.features.reset();
+    EXPECT_FALSE(leave_doubt(certain));
+    const double probability = place_probability(certain);
+    certain.features = {.verified = 40, .chance = 5, .neighbour = 30, .seen = 100};
+    EXPECT_EQ(place_probability(certain), probability);
+  }
 }
 
 // A navigator asks so, which holds a part of the memory only.

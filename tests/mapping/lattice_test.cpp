@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <set>
+#include <span>
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
@@ -139,6 +141,35 @@ TEST(Lattice, SameBitsOnAnyNumberOfThreads) {
     EXPECT_EQ(one.nodes[i].pose, three.nodes[i].pose);
   }
   EXPECT_EQ(one.energy, three.energy);
+}
+
+TEST(Lattice, WhoWatchesSeesItUnfoldAndChangesNothing) {
+  const Place place(5, 0.5);
+  for (const bool phases : {true, false}) {
+    const LatticeOptions options{.phases = phases};
+    const Lattice alone = arrange(place.memory, options);
+    std::size_t steps = 0;
+    std::size_t groups_at_first = 0;
+    std::size_t groups_at_last = 0;
+    Executor executor(1);
+    const Lattice watched = panonav::arrange(
+        place.memory, options, {}, executor,
+        [&](std::span<const Pose2> poses, std::span<const std::size_t> components) {
+          EXPECT_EQ(poses.size(), place.memory.size());
+          ASSERT_EQ(components.size(), place.memory.size());
+          groups_at_last = std::set(components.begin(), components.end()).size();
+          if (steps++ == 0) groups_at_first = groups_at_last;
+        });
+    EXPECT_GT(steps, 5U);
+    EXPECT_EQ(groups_at_last, watched.components.size());
+    if (phases) {
+      EXPECT_GT(groups_at_first, place.memory.size() / 2) << "groups grow from single views";
+    }
+    EXPECT_EQ(watched.energy, alone.energy);
+    for (std::size_t i = 0; i < alone.nodes.size(); ++i) {
+      EXPECT_EQ(watched.nodes[i].pose, alone.nodes[i].pose);
+    }
+  }
 }
 
 TEST(Lattice, WithoutPhasesHandednessIsUnknown) {

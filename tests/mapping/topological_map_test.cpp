@@ -87,7 +87,7 @@ TEST(TopologicalMapper, ClosesTheLoopOfASecondRound) {
   EXPECT_EQ(number_of_components(map), 1U);
 }
 
-TEST(TopologicalMapper, WheelLengthsSetTheScale) {
+TEST(TopologicalMapper, WheelsSetTheScale) {
   const ToyWorld world = round_room(radius_m, 6);
   const auto truth = rounds(round + 20);
   const auto steps = steps_between(truth);
@@ -98,6 +98,78 @@ TEST(TopologicalMapper, WheelLengthsSetTheScale) {
   }
   mapping.mapper.finish();
   EXPECT_LT(align(positions(mapping.mapper.poses()), positions(truth)).rms_m, 0.15);
+}
+
+std::vector<Pose2> poses_with_wheels(std::span<const FourierSignature> views,
+                                     std::span<const Pose2> wheels) {
+  Mapping mapping({.close_loops = false});
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    std::optional<Pose2> moved;
+    if (i > 0) moved = inverse(wheels[i - 1]) * wheels[i];
+    mapping.add(views[i], moved);
+  }
+  return {mapping.mapper.poses().begin(), mapping.mapper.poses().end()};
+}
+
+TEST(TopologicalMapper, FollowsTheWheelsWhereTheTurnsOfTheViewsDrift) {
+  const ToyWorld world = round_room(radius_m, 12);
+  const auto truth = rounds(round);
+  std::vector<FourierSignature> views;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    const Pose2 drifted = truth[i] * Pose2{0.0, 0.0, 0.01 * static_cast<double>(i)};
+    views.push_back(round_room_signature(world, drifted));
+  }
+  const auto poses = poses_with_wheels(views, truth);
+  EXPECT_LT(align(positions(poses), positions(truth)).rms_m, 0.1);
+}
+
+TEST(TopologicalMapper, ViewsSteadyTheTurnsOfTheWheels) {
+  const ToyWorld world = round_room(radius_m, 13);
+  const auto truth = rounds(round);
+  std::vector<FourierSignature> views;
+  for (const Pose2& pose : truth) views.push_back(round_room_signature(world, pose));
+  double with_views = 0.0;  // squared errors of the last heading
+  double alone = 0.0;
+  for (std::uint64_t seed = 1; seed <= 24; ++seed) {
+    const auto wheels = simulate_odometry(truth, {}, seed);
+    const double turned_rad = wrap_angle(truth.back().heading_rad - truth.front().heading_rad);
+    const auto heading_error = [&](double heading_rad) {
+      return std::abs(angle_difference(heading_rad, turned_rad));
+    };
+    alone += std::pow(heading_error(wheels.back().heading_rad), 2);
+    const auto poses = poses_with_wheels(views, wheels);
+    with_views += std::pow(heading_error(poses.back().heading_rad), 2);
+  }
+  EXPECT_LT(with_views, alone);
+}
+
+TEST(LoopClosureFinder, RefusesAHeadingBeyondTheDrift) {
+  const ToyWorld world = round_room(radius_m, 14);
+  const auto truth = rounds(round + 20);
+  const auto closures_with_heading_error = [&](double error_rad, std::size_t component) {
+    VisualMemory memory = empty_memory();
+    LoopClosureFinder finder(memory, {}, in_metres);
+    std::vector<PassedNode> nodes;
+    std::vector<Pose2> poses;
+    std::size_t closures = 0;
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      const FourierSignature view = round_room_signature(world, truth[i]);
+      const double way_m = 10.0 * static_cast<double>(i) / round;
+      nodes.push_back({memory.append(view, {.name = std::to_string(i)}), way_m});
+      poses.push_back(truth[i]);
+      if (i >= round - 20) {
+        const Pose2& since = truth[round - 20];
+        poses.back() = since * Pose2{0.0, 0.0, error_rad} * inverse(since) * truth[i];
+        nodes.back().component = component;
+      }
+      closures += finder.find(nodes, poses, OdometryView(view), radius_m).size();
+    }
+    return closures;
+  };
+  EXPECT_GT(closures_with_heading_error(0.2, 0), 0U);
+  EXPECT_EQ(closures_with_heading_error(0.6, 0), 0U);
+  // Frames of different connected components say nothing of each other.
+  EXPECT_GT(closures_with_heading_error(0.6, 1), 0U);
 }
 
 TEST(TopologicalMapper, SameViewsGiveTheSameBits) {

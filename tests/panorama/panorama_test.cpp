@@ -80,6 +80,17 @@ TEST(TurnColumns, FollowsTheConvention) {
   EXPECT_EQ(turn_columns(turn_columns(view, 7), 9), turn_columns(view, 4));
 }
 
+TEST(Mirrored, TheLeftOfTheRobotBecomesItsRight) {
+  const Panorama view = random_panorama(2, 3, 12);
+  const Panorama image = mirrored(view);
+  for (int y = 0; y < 3; ++y) {
+    for (int c = 0; c < 12; ++c) EXPECT_EQ(image.at(y, c), view.at(y, (12 - c) % 12));
+  }
+  EXPECT_NE(image, view);
+  EXPECT_EQ(mirrored(image), view);
+  EXPECT_EQ(mirrored(turn_columns(view, 5)), turn_columns(image, -5));
+}
+
 TEST(ToPicture, RunsClockwiseWithForwardInTheMiddle) {
   Panorama view(2, 8, std::nullopt);
   view.at(0, 0) = 1.0F;  // forward

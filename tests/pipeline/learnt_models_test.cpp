@@ -9,6 +9,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
+#include "panonav/geometry/angles.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
 #include "panonav/pipeline/tracker.hpp"
 #include "support/temporary_folder.hpp"
@@ -135,6 +136,33 @@ TEST_F(KeptModels, ARecogniserNeedsViewsAndFittingOptions) {
   EXPECT_EQ(place.matches.front().name, "view_1");
   EXPECT_TRUE(
       recogniser.localise(Image(32, 8), std::vector<std::string>{"view_1"}).matches.empty());
+}
+
+TEST_F(KeptModels, AViewThatSomebodyForgetsMeanwhileHasNoFeatures) {
+  MemoryHeader header;
+  header.shape = shape;
+  header.panorama_columns = 32;
+  header.elevations = ElevationBand{radians(-30.0), radians(30.0)};
+  const LocalFeatures features{{8, 32}, *header.elevations, {{.column = 3, .row = 4}}};
+  MemoryFile file = MemoryFile::create(path(), header);
+  std::vector<ViewId> views;
+  for (int i = 0; i < 60; ++i) {
+    NewView view = view_at(i, 0.5 * (i % 8), 0.5 * (i / 8));
+    view.features = pack(features);
+    views.push_back(file.append(view));
+  }
+  keep_models(file);  // or the recogniser reads them all to learn
+  const PlaceRecogniser recogniser(path());
+  file.remove(views);
+  int doubtful = 0;
+  for (int i = 0; i < 200; ++i) {
+    const PackedSignature query = view_at(0, 0.1 * i, 0.07 * i).signature;
+    const auto found =
+        recogniser.localiser().localise(query, {}, [&](Handedness) { return features; });
+    doubtful += leave_doubt(found.evidence) ? 1 : 0;
+    EXPECT_FALSE(found.evidence.features);
+  }
+  EXPECT_GT(doubtful, 0);
 }
 
 }  // namespace

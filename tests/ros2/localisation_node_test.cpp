@@ -55,6 +55,14 @@ class LocalisationNodeOnTheWire : public ::testing::Test {
     return to_picture(world_.panorama(pose, 24, 128, band));
   }
 
+  /// The last one that came; waits where none is there.
+  static Pose2 newest_pose(FastPeer::Endpoint& poses) {
+    FastPeer::Bytes last;
+    while (FastPeer::waiting(poses) > 0) last = FastPeer::next(poses, 1s);
+    if (last.empty()) last = FastPeer::next(poses, 10s);
+    return ros::planar(read<ros::PoseStamped>(last).pose);
+  }
+
   ~LocalisationNodeOnTheWire() override { stop(); }
 
   void start(LocalisationNodeOptions options = {}, const ParticipantOptions& participant = {}) {
@@ -451,12 +459,7 @@ TEST_F(LocalisationNodeOnTheWire, DrivesASimulatedRobotToAGoalFindsItKidnappedAn
   for (auto* each : {&goal, &set_pose, &result, &feedback, &velocity, &truth}) {
     ASSERT_TRUE(FastPeer::matched(*each, 10s));
   }
-  const auto robot_is = [&] {
-    FastPeer::Bytes last;
-    while (FastPeer::waiting(truth) > 0) last = FastPeer::next(truth, 1s);
-    if (last.empty()) last = FastPeer::next(truth, 10s);
-    return ros::planar(read<ros::PoseStamped>(last).pose);
-  };
+  const auto robot_is = [&] { return newest_pose(truth); };
   const auto state_of = [](const FastPeer::Bytes& cdr) {
     return cdr.empty() ? std::string("nothing")
                        : read<ros::DiagnosticArray>(cdr).status.at(0).message;
@@ -538,12 +541,7 @@ TEST_F(LocalisationNodeOnTheWire, LearnsADriveRepeatsItAndGoesOnAfterItDied) {
   for (auto* each : {&command, &answer, &velocity, &set_pose, &truth, &result}) {
     ASSERT_TRUE(FastPeer::matched(*each, 10s));
   }
-  const auto robot_is = [&] {
-    FastPeer::Bytes last;
-    while (FastPeer::waiting(truth) > 0) last = FastPeer::next(truth, 1s);
-    if (last.empty()) last = FastPeer::next(truth, 10s);
-    return ros::planar(read<ros::PoseStamped>(last).pose);
-  };
+  const auto robot_is = [&] { return newest_pose(truth); };
   const auto ask = [&](const std::string& words) {
     return LocalisationNodeOnTheWire::ask(command, answer, words);
   };

@@ -53,6 +53,9 @@ TEST(LocalFeatures, OfUnrelatedViewsFewAreVerifiedEitherWay) {
     const FeatureMatch match = match_features(a, b);
     EXPECT_LT(match.verified, static_cast<int>(a.features.size()) / 4);
     EXPECT_NEAR(match.verified, match_features(b, a).verified, 1);
+    EXPECT_EQ(match_features(a, b, match.verified - 1).verified, match.verified);
+    EXPECT_EQ(match_features(a, b, match.verified - 1).heading_rad, match.heading_rad);
+    EXPECT_EQ(match_features(a, b, match.verified).verified, 0);
   }
 }
 

@@ -35,6 +35,8 @@ class Session {
   void print(std::string_view line);
   /// One line on standard error that is no error: a warning or a hint. Silent with --quiet.
   void note(std::string_view line);
+  /// One line on standard error that the user needs to go on: not silent with --quiet either.
+  void ask(std::string_view line) { say(line); }
   /// With --verbose: the line on standard error, behind the seconds since the start.
   void detail(std::string_view line);
   /// Says why there is no answer, on standard error.

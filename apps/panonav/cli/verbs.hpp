@@ -28,6 +28,7 @@ namespace panonav::command {
 [[nodiscard]] Verb map_verb();
 [[nodiscard]] Verb memorise_verb();
 [[nodiscard]] Verb navigate_verb();
+[[nodiscard]] Verb merge_verb();
 [[nodiscard]] Verb prune_verb();
 [[nodiscard]] Verb rename_verb();
 [[nodiscard]] Verb reproduce_verb();

@@ -16,12 +16,12 @@
 #include "demo/pictures.hpp"
 #include "demo/recordings.hpp"
 #include "demo/route.hpp"
+#include "demo/story.hpp"
 #include "demo/track.hpp"
 #include "experiments/runs/surroundings.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/io/image_file.hpp"
 #include "panonav/pipeline/arrangement.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/observation_source.hpp"
@@ -37,56 +37,49 @@ std::string percent(double share) {
   return fixed(100.0 * share, 0) + " %";
 }
 
-// Raw picture, what calibration found in it, and the cylinder made of it.
-void show_camera(const DemoRecordings& recordings, const fs::path& out, Session& session,
-                 ReportPage& page) {
+// Raw picture, what calibration found in it, and the cylinder made of it. Gives the first for the
+// page's beginning.
+ReportPicture show_camera(const DemoRecordings& recordings, Session& session, ReportPage& page) {
   const Dataset& asked = recordings.query_run;
   const Image colour = recordings.colour_picture(asked.entries.front(), session.executor());
-  write_png(out / "mirror.png", colour.view());
   const Image overlay = draw_mirror(colour.view(), recordings.mirror);
-  write_png(out / "calibration.png", overlay.view());
   const PanoramaReader reader(asked.source, {});
-  const Panorama cylinder = reader.read(asked.entries.front().path);
-  const Image picture = to_picture(cylinder);
-  write_png(out / "cylinder.png", picture.view());
+  Panorama cylinder = reader.read(asked.entries.front().path);
 
   const Camera truth = recordings.true_camera;
   const MirrorCircle& found = recordings.mirror;
+  const std::string centre_px = fixed(
+      std::hypot(found.centre.u_px - truth.centre.u_px, found.centre.v_px - truth.centre.v_px), 2);
   page.part("What the robot sees",
-            {fixed(std::hypot(found.centre.u_px - truth.centre.u_px,
-                              found.centre.v_px - truth.centre.v_px),
-                   2) +
-                 " pixels",
+            {centre_px + " pixels",
              "is how far off it finds the middle of its mirror, in its own pictures alone"});
   page.text(
       "A camera looks up into a curved mirror and sees all around at once. The dark disc in the "
-      "middle is the camera "
-      "itself. Before anything else, calibration finds the mirror in some of the raw pictures: "
-      "centre, rim and inner radius. "
-      "Everything below uses what it found, not the simulator's own numbers.");
+      "middle is the camera itself. Before anything else, calibration finds the mirror in some of "
+      "the raw pictures: centre, rim and inner radius. Everything below uses what it found, not "
+      "the simulator's own numbers.");
+  ReportPicture mirror = picture_in_page(
+      colour.view(), "Raw picture of the mirror camera, " + std::to_string(truth.image_size.width) +
+                         " x " + std::to_string(truth.image_size.height) +
+                         " (in colour for you; the robot works on grey)");
   page.pictures(
-      {{"mirror.png", "Raw picture of the mirror camera, " +
-                          std::to_string(truth.image_size.width) + " x " +
-                          std::to_string(truth.image_size.height) +
-                          " (in colour for you; the robot works on grey)"},
-       {"calibration.png",
-        "What calibration found in " + std::to_string(recordings.calibrated_on) +
-            " raw pictures: rim green, inner radius orange, centre red. The centre is off by " +
-            fixed(std::hypot(found.centre.u_px - truth.centre.u_px,
-                             found.centre.v_px - truth.centre.v_px),
-                  2) +
-            " pixels, the rim by " + fixed(std::abs(found.rim_radius_px - truth.rim_radius_px), 2) +
-            "."}});
+      {mirror,
+       picture_in_page(
+           overlay.view(),
+           "What calibration found in " + std::to_string(recordings.calibrated_on) +
+               " raw pictures: rim green, inner radius orange, centre red. The centre is off by " +
+               centre_px + " pixels, the rim by " +
+               fixed(std::abs(found.rim_radius_px - truth.rim_radius_px), 2) + ".")});
   page.text(
       "The picture is then unwrapped to a panoramic cylinder. Of each of its 80 rows only the "
-      "first "
-      "15 Fourier components "
-      "are kept, 2.4 kB a view. Their magnitudes do not change when the robot turns, so they tell "
-      "the place whichever way "
-      "it faces; their phases tell the heading.");
-  page.pictures({{"cylinder.png",
-                  "The same view as a cylinder of 512 x 80 pixels, forward in the middle, left on "
-                  "the left"}});
+      "first 15 Fourier components are kept, 2.4 kB a view. Their magnitudes do not change when "
+      "the robot turns, so they tell the place whichever way it faces; their phases tell the "
+      "heading.");
+  page.views({{std::move(cylinder),
+               {},
+               "The same view as a cylinder of 512 x 80 pixels, forward in the middle, left on the "
+               "left"}});
+  return mirror;
 }
 
 std::vector<AskedView> ask(const Localiser& localiser, const ViewEncoder& pipeline,
@@ -148,8 +141,7 @@ std::string median_text(const std::vector<double>& values, double unit, int digi
 
 void show_answers(const VisualMemory& memory, const std::vector<MapLayer>& scene,
                   const std::vector<AskedView>& asked, const Outcome& own, const Outcome& foreign,
-                  double spacing_m, const fs::path& out, ReportPage& page) {
-  draw_answers(memory, scene, asked, out / "map.svg");
+                  double spacing_m, ReportPage& page) {
   const std::string spacing = fixed(100.0 * spacing_m, 0) + " cm";
   page.part("It remembers and localises itself",
             {median_text(own.errors_m, 100.0, 1, "cm"),
@@ -173,7 +165,7 @@ void show_answers(const VisualMemory& memory, const std::vector<MapLayer>& scene
       "view alone would be " +
       median_text(own.nearest_errors_m, 100.0, 1, "cm") +
       " off (median): the position is interpolated between views.");
-  page.pictures({{"map.svg", "True places, and the error of each answer"}});
+  page.plots({{map_of_answers(memory, scene, asked), "True places, and the error of each answer"}});
 }
 
 /// The first place that was recognised stands for all.
@@ -183,27 +175,27 @@ const AskedView& shown_view(const std::vector<AskedView>& asked) {
   return known == asked.end() ? asked.front() : *known;
 }
 
-void show_levels(const VisualMemory& memory, const std::vector<MapLayer>& scene,
-                 const AskedView& view, double spacing_m, const fs::path& out, ReportPage& page) {
-  const auto areas_m2 = draw_areas(memory, scene, view, out / "areas.svg");
-  draw_similarity(memory, spacing_m, view, out / "similarity.svg");
+UnfoldingMap show_levels(const VisualMemory& memory, const std::vector<MapLayer>& scene,
+                         const AskedView& view, double spacing_m, ReportPage& page) {
+  AreasShown areas = map_of_areas(memory, scene, view);
+  const std::string first = fixed(areas.areas_m2.front(), 1);
+  const std::string last = fixed(areas.areas_m2.back(), 2);
   page.part("As accurate as needed",
-            {fixed(areas_m2.front(), 1) + " to " + fixed(areas_m2.back(), 2) + " m²",
+            {first + " to " + last + " m²",
              "is the area where it may be: a coarse look is cheap, a fine one exact"});
   page.text(
-      "With one Fourier component compared, the robot may be anywhere in a large area (" +
-      fixed(areas_m2.front(), 1) +
-      " square metres here); with each further component the area shrinks, down to " +
-      fixed(areas_m2.back(), 2) +
+      "With one Fourier component compared, the robot may be anywhere in a large area (" + first +
+      " square metres here); with each further component the area shrinks, down to " + last +
       ". In the open a coarse answer is enough and costs less; at a door a fine one is needed.");
-  page.pictures({{"areas.svg",
-                  "The orange area is where the robot may be, after 1, 3, 6 and 15 components; the "
-                  "cross is where it is."}});
-  page.pictures(
-      {{"similarity.svg",
-        "How similar each remembered view is to the one asked for, taken at the cross: the "
-        "nearest view is the most similar, and similarity falls with distance on all "
-        "sides. That is what the areas are read from."}});
+  page.plots(
+      {{areas.map,
+        "The orange area is where the robot may be, with ever more components; the cross is where "
+        "it is."},
+       {map_of_similarity(memory, spacing_m, view),
+        "How similar each remembered view is to the one asked for, taken at the cross: the nearest "
+        "view is the most similar, and similarity falls with distance on all sides. That is what "
+        "the areas are read from."}});
+  return std::move(areas.map);
 }
 
 void show_what_next(const DemoOptions& wanted, const DemoRecordings& recordings,
@@ -214,7 +206,7 @@ void show_what_next(const DemoOptions& wanted, const DemoRecordings& recordings,
       "The recordings and the memory of this run lie beside this page. Each command shows more "
       "with --help.");
   const std::string memory = in_out("office.panonav");
-  const SimulationArguments seen = simulation_of(wanted, 0);
+  const SimulatedWorldOptions seen = simulation_of(wanted, 0);
   std::string mission;
   for (const std::string& word : navigation.first_mission) mission += " " + word;
   page.commands(
@@ -301,10 +293,11 @@ std::string images_text(const std::optional<std::size_t>& images) {
                 : "never";
 }
 
+std::string of(std::size_t part, std::size_t all) {
+  return std::to_string(part) + " of " + std::to_string(all);
+}
+
 void print(const DemoResults& done, Session& session) {
-  const auto of = [](std::size_t part, std::size_t all) {
-    return std::to_string(part) + " of " + std::to_string(all);
-  };
   session.print("panonav demo: " + std::to_string(done.views) + " views of an office remembered, " +
                 std::to_string(done.questions) + " questions asked, " + fixed(done.seconds, 0) +
                 " s");
@@ -369,21 +362,10 @@ ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
   }
   ReportPage page(
       "panonav: a robot that remembers what places look like",
-      "A robot with one camera that looks all around remembers views of a place, 2.4 kB "
-      "each. By what it sees it then tells where it is and which way it faces, makes "
-      "maps, finds home, repeats a route and goes where it is told: no laser, no GPU, no "
-      "training. Everything below was just simulated and measured against the truth on "
-      "this computer (seed " +
-          std::to_string(wanted.seed) + "). Each figure leads to its part.");
-  page.section("With pictures of your own");
-  page.commands(
-      {"panonav memorise photos place.panonav --kind equirectangular --elevation-deg -30 40",
-       "panonav localise place.panonav now.jpg"});
-  page.text(
-      "The first command remembers a folder of 360 degree pictures, the second tells where another "
-      "one was taken. The end of this page has commands to try on the data of this run; every verb "
-      "has --help.");
-  show_camera(*recordings, out, session, page);
+      "A robot with one camera remembers views of a place. By what it sees it then knows where it "
+      "is, makes maps, finds home, repeats routes and goes where it is told. All of this was just "
+      "simulated on this computer and measured against the truth. What moves stops at a click.");
+  DemoStory story{.mirror = show_camera(*recordings, session, page)};
 
   next_part("remembers and localises itself");
   MemoryFile file = remember(recordings->memory_run, out / "office.panonav", session.executor());
@@ -397,27 +379,32 @@ ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
   done.own = outcome_of(asked, memory);
   done.foreign = outcome_of(elsewhere, memory);
   const std::vector<MapLayer> scene = scene_layers(recordings->office_scene);
-  show_answers(memory, scene, asked, done.own, done.foreign, wanted.spacing_m(), out, page);
+  show_answers(memory, scene, asked, done.own, done.foreign, wanted.spacing_m(), page);
+  story.position_error = median_text(done.own.errors_m, 100.0, 1, "cm");
   next_part("as accurate as needed");
-  show_levels(memory, scene, shown_view(asked), wanted.spacing_m(), out, page);
+  story.areas = show_levels(memory, scene, shown_view(asked), wanted.spacing_m(), page);
   next_part("tracks itself");
   const MemoryFile corridor =
       remember(recordings->corridor_run, out / "corridor.panonav", session.executor());
   done.track = show_track(wanted, *recordings, corridor, session, page);
   next_part("arranges what it remembers");
-  done.maps = show_maps(memory, wanted.seed, wanted.quick, out, session, page);
+  done.maps = show_maps(memory, wanted.seed, wanted.quick, session, page);
   store_lattice(done.maps.arranged, memory, file);
   next_part("goes home");
   done.homing =
-      show_homing(recordings->office_scene, wanted.runs_home(), wanted.seed, out, session, page);
+      show_homing(recordings->office_scene, wanted.runs_home(), wanted.seed, session, page);
   next_part("repeats a route");
-  done.route =
-      show_route(recordings->office_scene, wanted.route_m(), wanted.seed, out, session, page);
+  done.route = show_route(recordings->office_scene, wanted.route_m(), wanted.seed, session, page);
   next_part("goes where it is told");
-  done.navigation =
-      show_navigation(wanted, *recordings, memory, done.maps.arranged, pipeline, session, page);
+  done.navigation = show_navigation(wanted, *recordings, file, memory, done.maps.arranged, pipeline,
+                                    session, page);
   show_what_next(wanted, *recordings, done.navigation, page);
-  page.write(out);
+  story.found_again = pictures_text(done.track.until_found_again);
+  story.gathering = std::move(done.track.gathering);
+  story.arrived = of(done.navigation.arrived, done.navigation.runs.size());
+  story.missions = std::move(done.navigation.all);
+  tell_story(std::move(story), page);
+  page.write(out, "index.html", "panonav demo");
   progress.clear();
 
   done.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -453,7 +440,7 @@ Verb demo_verb() {
           "A robot sees, remembers, localises and tracks itself, arranges what it remembers, goes "
           "home, repeats\n"
           "a route and goes where it is told. It takes about a minute on two cores and needs "
-          "nothing but this program and gnuplot. What an earlier demo left in the folder is "
+          "nothing but this program. What an earlier demo left in the folder is "
           "written anew; a folder that holds "
           "anything\n"
           "else is refused.",

@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "experiments/runs/surroundings.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
+#include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/positions.hpp"
-#include "panonav/io/image_file.hpp"
 #include "reporting/plot.hpp"
-#include "reports/home_picture.hpp"
 
 namespace panonav::command {
 
@@ -36,27 +36,56 @@ std::vector<HomingTask> tasks_in(const HomingPlace& place, int count, std::uint6
   return tasks;
 }
 
-void draw_runs(const Scene& office, const std::vector<HomingRun>& runs,
-               const std::filesystem::path& path) {
+/// All robots at once, step by step.
+UnfoldingMap map_of_runs(const Scene& office, const std::vector<HomingRun>& runs) {
   MapLayer homes{.label = "home", .colour = PlotColour::black};
   MapLayer starts{.label = "start", .colour = PlotColour::green};
-  MapLayer good{.label = "way home", .colour = PlotColour::blue};
-  MapLayer bad{.label = "ended elsewhere", .colour = PlotColour::vermilion};
+  std::size_t longest = 0;
   for (const HomingRun& run : runs) {
     homes.squares.push_back(run.goal.position());
     starts.circles.push_back(run.path.front().position());
-    std::vector<Point2> line = positions_of(run.path);
-    if (line.size() > 1) (run.succeeds(close_m) ? good : bad).lines.push_back(std::move(line));
+    longest = std::max(longest, run.path.size());
   }
-  MapPlot map{.title = "Runs home in the office", .layers = scene_layers(office)};
-  for (const MapLayer& layer : {good, bad, starts, homes}) map.layers.push_back(layer);
-  write_plot(path, map);
+  UnfoldingMap map{.title = "Runs home in the office", .backdrop = scene_layers(office)};
+  map.backdrop.push_back(homes);
+  map.backdrop.push_back(starts);
+  for (std::size_t step = 0; step < longest; ++step) {
+    MapLayer good{.label = "way home", .colour = PlotColour::blue};
+    MapLayer bad{.label = "ended elsewhere", .colour = PlotColour::vermilion};
+    for (const HomingRun& run : runs) {
+      std::vector<Point2> line = positions_of(run.path);
+      const bool over = line.size() <= step + 1;
+      line.resize(std::min(line.size(), step + 1));
+      MapLayer& layer = over && !run.succeeds(close_m) ? bad : good;
+      layer.dots.push_back(line.back());
+      if (line.size() > 1) layer.lines.push_back(std::move(line));
+    }
+    map.frames.push_back({.title = "step " + std::to_string(step), .layers = {good, bad}});
+  }
+  return map;
+}
+
+/// The view at home, turned as the robot faces, above what it sees.
+std::vector<ReportView> views_of(const Panorama& home, const Panorama& current,
+                                 const HomeVector& vector) {
+  std::vector<ViewMark> marks{{.azimuth_rad = 0.0, .colour = PlotColour::grey}};
+  if (vector.length() > 0.0) {
+    marks.push_back({vector.direction_rad(), PlotColour::vermilion, true});
+    marks.push_back(
+        {wrap_angle(vector.direction_rad() + std::numbers::pi), PlotColour::blue, true});
+  }
+  const double columns = -vector.heading_rad / (2.0 * std::numbers::pi) * home.columns();
+  return {{turn_columns(home, static_cast<int>(std::lround(columns))), marks,
+           "The first run: what was seen at home, turned as the robot faces at the start."},
+          {current, marks,
+           "What it sees at the start. Orange: the direction home, where things spread out on the "
+           "way; blue: the opposite one; grey: straight ahead."}};
 }
 
 }  // namespace
 
-DemoHoming show_homing(const Scene& office, int runs, std::uint64_t seed,
-                       const std::filesystem::path& out, Session& session, ReportPage& page) {
+DemoHoming show_homing(const Scene& office, int runs, std::uint64_t seed, Session& session,
+                       ReportPage& page) {
   const HomingPlace place = make_homing_place(office, {}, session.executor());
   const auto tasks = tasks_in(place, runs, seed);
   DemoHoming homing;
@@ -67,17 +96,12 @@ DemoHoming show_homing(const Scene& office, int runs, std::uint64_t seed,
     homing.distances_m.push_back(run.end_distance_m);
     steps += run.path.size() - 1;
   }
-  draw_runs(office, homing.runs, out / "homing.svg");
   const auto seen_from = [&](const Pose2& pose) {
     const HomingCamera& camera = place.camera;
     return take_panorama(*place.renderer, pose, camera.rendering, camera.frame, camera.sensor, seed,
                          session.executor());
   };
   const HomingRun& shown = homing.runs.front();
-  const Image picture =
-      picture_of_homing(seen_from(shown.goal), seen_from(shown.path.front()), shown.vectors.front(),
-                        shown.vectors.front().length() > 0.0);
-  write_png(out / "way_home.png", picture.view());
 
   page.part("Back home", {std::to_string(homing.arrived) + " of " + std::to_string(runs),
                           "robots found home from a metre away, by one remembered picture"});
@@ -94,14 +118,10 @@ DemoHoming show_homing(const Scene& office, int runs, std::uint64_t seed,
                 {fixed(100.0 * median(homing.distances_m), 1) + " cm",
                  "median distance from home at the end"},
                 {fixed(static_cast<double>(steps) / runs, 0), "steps a run, on average"}});
-  page.pictures(
-      {{"way_home.png",
-        "The first run. Above, the view at home, turned as the robot faces at the start; below, "
-        "what it sees there. Orange: the direction home, where things spread out on the way; "
-        "blue: the opposite one; grey: straight ahead."},
-       {"homing.svg",
-        "All runs, from the green circles to the black squares. A run that ended elsewhere is "
-        "orange."}});
+  page.plots({{map_of_runs(office, homing.runs),
+               "All robots at once, step by step, from the green circles to the black squares. A "
+               "run that ended elsewhere turns orange."}});
+  page.views(views_of(seen_from(shown.goal), seen_from(shown.path.front()), shown.vectors.front()));
   return homing;
 }
 

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <vector>
 
 #include "cli/session.hpp"
@@ -17,8 +16,8 @@ struct DemoHoming {
   std::vector<double> distances_m;  ///< between home and where each run ended
 };
 
-/// Runs them and adds a section with its pictures to the page. The same seed gives the same runs.
-DemoHoming show_homing(const Scene& office, int runs, std::uint64_t seed,
-                       const std::filesystem::path& out, Session& session, ReportPage& page);
+/// Runs them and adds a part that plays them to the page. The same seed gives the same runs.
+DemoHoming show_homing(const Scene& office, int runs, std::uint64_t seed, Session& session,
+                       ReportPage& page);
 
 }  // namespace panonav::command

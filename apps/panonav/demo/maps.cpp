@@ -1,14 +1,20 @@
 #include "demo/maps.hpp"
 
 #include <algorithm>
+#include <array>
+#include <iterator>
+#include <map>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "experiments/runs/surroundings.hpp"
+#include "panonav/core/random.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/geometry/positions.hpp"
 #include "panonav/mapping/lattice.hpp"
+#include "panonav/pipeline/arrangement.hpp"
 #include "panonav/simulation/scenes.hpp"
 #include "reporting/plot.hpp"
 
@@ -19,8 +25,8 @@ namespace {
 constexpr double spacing_m = 0.1;
 constexpr int components = 15;
 
-void draw_drive(const PlaceRecording& place, const MappingRecording& recording,
-                const MappedRecording& mapped, const std::filesystem::path& path) {
+MapPlot map_of_drive(const PlaceRecording& place, const MappingRecording& recording,
+                     const MappedRecording& mapped) {
   MapPlot plot{.title = "A drive through rooms", .layers = scene_layers(place.scene)};
   plot.layers.push_back(
       {.label = "true way", .colour = PlotColour::black, .lines = {mapped.truth}});
@@ -30,7 +36,89 @@ void draw_drive(const PlaceRecording& place, const MappingRecording& recording,
   plot.layers.push_back({.label = "map from the views",
                          .colour = PlotColour::blue,
                          .lines = {laid_over(mapped.estimate, mapped.truth)}});
-  write_plot(path, plot);
+  return plot;
+}
+
+/// The groups of views at one time while the arrangement grows.
+struct Growth {
+  std::vector<Pose2> poses;
+  std::vector<std::size_t> groups;
+};
+
+/// The views as dots, coloured by where they were taken, from west to east: whoever looks sees at
+/// once whether they are sorted.
+std::vector<MapLayer> coloured(const std::vector<Point2>& positions,
+                               const std::vector<Point2>& truth) {
+  constexpr std::array colours{PlotColour::blue,   PlotColour::sky,    PlotColour::green,
+                               PlotColour::yellow, PlotColour::orange, PlotColour::vermilion};
+  std::vector<MapLayer> layers;
+  for (const PlotColour colour : colours) layers.push_back({.colour = colour});
+  layers.front().label = "taken in the west";
+  layers.back().label = "taken in the east";
+  const auto [west, east] = std::ranges::minmax(truth, {}, &Point2::x_m);
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    const double share = (truth[i].x_m - west.x_m) / std::max(1e-9, east.x_m - west.x_m);
+    const auto strip = static_cast<std::size_t>(share * static_cast<double>(colours.size()));
+    layers[std::min(strip, colours.size() - 1)].squares.push_back(positions[i]);
+  }
+  return layers;
+}
+
+/// How the views find together: groups at the places where their views end, single views at places
+/// at random.
+UnfoldingMap map_of_growth(const Lattice& arranged, const VisualMemory& office,
+                           const std::vector<Growth>& growth, std::uint64_t seed) {
+  std::vector<Point2> truth;
+  std::vector<Point2> ends;
+  for (const LatticeNode& node : arranged.nodes) {
+    truth.push_back(office.info(node.view).pose->position());
+    ends.push_back(node.pose.position());
+  }
+  ends = laid_over(ends, truth);
+  std::vector<Point2> anywhere = ends;
+  Random random(seed, 1);
+  for (std::size_t i = anywhere.size(); i > 1; --i) {
+    std::swap(anywhere[i - 1], anywhere[static_cast<std::size_t>(random.index(i))]);
+  }
+  UnfoldingMap map{.title = "As the views arrange themselves"};
+  map.frames.push_back({.title = "in no order", .layers = coloured(anywhere, truth)});
+  for (const Growth& at : growth) {
+    std::map<std::size_t, std::vector<std::size_t>> groups;
+    for (std::size_t i = 0; i < at.groups.size(); ++i) groups[at.groups[i]].push_back(i);
+    std::vector<Point2> positions = anywhere;
+    std::size_t found = 0;
+    for (const auto& [unused, views] : groups) {
+      if (views.size() < 3) continue;
+      std::vector<Point2> now;
+      std::vector<Point2> end;
+      for (const std::size_t view : views) {
+        now.push_back(at.poses[view].position());
+        end.push_back(ends[view]);
+      }
+      now = laid_over(now, end);
+      for (std::size_t i = 0; i < views.size(); ++i) positions[views[i]] = now[i];
+      found += views.size();
+    }
+    map.frames.push_back({.title = std::to_string(found) + " of " + std::to_string(truth.size()) +
+                                   " views in groups",
+                          .layers = coloured(positions, truth)});
+  }
+  MapLayer springs{.label = "springs", .colour = PlotColour::light_grey};
+  for (const LatticeSpring& spring : arranged.springs) {
+    if (spring.weight >= min_spring_weight)
+      springs.lines.push_back({ends[spring.a], ends[spring.b]});
+  }
+  map.frames.push_back({.title = "done", .layers = {springs}});
+  std::ranges::move(coloured(ends, truth), std::back_inserter(map.frames.back().layers));
+  return map;
+}
+
+MapPlot map_of_truth(const VisualMemory& office) {
+  std::vector<Point2> truth;
+  for (const ViewId view : office.views()) {
+    truth.push_back(office.info(view).pose->position());
+  }
+  return {.title = "As they were taken", .layers = coloured(truth, truth)};
 }
 
 /// The longer side of the floor on which the views were taken.
@@ -48,12 +136,19 @@ double room_m(const VisualMemory& office) {
 
 }  // namespace
 
-DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick,
-                   const std::filesystem::path& out, Session& session, ReportPage& page) {
+DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick, Session& session,
+                   ReportPage& page) {
+  constexpr std::size_t frames = 40;
   DemoMaps maps;
-  maps.arranged = arrange(office, {}, {}, session.executor());
+  std::vector<Growth> growth;
+  std::size_t joins = 0;
+  maps.arranged =
+      arrange(office, {}, {}, session.executor(),
+              [&](std::span<const Pose2> poses, std::span<const std::size_t> groups) {
+                if (joins++ % (office.size() / frames + 1) != 0) return;
+                growth.push_back({{poses.begin(), poses.end()}, {groups.begin(), groups.end()}});
+              });
   maps.lattice = compare_with_ground_truth(maps.arranged, office);
-  write_lattice_picture(out / "arranged.svg", maps.arranged, office);
 
   const PlaceRecording place =
       empty_place(make_scene("loop", {.seed = seed}), seed, 256, session.executor());
@@ -67,7 +162,6 @@ DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick,
   maps.map_rms_m = align(mapped.estimate, mapped.truth, {.allow_scale = true}).rms_m;
   maps.wheels_rms_m =
       align(positions_of(recording.wheels), mapped.truth, {.allow_scale = true}).rms_m;
-  draw_drive(place, recording, mapped, out / "drive.svg");
 
   const auto centimetres = [](double metres) { return fixed(100.0 * metres, 0) + " cm"; };
   const std::string arranged = maps.lattice ? centimetres(maps.lattice->rms_m) : "none";
@@ -77,21 +171,24 @@ DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick,
       "Can pictures alone make a map? The remembered views of the office were shuffled and their "
       "positions taken away. Views that look alike pull each other close, like balls on springs, "
       "and so they find their places by themselves.");
-  page.pictures({{"arranged.svg",
-                  "Left, where the views were taken; right, where they put themselves: turned and "
-                  "scaled as a whole to fit, because pictures know neither north nor metres. Lines "
-                  "are the springs. Were the arrangement perfect, the right picture would be the "
-                  "left one."}});
+  page.plots({{map_of_growth(maps.arranged, office, growth, seed),
+               "At first the views lie anywhere. Those that belong together join, and the groups "
+               "grow until all hang together; each group is drawn where it ends. The whole is "
+               "turned and scaled to fit the truth, because pictures know neither north nor "
+               "metres."},
+              {map_of_truth(office),
+               "Where the views were taken, which the robot was not told. Colours go from west to "
+               "east: were the arrangement perfect, the left picture would become this one."}});
   page.text(
-      "In the second picture a robot drives through rooms that it has never seen and makes a map "
+      "Below, a robot drives through rooms that it has never seen and makes a map "
       "of its way, from one picture after the other and without wheels; where it comes by again it "
       "recognises the place and closes the loop.");
-  page.pictures(
-      {{"drive.svg", "The drive: " + std::to_string(recording.truth.size()) + " views, one every " +
-                         centimetres(spacing_m) +
-                         ". The blue map should lie on the black way; both it and the "
-                         "orange line are laid over that in equal size. The orange one is "
-                         "what the wheels of a cheap robot make of the same drive."}});
+  page.plots({{map_of_drive(place, recording, mapped),
+               "The drive: " + std::to_string(recording.truth.size()) + " views, one every " +
+                   centimetres(spacing_m) +
+                   ". The blue map should lie on the black way; both it and the orange line are "
+                   "laid over that in equal size. The orange one is what the wheels of a cheap "
+                   "robot make of the same drive."}});
   std::vector<std::pair<std::string, std::string>> figures;
   if (maps.lattice) {
     figures.push_back({arranged,

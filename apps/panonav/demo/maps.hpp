@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <optional>
 
 #include "cli/session.hpp"
@@ -22,8 +21,9 @@ struct DemoMaps {
 };
 
 /// Arranges the views of `office` without their poses, makes a map of a drive through rooms of
-/// another place, and adds a section with both pictures to the page.
-DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick,
-                   const std::filesystem::path& out, Session& session, ReportPage& page);
+/// another place, and adds a part to the page that plays the first and
+/// draws the second.
+DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick, Session& session,
+                   ReportPage& page);
 
 }  // namespace panonav::command

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
 #include <utility>
 
 #include "experiments/runs/mission_picture.hpp"
@@ -13,16 +15,17 @@
 #include "panonav/geometry/positions.hpp"
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/motion/path.hpp"
+#include "panonav/navigation/direction_field.hpp"
 #include "panonav/navigation/navigation_graph.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
 #include "panonav/simulation/screen.hpp"
 #include "reporting/plot.hpp"
 #include "verbs/navigated_run.hpp"
+#include "verbs/shown_references.hpp"
 
 namespace panonav::command {
 
 namespace {
-
-namespace fs = std::filesystem;
 
 // Random streams of the demonstration's missions.
 constexpr std::uint64_t mission_stream = 1;
@@ -44,7 +47,7 @@ RememberedPlace remembered_place(const VisualMemory& memory, const Lattice& arra
 
 /// The robot sees through the camera as it is, and understands it as it was calibrated.
 void give_sight(MissionPlace& place, const DemoRecordings& recordings, const Pipeline& pipeline) {
-  const SimulationArguments& settled = recordings.office_world->arguments();
+  const SimulatedWorldOptions& settled = recordings.office_world->options();
   place.sight = sight_through(place.renderer, recordings.true_camera, settled.frame, settled.sensor,
                               pipeline, nullptr);
 }
@@ -80,7 +83,7 @@ std::optional<ScreenedMission> screened_mission(const MissionPlace& place,
     MissionPlace screened = place;
     add_screen(screened.scene, across, width_m, height_m);
     screened.free_space = std::make_shared<const FreeSpace>(
-        screened.scene, recordings.office_world->arguments().free_space);
+        screened.scene, recordings.office_world->options().free_space);
     const Point2 goal = remembered.truth[*remembered.graph.node_of(mission.goal)].position();
     const auto direct = place.free_space->shortest_path(mission.start.position(), goal);
     const auto around = screened.free_space->shortest_path(mission.start.position(), goal);
@@ -94,27 +97,121 @@ std::optional<ScreenedMission> screened_mission(const MissionPlace& place,
   return std::nullopt;
 }
 
-void draw_runs(const DemoNavigation& navigation, const RememberedPlace& remembered,
-               const std::vector<Mission>& missions, const Scene& office, const fs::path& path) {
+/// All robots at once, look by look.
+UnfoldingMap map_of_runs(const DemoNavigation& navigation, const RememberedPlace& remembered,
+                         const std::vector<Mission>& missions, const Scene& office) {
   MapLayer views{.label = "remembered views", .colour = PlotColour::light_grey};
   for (const Pose2& pose : remembered.truth) views.circles.push_back(pose.position());
-  MapLayer good{.label = "way to the goal", .colour = PlotColour::blue};
-  MapLayer bad{.label = "ended elsewhere", .colour = PlotColour::vermilion};
   MapLayer starts{.label = "start", .colour = PlotColour::green};
   MapLayer goals{.label = "goal", .colour = PlotColour::black};
+  std::size_t longest = 0;
   for (std::size_t i = 0; i < navigation.runs.size(); ++i) {
-    const MissionRun& run = navigation.runs[i];
-    starts.squares.push_back(run.path.front().position());
+    starts.squares.push_back(navigation.runs[i].path.front().position());
     goals.crosses.push_back(
         remembered.truth[*remembered.graph.node_of(missions[i].goal)].position());
-    std::vector<Point2> line = positions_of(run.path);
-    if (line.size() > 1) {
-      (run.arrives(navigation.within_m) ? good : bad).lines.push_back(std::move(line));
-    }
+    longest = std::max(longest, navigation.runs[i].path.size());
   }
-  MapPlot map{.title = "All missions", .layers = scene_layers(office)};
-  for (const MapLayer& layer : {views, good, bad, starts, goals}) map.layers.push_back(layer);
-  write_plot(path, map);
+  UnfoldingMap map{.title = "All missions", .backdrop = scene_layers(office)};
+  for (const MapLayer& layer : {views, starts, goals}) map.backdrop.push_back(layer);
+  for (std::size_t look = 0; look < longest; ++look) {
+    MapLayer good{.label = "way to the goal", .colour = PlotColour::blue};
+    MapLayer bad{.label = "ended elsewhere", .colour = PlotColour::vermilion};
+    for (const MissionRun& run : navigation.runs) {
+      std::vector<Point2> line = positions_of(run.path);
+      const bool over = line.size() <= look + 1;
+      line.resize(std::min(line.size(), look + 1));
+      MapLayer& layer = over && !run.arrives(navigation.within_m) ? bad : good;
+      layer.dots.push_back(line.back());
+      if (line.size() > 1) layer.lines.push_back(std::move(line));
+    }
+    map.frames.push_back({.title = "look " + std::to_string(look + 1), .layers = {good, bad}});
+  }
+  return map;
+}
+
+/// One run, look by look, over what the memory tells of the way.
+UnfoldingMap map_of_run(const std::string& title, const MissionPlace& place,
+                        const RememberedPlace& remembered, const PlannerOptions& options,
+                        ViewId goal, const MissionRun& run) {
+  MapPlot backdrop = mission_plot(title, place, remembered, options, goal, run);
+  std::erase_if(backdrop.layers, [](const MapLayer& layer) { return layer.label == "way driven"; });
+  UnfoldingMap map{.title = title, .backdrop = std::move(backdrop.layers)};
+  for (std::size_t look = 0; look < run.path.size(); ++look) {
+    MapLayer driven{.label = "way driven", .colour = PlotColour::vermilion, .lines = {{}}};
+    for (std::size_t i = 0; i <= look; ++i) {
+      driven.lines.back().push_back(run.path[i].position());
+      if (run.kidnapped_at == i) driven.lines.emplace_back();
+    }
+    std::erase_if(driven.lines, [](const auto& line) { return line.size() < 2; });
+    driven.dots = {run.path[look].position()};
+    map.frames.push_back({.title = look < run.decisions.size()
+                                       ? "look " + std::to_string(look + 1) + ": " +
+                                             std::string(name_of(run.decisions[look].state))
+                                       : "the end",
+                          .layers = {driven}});
+  }
+  return map;
+}
+
+/// A mission with what the robot sees and decides at each look.
+RunPage played_run(const MissionPlace& place, const RememberedPlace& remembered,
+                   const DemoRecordings& recordings, const MemoryFile& file,
+                   const Pipeline& pipeline, const PlannerOptions& options, ViewId goal,
+                   const MissionRun& run) {
+  const SimulatedWorldOptions& settled = recordings.office_world->options();
+  std::optional<Panorama> seen;
+  const auto look = sight_through(
+      place.renderer, recordings.true_camera, settled.frame, settled.sensor, pipeline, nullptr,
+      [&](const Image& /*picture*/, const Panorama& panorama) { seen = panorama; });
+  AreaPlanner planner(remembered.graph, options);
+  planner.set_goal(goal);
+  RunPage page("A mission", run.decisions.size());
+  bool planned = false;
+  for (std::size_t i = 0; i < run.decisions.size(); ++i) {
+    const NavigationDecision& decision = run.decisions[i];
+    const Pose2& pose = run.path[i];
+    RunMoment moment{.stamp_s = 0.5 * static_cast<double>(i), .pose = pose};
+    moment.truth = ReferencePose{pose.x_m, pose.y_m, pose.heading_rad};
+    moment.sure = decision.probability >= 0.5;
+    moment.state = name_of(decision.state);
+    moment.probability = decision.probability;
+    for (const NavigationEvent event : decision.events) {
+      std::string name(name_of(event));
+      std::ranges::replace(name, '_', ' ');
+      moment.values.emplace_back("event", std::move(name));
+    }
+    const FourierSignature signature = look(pose, i);
+    moment.panorama = std::exchange(seen, std::nullopt);
+    if (decision.nearest) {
+      moment.values.emplace_back("best_match", remembered.memory.info(*decision.nearest).name);
+      moment.best_match = file.thumbnail(*decision.nearest).value_or(std::vector<std::uint8_t>{});
+      moment.best_match_turn_rad =
+          -home_vector(homing_view(remembered.memory.signature(*decision.nearest)),
+                       homing_view(signature))
+               .heading_rad;
+      if (!planned) {  // the page shows one plan: that of the start
+        for (const std::size_t node :
+             planner.planned_way(*remembered.graph.node_of(*decision.nearest))) {
+          moment.plan.push_back(remembered.truth[node]);
+        }
+        planned = true;
+      }
+    }
+    if (i == 0) {
+      moment.walls = walls_of(place.scene);
+      const auto guides = direction_field(remembered.graph, goal, options.field);
+      for (std::size_t node = 0; node < guides.size(); ++node) {
+        const Pose2& at = remembered.truth[node];
+        moment.references.push_back(at.position());
+        if (!guides[node].direction_rad) continue;
+        moment.directions.push_back(
+            {at.x_m, at.y_m, wrap_angle(at.heading_rad + *guides[node].direction_rad)});
+      }
+      moment.goal = remembered.truth[*remembered.graph.node_of(goal)];
+    }
+    page.add(moment);
+  }
+  return page;
 }
 
 std::string end_text(const MissionRun& run, double within_m) {
@@ -139,7 +236,15 @@ std::string sentence_on(const MissionRun& run, double within_m) {
          fixed(run.travelled_m, 1) + " m.";
 }
 
-void add_part(const DemoNavigation& navigation, ReportPage& page) {
+/// What the page shows of them.
+struct Shown {
+  RunPage first;
+  UnfoldingMap all;
+  UnfoldingMap kidnapped;
+  std::optional<UnfoldingMap> screened;
+};
+
+void add_part(const DemoNavigation& navigation, Shown shown, ReportPage& page) {
   const std::string count = std::to_string(navigation.runs.size());
   const std::string arrived = std::to_string(navigation.arrived) + " of " + count;
   const std::string within = fixed(100.0 * navigation.within_m, 1) + " cm";
@@ -166,34 +271,35 @@ void add_part(const DemoNavigation& navigation, ReportPage& page) {
        {navigation.screened ? end_text(*navigation.screened, navigation.within_m) : "none",
         navigation.screened ? "the robot with a screen in its way"
                             : "no screen leaves a way round here"}});
-  std::vector<ReportPicture> pictures{
-      {"mission.svg",
-       "The first mission. Arrows: which way each remembered view sends the robot; orange: the way "
-       "planned at the start; red-orange: the way driven."},
-      {"missions.svg", "All missions. A way that did not end at its goal is orange."},
-      {"mission_kidnapped.svg",
+  page.text(
+      "The first mission, look by look. Short strokes: which way each remembered view sends the "
+      "robot; the thick line: the way planned. Below what the robot sees stands the view that it "
+      "takes for the place where it is, turned alike.");
+  page.run(shown.first);
+  std::vector<ReportPlot> maps{
+      {std::move(shown.all), "All missions at once. A way that did not end at its goal is orange."},
+      {std::move(shown.kidnapped),
        "Half way, somebody kidnapped this robot: it was put down at the purple square. " +
            sentence_on(navigation.kidnapped, navigation.within_m)}};
-  if (navigation.screened) {
-    pictures.push_back(
-        {"mission_screen.svg",
-         "A screen, the short dark line, stands across the middle of the planned way; "
-         "the memory does not know it. There is a way round. " +
-             sentence_on(*navigation.screened, navigation.within_m)});
+  if (shown.screened) {
+    maps.push_back({std::move(*shown.screened),
+                    "A screen, the short dark line, stands across the middle of the planned way; "
+                    "the memory does not know it. There is a way round. " +
+                        sentence_on(*navigation.screened, navigation.within_m)});
   }
-  page.pictures(pictures);
+  page.plots(maps);
   page.link("mission.log", "Read each decision of all missions");
 }
 
 }  // namespace
 
 DemoNavigation show_navigation(const DemoOptions& options, const DemoRecordings& recordings,
-                               const VisualMemory& memory, const Lattice& arranged,
-                               std::shared_ptr<const ViewEncoder> pipeline, Session& session,
-                               ReportPage& page) {
+                               const MemoryFile& file, const VisualMemory& memory,
+                               const Lattice& arranged, std::shared_ptr<const ViewEncoder> pipeline,
+                               Session& session, ReportPage& page) {
   Executor& executor = session.executor();
   const RememberedPlace remembered = remembered_place(memory, arranged, options.spacing_m());
-  MissionPlace place = recordings.office_world->place();
+  MissionPlace place = mission_place(*recordings.office_world);
   give_sight(place, recordings, pipeline);
   const auto random = [&](std::uint64_t stream, int count, bool kidnapped) {
     return random_missions(place, remembered, {.count = count, .kidnapped = kidnapped},
@@ -213,16 +319,17 @@ DemoNavigation show_navigation(const DemoOptions& options, const DemoRecordings&
     ++navigation.arrived;
     if (run.shortest_m > 0.0) navigation.detours.push_back(run.travelled_m / run.shortest_m);
   }
-  const auto draw = [&](const char* file, const std::string& what, const MissionPlace& where,
-                        const Mission& mission, const MissionRun& run) {
-    write_mission_picture(options.out / file, what + "", where, remembered, settings.planner,
-                          mission.goal, run);
+  const auto map_of = [&](const std::string& title, const MissionPlace& where,
+                          const Mission& mission, const MissionRun& run) {
+    return map_of_run(title, where, remembered, settings.planner, mission.goal, run);
   };
   const Mission& first = missions.front();
-  draw("mission.svg", "To a remembered view", place, first, navigation.runs.front());
-  draw("mission_kidnapped.svg", "Kidnapped half way", place, missions.back(), navigation.kidnapped);
-  draw_runs(navigation, remembered, missions, recordings.office_scene,
-            options.out / "missions.svg");
+  Shown shown{
+      .first = played_run(place, remembered, recordings, file, pipeline, settings.planner,
+                          first.goal, navigation.runs.front()),
+      .all = map_of_runs(navigation, remembered, missions, recordings.office_scene),
+      .kidnapped = map_of("Kidnapped half way", place, missions.back(), navigation.kidnapped)};
+  navigation.all = shown.all;
   std::string log;
   const auto add_log = [&](const std::string& title, const Mission& mission,
                            const MissionRun& run) {
@@ -242,12 +349,12 @@ DemoNavigation show_navigation(const DemoOptions& options, const DemoRecordings&
     navigation.screened =
         run_missions(screened->place, remembered, {screened->mission}, settings, noise, executor)
             .front();
-    draw("mission_screen.svg", "A screen in the way", screened->place, screened->mission,
-         *navigation.screened);
+    shown.screened =
+        map_of("A screen in the way", screened->place, screened->mission, *navigation.screened);
     add_log("A screen in the way", screened->mission, *navigation.screened);
   }
   write_file(options.out / "mission.log", std::string_view(log));
-  add_part(navigation, page);
+  add_part(navigation, std::move(shown), page);
   return navigation;
 }
 

@@ -11,6 +11,7 @@
 #include "experiments/runs/mission.hpp"
 #include "panonav/mapping/lattice.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
+#include "panonav/storage/memory_file.hpp"
 #include "reports/report_page.hpp"
 
 namespace panonav::command {
@@ -25,15 +26,16 @@ struct DemoNavigation {
   MissionRun kidnapped;          ///< one more, kidnapped half way
   /// One more, a screen across its way; empty: no screen leaves a way round.
   std::optional<MissionRun> screened;
+  UnfoldingMap all;  ///< the runs, one look after the other
   /// The first run as options of the verb `navigate`.
   std::vector<std::string> first_mission;
 };
 
-/// Sends them and adds a part with pictures and a log to the page. The same seed gives the same
-/// runs.
+/// Sends them over the views of `memory`, which is what `file` holds, and adds a part that plays
+/// them to the page, with a log. The same seed gives the same runs.
 DemoNavigation show_navigation(const DemoOptions& options, const DemoRecordings& recordings,
-                               const VisualMemory& memory, const Lattice& arranged,
-                               std::shared_ptr<const ViewEncoder> pipeline, Session& session,
-                               ReportPage& page);
+                               const MemoryFile& file, const VisualMemory& memory,
+                               const Lattice& arranged, std::shared_ptr<const ViewEncoder> pipeline,
+                               Session& session, ReportPage& page);
 
 }  // namespace panonav::command

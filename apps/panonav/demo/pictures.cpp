@@ -3,15 +3,18 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
+#include "panonav/core/text.hpp"
+#include "panonav/io/image_file.hpp"
 #include "panonav/signature/dissimilarity.hpp"
 
 namespace panonav::command {
 
 namespace {
 
-MapLayer references(const VisualMemory& memory) {
-  MapLayer layer{.label = "remembered views", .colour = PlotColour::blue};
+MapLayer references(const VisualMemory& memory, PlotColour colour) {
+  MapLayer layer{.label = "remembered views", .colour = colour};
   for (const ViewId view : memory.views()) {
     layer.circles.push_back(memory.info(view).pose->position());
   }
@@ -20,8 +23,8 @@ MapLayer references(const VisualMemory& memory) {
 
 }  // namespace
 
-void draw_answers(const VisualMemory& memory, const std::vector<MapLayer>& scene,
-                  const std::vector<AskedView>& asked, const std::filesystem::path& path) {
+MapPlot map_of_answers(const VisualMemory& memory, const std::vector<MapLayer>& scene,
+                       const std::vector<AskedView>& asked) {
   MapLayer truth{.label = "true place", .colour = PlotColour::green};
   MapLayer error{.label = "from there to the answer", .colour = PlotColour::vermilion};
   for (const auto& view : asked) {
@@ -31,44 +34,39 @@ void draw_answers(const VisualMemory& memory, const std::vector<MapLayer>& scene
     }
   }
   MapPlot map{.title = "The office from above", .layers = scene};
-  for (const MapLayer& layer : {references(memory), error, truth}) map.layers.push_back(layer);
-  write_plot(path, map);
+  for (const MapLayer& layer : {references(memory, PlotColour::blue), error, truth})
+    map.layers.push_back(layer);
+  return map;
 }
 
-std::vector<double> draw_areas(const VisualMemory& memory, const std::vector<MapLayer>& scene,
-                               const AskedView& asked, const std::filesystem::path& path) {
+AreasShown map_of_areas(const VisualMemory& memory, const std::vector<MapLayer>& scene,
+                        const AskedView& asked) {
   // Views within a quarter of the best dissimilarity stay candidates, as in `reproduce m04`: with
   // none the first component alone would drop the true place for noise.
   constexpr double tolerance = 0.25;
   const ReferenceAreas areas(memory);
   const auto levels =
       localise_hierarchically(memory, areas, asked.signature, {.tolerance = tolerance});
-  std::vector<MapPlot> panels;
-  std::vector<double> areas_m2;
+  AreasShown shown{.map = {.title = "Where the robot may be", .backdrop = scene}};
+  shown.map.backdrop.push_back(references(memory, PlotColour::light_grey));
   for (const auto& level : levels) {
-    const bool shown = level.components == 1 || level.components == 3 || level.components == 6 ||
-                       level.components == memory.shape().components;
-    if (!shown) continue;
     MapLayer area{.label = "where the robot may be", .colour = PlotColour::orange};
     for (const auto& candidate : level.candidates) {
       area.filled_polygons.push_back(areas.cell(candidate.view));
     }
     const MapLayer robot{
         .label = "the robot", .colour = PlotColour::vermilion, .crosses = {asked.truth.position()}};
-    areas_m2.push_back(level.area_m2.value_or(std::numeric_limits<double>::quiet_NaN()));
-    panels.push_back({.title = std::to_string(level.components) +
-                               (level.components == 1 ? " component" : " components"),
-                      .layers = scene});
-    for (const MapLayer& layer : {area, references(memory), robot}) {
-      panels.back().layers.push_back(layer);
-    }
+    shown.areas_m2.push_back(level.area_m2.value_or(std::numeric_limits<double>::quiet_NaN()));
+    shown.map.frames.push_back(
+        {.title = std::to_string(level.components) +
+                  (level.components == 1 ? " component: " : " components: ") +
+                  fixed(shown.areas_m2.back(), 2) + " m²",
+         .layers = {area, robot}});
   }
-  write_plot(path, panels, 2);
-  return areas_m2;
+  return shown;
 }
 
-void draw_similarity(const VisualMemory& memory, double spacing_m, const AskedView& asked,
-                     const std::filesystem::path& path) {
+HeatMap map_of_similarity(const VisualMemory& memory, double spacing_m, const AskedView& asked) {
   std::vector<double> dissimilarities;
   constexpr double infinity = std::numeric_limits<double>::infinity();
   Point2 low{infinity, infinity};
@@ -103,7 +101,11 @@ void draw_similarity(const VisualMemory& memory, double spacing_m, const AskedVi
         static_cast<std::size_t>(column_of(at.x_m));
     map.values[cell] = similarity[number++];
   }
-  write_plot(path, map);
+  return map;
+}
+
+ReportPicture picture_in_page(ImageView image, std::string caption) {
+  return {data_url("image/jpeg", encode_jpeg(image)), std::move(caption)};
 }
 
 }  // namespace panonav::command

@@ -1,13 +1,13 @@
 #pragma once
 
-#include <filesystem>
-#include <optional>
+#include <string>
 #include <vector>
 
 #include "panonav/localisation/hierarchical.hpp"
 #include "panonav/localisation/localiser.hpp"
 #include "panonav/memory/visual_memory.hpp"
 #include "reporting/plot.hpp"
+#include "reports/report_page.hpp"
 
 namespace panonav::command {
 
@@ -19,16 +19,22 @@ struct AskedView {
 };
 
 /// True places, and a line from each to where the memory says it is, over the layers of the scene.
-void draw_answers(const VisualMemory& memory, const std::vector<MapLayer>& scene,
-                  const std::vector<AskedView>& asked, const std::filesystem::path& path);
+[[nodiscard]] MapPlot map_of_answers(const VisualMemory& memory, const std::vector<MapLayer>& scene,
+                                     const std::vector<AskedView>& asked);
 
-/// Where the robot may be after 1, 3, 6 and all components, side by side [M04 figure 9]. Gives the
-/// areas of these levels in square metres.
-std::vector<double> draw_areas(const VisualMemory& memory, const std::vector<MapLayer>& scene,
-                               const AskedView& asked, const std::filesystem::path& path);
+/// Where the robot may be after each number of components [M04 figure 9].
+struct AreasShown {
+  UnfoldingMap map;
+  std::vector<double> areas_m2;  ///< of the frames
+};
+[[nodiscard]] AreasShown map_of_areas(const VisualMemory& memory,
+                                      const std::vector<MapLayer>& scene, const AskedView& asked);
 
 /// How similar every remembered view is to the one asked for [M04 figure 8].
-void draw_similarity(const VisualMemory& memory, double spacing_m, const AskedView& asked,
-                     const std::filesystem::path& path);
+[[nodiscard]] HeatMap map_of_similarity(const VisualMemory& memory, double spacing_m,
+                                        const AskedView& asked);
+
+/// A picture that stands in the page itself.
+[[nodiscard]] ReportPicture picture_in_page(ImageView image, std::string caption);
 
 }  // namespace panonav::command

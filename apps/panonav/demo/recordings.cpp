@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 /// Says that the folder is a demo's; written first, so that an interrupted demo can be run again.
 constexpr std::string_view mark = "made_by_panonav_demo.txt";
 
-/// Everything else that a demo makes.
+/// Everything else that a demo makes, or made in earlier versions.
 constexpr std::array<std::string_view, 32> made{"memory_run",
                                                 "query_run",
                                                 "elsewhere_run",
@@ -63,17 +63,14 @@ struct PlannedRun {
 };
 
 PlannedRun plan(SimulatedWorld world) {
-  const auto& settled = world.arguments();
-  auto poses =
-      plan_recording(world.scene(), world.free_space(), settled.recording, settled.odometry,
-                     static_cast<std::uint64_t>(settled.simulation.scene.seed));
-  const bool with_path = settled.recording.path != RecordingPath::random;
+  auto poses = world.plan();
+  const bool with_path = world.options().recording.path != RecordingPath::random;
   return {std::move(world), std::move(poses), with_path};
 }
 
-SimulatedWorld world_of(const std::string& scene, const SimulationArguments& wanted,
+SimulatedWorld world_of(const std::string& scene, const SimulatedWorldOptions& wanted,
                         Executor& executor) {
-  return {scene, wanted, [](const std::string&, const std::string&) { return false; }, executor};
+  return {scene, wanted, [](const auto&, const auto&) { return std::nullopt; }, executor};
 }
 
 /// Sees the same with half as many pixels each way.
@@ -121,16 +118,14 @@ PlannedRun drive_through(const SimulatedWorld& world, double spacing_m, int seed
   SimulatedWorld there = world.with(
       {.path = RecordingPath::tour, .heading = RecordingHeading::path, .spacing_m = spacing_m},
       seed);
-  const SimulationArguments& settled = there.arguments();
-  auto poses = plan_recording(there.scene(), there.free_space(), settled.recording,
-                              settled.odometry, static_cast<std::uint64_t>(seed), way_points);
+  auto poses = there.plan(way_points);
   return {std::move(there), std::move(poses), true};
 }
 
 }  // namespace
 
-SimulationArguments simulation_of(const DemoOptions& options, int stream) {
-  SimulationArguments wanted;
+SimulatedWorldOptions simulation_of(const DemoOptions& options, int stream) {
+  SimulatedWorldOptions wanted;
   wanted.simulation.scene.seed = static_cast<int>(3 * (options.seed % 100000000) + stream);
   wanted.simulation.scene.scene_seed = static_cast<int>(options.seed % 1000000000);
   // One ray a pixel: unwrapping averages over pixels, and it takes a third of the time.
@@ -164,7 +159,7 @@ void prepare_demo_folder(const fs::path& out) {
 
 std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& session) {
   Executor& executor = session.executor();
-  SimulationArguments grid = simulation_of(options, 0);
+  SimulatedWorldOptions grid = simulation_of(options, 0);
   grid.recording.path = RecordingPath::grid;
   grid.recording.spacing_m = options.spacing_m();
   const RecordingOptions anywhere{.path = RecordingPath::random,
@@ -239,7 +234,7 @@ std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& s
   auto in_colour = std::make_shared<const Renderer>(office.world.scene(),
                                                     RendererOptions{.channels = 3}, executor);
   recordings.colour_picture = [renderer = std::move(in_colour),
-                               frame = office.world.arguments().frame, sensor = grid.sensor,
+                               frame = office.world.options().frame, sensor = grid.sensor,
                                seen_by = recordings.true_camera](const DatasetEntry& entry,
                                                                  Executor& threads) {
     const Viewpoint viewpoint{.pose = {entry.pose->x_m, entry.pose->y_m, *entry.pose->heading_rad},

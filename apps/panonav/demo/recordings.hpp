@@ -51,7 +51,7 @@ struct DemoRecordings {
 
 /// How the demonstration's camera sees its office. `stream` tells the noise of different robots
 /// apart.
-[[nodiscard]] SimulationArguments simulation_of(const DemoOptions& options, int stream);
+[[nodiscard]] SimulatedWorldOptions simulation_of(const DemoOptions& options, int stream);
 
 /// Makes the folder, or clears away what an earlier demo made in it and nothing else. Throws
 /// FileError when it holds anything and was not made by a demo, or cannot be written.

@@ -3,24 +3,23 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <optional>
+#include <vector>
 
 #include "experiments/runs/surroundings.hpp"
 #include "panonav/core/statistics.hpp"
+#include "panonav/simulation/recording.hpp"
 #include "reporting/picture_plot.hpp"
 #include "reporting/plot.hpp"
+#include "verbs/shown_references.hpp"
 
 namespace panonav::command {
 
 namespace {
 
-void draw_runs(const Scene& office, std::span<const Pose2> way, const std::vector<RouteRun>& runs,
-               const std::filesystem::path& path) {
-  MapPlot map{.title = "A route through the office", .layers = scene_layers(office)};
-  std::ranges::move(route_layers(way, runs), std::back_inserter(map.layers));
-  write_plot(path, map);
-}
+constexpr double seconds_a_look = 0.3;
 
-void draw_panorama(const RoutePanorama& route, const std::filesystem::path& path) {
+PicturePlot picture_of(const RoutePanorama& route) {
   const auto columns = static_cast<std::size_t>(route.columns());
   PicturePlot plot{.title = "What the robot remembers of the route",
                    .x_label = "azimuth from straight ahead [degrees], left positive",
@@ -37,13 +36,41 @@ void draw_panorama(const RoutePanorama& route, const std::filesystem::path& path
       plot.values.push_back(static_cast<float>(line[c]) / 255.0F);
     }
   }
-  write_plot(path, plot);
+  return plot;
+}
+
+/// The first run, line by line.
+RunPage played_run(const RouteScene& place, const RoutePanorama& panorama, const RouteRun& run,
+                   std::uint64_t seed, Executor& executor) {
+  RunPage page("A route is repeated", run.truth.size());
+  std::vector<RouteMark> marks;
+  for (std::size_t i = 0; i < run.truth.size(); ++i) {
+    const Pose2& truth = run.truth[i];
+    const auto& seen = run.sightings[i];
+    RunMoment moment{.stamp_s = seconds_a_look * static_cast<double>(i)};
+    moment.truth = ReferencePose{truth.x_m, truth.y_m, truth.heading_rad};
+    moment.sure = seen.has_value();
+    moment.state = seen ? "on the route" : "off the route";
+    moment.values.emplace_back("beside the route", fixed(100.0 * run.lateral_m[i], 1) + " cm");
+    if (seen) moment.pose = seen->pose;
+    moment.panorama = take_panorama(
+        *place.renderer, truth, {.rows = 40, .columns = 256, .rays_per_axis = 1},
+        {.camera_height_m = place.scene.camera_height_m}, place.camera.sensor, seed, executor);
+    if (i == 0) {
+      moment.walls = walls_of(place.scene);
+      moment.plan.assign(panorama.poses().begin(), panorama.poses().end());
+    }
+    page.add(moment);
+    marks.push_back({.along_m = seen ? std::optional(seen->along_m) : std::nullopt});
+  }
+  page.route(picture_of(panorama), marks);
+  return page;
 }
 
 }  // namespace
 
-DemoRoute show_route(const Scene& office, double length_m, std::uint64_t seed,
-                     const std::filesystem::path& out, Session& session, ReportPage& page) {
+DemoRoute show_route(const Scene& office, double length_m, std::uint64_t seed, Session& session,
+                     ReportPage& page) {
   constexpr double spacing_m = 0.1;
   Executor& executor = session.executor();
   RouteScene place = make_route_scene(office, "office", executor);
@@ -70,8 +97,8 @@ DemoRoute show_route(const Scene& office, double length_m, std::uint64_t seed,
     }
     route.position_m.insert(route.position_m.end(), run.position_m.begin(), run.position_m.end());
   }
-  draw_panorama(panorama, out / "route_panorama.svg");
-  draw_runs(office, way, route.runs, out / "route.svg");
+  MapPlot map{.title = "The route, and both drives", .layers = scene_layers(office)};
+  std::ranges::move(route_layers(way, route.runs), std::back_inserter(map.layers));
 
   const auto median_cm = [](const std::vector<double>& values) {
     return values.empty() ? std::string("none") : fixed(100.0 * median(values), 1) + " cm";
@@ -94,16 +121,17 @@ DemoRoute show_route(const Scene& office, double length_m, std::uint64_t seed,
                 {median_cm(route.position_m), "median error of the position"},
                 {fixed(1e-3 * static_cast<double>(route.bytes), 0) + " kB",
                  "what the route takes, before packing"}});
-  page.pictures(
-      {{"route_panorama.svg",
-        "All that the robot keeps of the route. Each row is what it saw at one place, all around, "
-        "straight ahead in the middle: the start is the lowest row, the end the highest. A thing "
-        "that the robot passes is a curve that begins in the middle and runs out to a side; bends "
-        "of the way shift all curves together."},
-       {"route.svg",
-        "The remembered route in black, under both drives: one there, one back. Each was put down "
-        "at a circle, 0.3 m beside the route, and comes to it by itself; where only one colour is "
-        "seen the drives lie on the route."}});
+  page.text(
+      "Below is the first of them. The striped picture is all that the robot keeps of the route: "
+      "each row is what it saw at one place, all around, straight ahead in the middle; the start "
+      "is the lowest row, the end the highest. A thing that the robot passes is a curve that "
+      "begins in the middle and runs out to a side. The mark says which row it is at by what it "
+      "sees.");
+  page.run(played_run(place, panorama, route.runs.front(), seed, executor));
+  page.plots({{map,
+               "The remembered route in black, under both drives: one there, one back. Each was "
+               "put down at a circle, 0.3 m beside the route, and comes to it by itself; where "
+               "only one colour is seen the drives lie on the route."}});
   return route;
 }
 

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 
 #include "cli/session.hpp"
 #include "experiments/y03/routes.hpp"
@@ -19,9 +18,9 @@ struct DemoRoute {
   std::vector<double> position_m;  ///< errors of the fixes
 };
 
-/// Records and repeats it and adds a section with its pictures to the page. The same seed gives the
-/// same runs.
-DemoRoute show_route(const Scene& office, double length_m, std::uint64_t seed,
-                     const std::filesystem::path& out, Session& session, ReportPage& page);
+/// Records and repeats it and adds a part that plays it to the page. The same seed gives the same
+/// runs.
+DemoRoute show_route(const Scene& office, double length_m, std::uint64_t seed, Session& session,
+                     ReportPage& page);
 
 }  // namespace panonav::command

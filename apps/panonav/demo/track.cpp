@@ -1,16 +1,14 @@
 #include "demo/track.hpp"
 
-#include <filesystem>
-#include <set>
 #include <string>
 #include <utility>
 
 #include "experiments/runs/surroundings.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/positions.hpp"
-#include "reports/track_animation.hpp"
 #include "reports/track_pictures.hpp"
 #include "reports/track_report.hpp"
+#include "verbs/shown_references.hpp"
 #include "verbs/tracked_run.hpp"
 
 namespace panonav::command {
@@ -46,29 +44,48 @@ DemoTrack outcome_of(const std::vector<TrackedImage>& images, std::size_t kidnap
   return track;
 }
 
-/// The first images, those around which it is localised, kidnapped and found again.
-std::set<std::size_t> moments_of(const DemoTrack& track, std::size_t kidnapped_after) {
-  std::set<std::size_t> moments{0, kidnapped_after + 1};
-  if (track.until_localised) {
-    moments.insert(*track.until_localised / 2);
-    moments.insert(*track.until_localised - 1);
+/// What happened at an image, for people.
+std::string frame_title(const TrackedImage& image, std::size_t kidnapped_after, double within_m) {
+  const std::string number = "picture " + std::to_string(image.index + 1) + ": ";
+  if (image.index == kidnapped_after + 1) return number + "carried away";
+  switch (image.estimate.state) {
+    case LocalisationState::localised:
+      return number + (is_right(image, within_m) ? "it knows where it is" : "it has not noticed");
+    case LocalisationState::ambiguous:
+      return number + "it may be in several places";
+    case LocalisationState::lost:
+      break;
   }
-  if (track.until_found_again) moments.insert(kidnapped_after + *track.until_found_again);
-  return moments;
+  return number + "it does not know where it is";
 }
 
-std::string images_text(const std::optional<std::size_t>& images) {
-  return images ? std::to_string(*images) + (*images == 1 ? " picture" : " pictures") : "never";
+/// The particles gather: few of them, so that they fit into a small picture.
+UnfoldingMap gathering_of(const std::vector<TrackedImage>& images,
+                          const std::vector<Point2>& at_first, std::vector<MapLayer> scene,
+                          std::size_t kidnapped_after, double within_m) {
+  UnfoldingMap map{.title = "", .backdrop = std::move(scene)};
+  const MapLayer everywhere{
+      .label = "where it may be", .colour = PlotColour::vermilion, .dots = at_first};
+  map.frames.push_back({.title = "before the first picture", .layers = {everywhere}});
+  for (const TrackedImage& image : images) {
+    MapLayer particles = everywhere;
+    particles.dots = positions_of(image.particles);
+    const MapLayer truth{
+        .label = "where it is", .colour = PlotColour::black, .circles = {image.truth->position()}};
+    map.frames.push_back(
+        {.title = frame_title(image, kidnapped_after, within_m), .layers = {particles, truth}});
+  }
+  return map;
 }
 
 void add_part(const DemoTrack& track, double spacing_m, std::size_t kidnapped_after,
-              ReportPage& page) {
+              const RunPage& played, const MapPlot& whole, ReportPage& page) {
   const std::string median_text =
       track.errors_m.empty() ? "none" : fixed(100.0 * median(track.errors_m), 1) + " cm";
   page.part("It tracks itself",
-            {images_text(track.until_localised), "until a robot knew which of " +
-                                                     std::to_string(track.places_at_first) +
-                                                     " places it was at, several of them alike"});
+            {pictures_text(track.until_localised), "until a robot knew which of " +
+                                                       std::to_string(track.places_at_first) +
+                                                       " places it was at, several of them alike"});
   page.text(
       "A corridor with identical doors and eight identical junctions. The robot does not know "
       "where it is, nor which way it faces, and it starts in one of two narrow crossings: its plan "
@@ -80,25 +97,25 @@ void add_part(const DemoTrack& track, double spacing_m, std::size_t kidnapped_af
             " pictures somebody carries the robot to the other crossing and tells it nothing. It "
             "counts as localised when it says so and is right to " +
             fixed(100.0 * spacing_m, 0) + " cm.");
-  page.figures({{std::to_string(track.places_at_first), "places possible after the first picture"},
-                {images_text(track.until_localised), "until it was localised"},
-                {images_text(track.until_found_again), "until it was found again, once kidnapped"},
-                {median_text, "median error where it says that it is localised"},
-                {std::to_string(track.wrong) + " of " + std::to_string(track.localised),
-                 "of these answers wrong; a kidnapped robot needs some pictures to notice"}});
-  page.pictures(
-      {{"particles.svg",
-        "From the top left: before the first picture the particles are everywhere; then they "
-        "gather; then the robot is localised, kidnapped, and found again. Black cross: where it "
-        "is; square: where it says that it is, orange while it is not sure."}});
-  page.pictures(
-      {{"tracked.svg",
-        "The whole run. The true way in black begins anew where the robot was put down; the "
-        "estimated one in blue lies on it, but for the pictures after it was kidnapped."}});
-  page.link("track.html", "Play the run, image by image");
+  page.figures(
+      {{std::to_string(track.places_at_first), "places possible after the first picture"},
+       {pictures_text(track.until_localised), "until it was localised"},
+       {pictures_text(track.until_found_again), "until it was found again, once kidnapped"},
+       {median_text, "median error where it says that it is localised"},
+       {std::to_string(track.wrong) + " of " + std::to_string(track.localised),
+        "of these answers wrong; a kidnapped robot needs some pictures to notice"}});
+  page.run(played);
+  page.plots({{whole,
+               "The whole run. The true way in black begins anew where the robot was put down; the "
+               "estimated one in blue lies on it, but for the pictures after it was kidnapped."}});
 }
 
 }  // namespace
+
+std::string pictures_text(const std::optional<std::size_t>& pictures) {
+  return pictures ? std::to_string(*pictures) + (*pictures == 1 ? " picture" : " pictures")
+                  : "never";
+}
 
 DemoTrack show_track(const DemoOptions& options, const DemoRecordings& recordings,
                      const MemoryFile& file, Session& session, ReportPage& page) {
@@ -112,17 +129,22 @@ DemoTrack show_track(const DemoOptions& options, const DemoRecordings& recording
   const std::vector<Point2> at_first =
       positions_of(even_sample(tracker.localiser().particles(), particles_kept));
   std::vector<TrackedImage> images;
-  track(tracker, run, {.particles_kept = particles_kept}, session.executor(),
-        [&](TrackedImage&& image) { images.push_back(std::move(image)); });
+  RunPage played("A robot that is kidnapped", run.entries.size());
+  const ShownReferences shown(memory);
+  track(tracker, run, {.particles_kept = particles_kept, .recorded = &file, .shown = &shown},
+        session.executor(), [&](TrackedImage&& image) {
+          if (image.index == 0) image.moment->walls = walls_of(recordings.corridor_scene);
+          add(played, image);
+          image.moment.reset();
+          images.push_back(std::move(image));
+        });
   DemoTrack result = outcome_of(images, recordings.kidnapped_after, options.spacing_m());
   result.places_at_first = images.front().estimate.modes.size();
-  const TrackBackground background{scene_layers(recordings.corridor_scene),
-                                   recordings.kidnapped_after};
-  draw_track_snapshots(memory, images, moments_of(result, recordings.kidnapped_after), background,
-                       options.out / "particles.svg", at_first);
-  draw_track_map(memory, images, background, options.out / "tracked.svg");
-  write_track_animation(options.out / "track.html", memory, options.spacing_m(), images);
-  add_part(result, options.spacing_m(), recordings.kidnapped_after, page);
+  const std::vector<MapLayer> scene = scene_layers(recordings.corridor_scene);
+  result.gathering =
+      gathering_of(images, at_first, scene, recordings.kidnapped_after, options.spacing_m());
+  add_part(result, options.spacing_m(), recordings.kidnapped_after, played,
+           track_map(memory, images, {scene, recordings.kidnapped_after}), page);
   return result;
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "cli/session.hpp"
@@ -24,10 +25,14 @@ struct DemoTrack {
   std::size_t localised = 0;     ///< images at which it says so
   std::size_t wrong = 0;         ///< of these, farther off than the spacing
   std::vector<double> errors_m;  ///< of these, right or wrong
+  UnfoldingMap gathering;        ///< the particles, picture by picture
 };
 
-/// Tracks it by Monte-Carlo localisation and adds a part with pictures and an animation to the
-/// page. The same seed gives the same run.
+/// "9 pictures", or "never".
+[[nodiscard]] std::string pictures_text(const std::optional<std::size_t>& pictures);
+
+/// Tracks it by Monte-Carlo localisation and adds a part that plays the run to the page. The same
+/// seed gives the same run.
 DemoTrack show_track(const DemoOptions& options, const DemoRecordings& recordings,
                      const MemoryFile& file, Session& session, ReportPage& page);
 

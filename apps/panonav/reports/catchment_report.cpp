@@ -5,6 +5,7 @@
 #include <functional>
 #include <limits>
 
+#include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "reporting/plot.hpp"
 #include "reports/report_page.hpp"
@@ -12,10 +13,6 @@
 namespace panonav::command {
 
 namespace {
-
-namespace fs = std::filesystem;
-
-constexpr const char* homeward_file = "homeward.svg";
 
 /// Places as cells of a raster of their spacing. Places that share a cell show the last one.
 HeatMap raster(const std::vector<Pose2>& places, double spacing_m,
@@ -47,7 +44,7 @@ HeatMap raster(const std::vector<Pose2>& places, double spacing_m,
   return map;
 }
 
-void draw_curves(const CatchmentResult& result, const fs::path& folder) {
+std::vector<ReportPlot> curves(const CatchmentResult& result) {
   Series homeward{.label = "", .style = SeriesStyle::lines_and_points};
   Series orientation{.label = "", .style = SeriesStyle::lines_and_points};
   for (const CatchmentBin& bin : result.bins) {
@@ -55,30 +52,34 @@ void draw_curves(const CatchmentResult& result, const fs::path& folder) {
     homeward.add(bin.homeward.distance_m, bin.homeward.component);
     orientation.add(bin.homeward.distance_m, degrees(bin.orientation_error_rad));
   }
-  write_plot(folder / homeward_file, LinePlot{.title = "Average homeward component",
-                                              .x_label = "distance from home [m]",
-                                              .y_label = "homeward component",
-                                              .series = {homeward},
-                                              .y_range = std::pair{-0.2, 1.0}});
-  write_plot(folder / "orientation.svg",
-             LinePlot{.title = "Error of the heading",
-                      .x_label = "distance from home [m]",
-                      .y_label = "circular standard deviation [degrees]",
-                      .series = {orientation}});
   Series areas{.label = "", .style = SeriesStyle::lines_and_points};
   const auto places = static_cast<double>(result.survey.places.size());
   for (std::size_t i = 0; i < result.areas.size(); ++i) {
     areas.add(result.accepted_m[i], 100.0 * result.areas[i] / places);
   }
-  write_plot(folder / "areas.svg", LinePlot{.title = "Mean catchment area",
-                                            .x_label = "accepted distance from home [m]",
-                                            .y_label = "share of all places [%]",
-                                            .series = {areas},
-                                            .y_range = std::pair{0.0, 100.0}});
+  return {{LinePlot{.title = "Average homeward component",
+                    .x_label = "distance from home [m]",
+                    .y_label = "homeward component",
+                    .series = {homeward},
+                    .y_range = std::pair{-0.2, 1.0}},
+           "Cosine between home vector and true direction: 1 straight home, 0 chance "
+           "[S06 figure 10]"},
+          {LinePlot{.title = "Error of the heading",
+                    .x_label = "distance from home [m]",
+                    .y_label = "circular standard deviation [degrees]",
+                    .series = {orientation}},
+           "Error of the heading that comes with it [S06 figure 8]"},
+          {LinePlot{.title = "Mean catchment area",
+                    .x_label = "accepted distance from home [m]",
+                    .y_label = "share of all places [%]",
+                    .series = {areas},
+                    .y_range = std::pair{0.0, 100.0}},
+           "Runs from place to place: share of starts from which a run ends within a distance of "
+           "home [S06 figure 11]"}};
 }
 
-void draw_field(const RecordedViews& places, const std::vector<HomeVector>& vectors,
-                const CatchmentResult& result, std::size_t goal, const fs::path& path) {
+MapPlot field(const RecordedViews& places, const std::vector<HomeVector>& vectors,
+              const CatchmentResult& result, std::size_t goal) {
   const double side_m = 0.5 * result.spacing_m;
   const double arrow_m = 0.8 * result.spacing_m;
   MapLayer inside{.label = "catchment area", .colour = PlotColour::green};
@@ -92,29 +93,24 @@ void draw_field(const RecordedViews& places, const std::vector<HomeVector>& vect
                                         {place.x_m + side_m, place.y_m + side_m},
                                         {place.x_m - side_m, place.y_m + side_m}});
     }
-    arrows.dots.push_back(place.position());
-    if (!(vectors[p].length() > 0.0)) continue;
-    const double towards = place.heading_rad + vectors[p].direction_rad();
+    if (!(vectors[p].length() > 0.0)) {
+      arrows.dots.push_back(place.position());
+      continue;
+    }
     arrows.lines.push_back(
-        {place.position(),
-         {place.x_m + arrow_m * std::cos(towards), place.y_m + arrow_m * std::sin(towards)}});
+        arrow({place.x_m, place.y_m, place.heading_rad + vectors[p].direction_rad()}, arrow_m));
   }
   const MapLayer home{.label = "home",
                       .colour = PlotColour::black,
                       .squares = {result.survey.goals[goal].position()}};
-  write_plot(path, MapPlot{.title = "Home vectors from above", .layers = {inside, arrows, home}});
+  return {.title = "Home vectors from above", .layers = {inside, arrows, home}};
 }
 
 }  // namespace
 
-void prepare_catchment_report(const fs::path& folder) {
-  prepare_report_folder(folder, homeward_file, "catchment");
-}
-
-void write_catchment_report(const fs::path& folder, const RecordedViews& goals,
+void write_catchment_report(const std::filesystem::path& folder, const RecordedViews& goals,
                             const RecordedViews& places, const CatchmentResult& result,
                             const FourierHomingOptions& homing, std::size_t goal) {
-  draw_curves(result, folder);
   const double accepted_m = result.spacing_m;
   const auto count = static_cast<double>(result.survey.places.size());
   auto sizes = raster(result.survey.goals, result.spacing_m, [&](std::size_t g) {
@@ -122,7 +118,6 @@ void write_catchment_report(const fs::path& folder, const RecordedViews& goals,
   });
   sizes.title = "Catchment area of the view at each place";
   sizes.value_label = "share of all places [%]";
-  write_plot(folder / "catchment.svg", sizes);
 
   std::vector<HomeVector> vectors;
   std::vector<double> differences;
@@ -130,20 +125,17 @@ void write_catchment_report(const fs::path& folder, const RecordedViews& goals,
     vectors.push_back(home_vector(goals.views[goal], view, homing));
     differences.push_back(image_difference(goals.views[goal], view, homing.highest));
   }
-  draw_field(places, vectors, result, goal, folder / "field.svg");
   auto difference =
       raster(result.survey.places, result.spacing_m, [&](std::size_t p) { return differences[p]; });
   difference.title = "Difference from the view at home (cross)";
   difference.value_label = "image difference, 0 to 1";
   difference.crosses = {result.survey.goals[goal].position()};
-  write_plot(folder / "difference.svg", difference);
   auto ends = raster(result.survey.places, result.spacing_m, [&](std::size_t p) {
     return static_cast<double>(result.final_m[goal * places.views.size() + p]);
   });
   ends.title = "Where runs home end, by where they start (home: cross)";
   ends.value_label = "distance from home at the end [m]";
   ends.crosses = difference.crosses;
-  write_plot(folder / "ends.svg", ends);
 
   ReportPage page("From how far do views lead home?",
                   "Every view of a recording as a home, every view of " +
@@ -157,20 +149,15 @@ void write_catchment_report(const fs::path& folder, const RecordedViews& goals,
        {fixed(result.areas[1], 1) + " of " + std::to_string(result.survey.places.size()),
         "places from which runs end within " + fixed(result.spacing_m, 2) + " m"}});
   page.section("Against the distance");
-  page.pictures({{homeward_file,
-                  "Cosine between home vector and true direction: 1 straight home, "
-                  "0 chance [S06 figure 10]"},
-                 {"orientation.svg", "Error of the heading that comes with it [S06 figure 8]"},
-                 {"areas.svg",
-                  "Runs from place to place: share of starts from which a run ends "
-                  "within a distance of home [S06 figure 11]"}});
+  page.plots(curves(result));
   page.section("Place by place");
-  page.pictures({{"catchment.svg", "Share of all places from which runs end within " +
-                                       fixed(result.spacing_m, 2) + " m of home, home by home"}});
+  page.plots({{sizes, "Share of all places from which runs end within " +
+                          fixed(result.spacing_m, 2) + " m of home, home by home"}});
   page.section("One home: " + goals.files[goal]);
-  page.pictures({{"field.svg", "Home vectors, and the catchment area [S06 figure 9]"},
-                 {"difference.svg", "How far views differ from home's [S06 figure 9]"},
-                 {"ends.svg", "How far from home runs end [S06 figure 14]"}});
+  page.plots({{field(places, vectors, result, goal),
+               "Home vectors, and the catchment area [S06 figure 9]"},
+              {difference, "How far views differ from home's [S06 figure 9]"},
+              {ends, "How far from home runs end [S06 figure 14]"}});
   page.section("Numbers");
   std::vector<std::vector<std::string>> rows;
   for (const CatchmentBin& bin : result.bins) {
@@ -179,7 +166,7 @@ void write_catchment_report(const fs::path& folder, const RecordedViews& goals,
                     fixed(degrees(bin.orientation_error_rad), 1)});
   }
   page.table({"distance [m]", "pairs", "homeward component", "heading error [degrees]"}, rows);
-  page.write(folder);
+  page.write(folder, "index.html", "panonav catchment");
 }
 
 }  // namespace panonav::command

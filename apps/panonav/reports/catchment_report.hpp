@@ -2,12 +2,9 @@
 
 #include <filesystem>
 
-#include "verbs/catchment_survey.hpp"
+#include "panonav/pipeline/catchment_survey.hpp"
 
 namespace panonav::command {
-
-/// Makes the folder. Throws FileError when something else is there.
-void prepare_catchment_report(const std::filesystem::path& folder);
 
 /// Writes index.html, curves, and maps of all catchment areas and of the view number `goal`. Throws
 /// FileError.

@@ -2,23 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <set>
 
 #include "cli/session.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/voronoi.hpp"
-#include "panonav/io/image_file.hpp"
 #include "reporting/plot.hpp"
-#include "reports/home_picture.hpp"
 #include "reports/report_page.hpp"
 
 namespace panonav::command {
 
 namespace {
-
-namespace fs = std::filesystem;
-
-constexpr const char* first_picture = "home_1.png";
 
 /// First, last and evenly between.
 std::set<std::size_t> shown_of(std::size_t count) {
@@ -46,7 +41,8 @@ double arrow_length_m(const std::vector<HomeAnswer>& answers) {
   return places.size() < 2 ? 1.0 : 0.8 * VoronoiCells(places).spacing_m();
 }
 
-bool draw_field(const Goal& goal, const std::vector<HomeAnswer>& answers, const fs::path& path) {
+/// Empty where nothing is known of positions.
+std::optional<MapPlot> field(const Goal& goal, const std::vector<HomeAnswer>& answers) {
   MapLayer arrows{.label = "way home", .colour = PlotColour::blue};
   MapLayer silent{.label = "no direction", .colour = PlotColour::vermilion};
   const double length_m = arrow_length_m(answers);
@@ -58,24 +54,40 @@ bool draw_field(const Goal& goal, const std::vector<HomeAnswer>& answers, const 
       continue;
     }
     const double towards = *answer.pose->heading_rad + *answer.way.direction_rad;
-    arrows.dots.push_back(at);
-    arrows.lines.push_back(
-        {at, {at.x_m + length_m * std::cos(towards), at.y_m + length_m * std::sin(towards)}});
+    arrows.lines.push_back(arrow({at.x_m, at.y_m, towards}, length_m));
   }
-  if (arrows.lines.empty()) return false;
+  if (arrows.lines.empty()) return std::nullopt;
   MapLayer home{.label = "home", .colour = PlotColour::black};
   if (goal.pose) home.squares.push_back(goal.pose->position());
-  write_plot(path, MapPlot{.title = "Home vectors from above", .layers = {arrows, silent, home}});
-  return true;
+  return MapPlot{.title = "Home vectors from above", .layers = {arrows, silent, home}};
+}
+
+/// The view at home, turned as if the robot there faced the same way as here, above the current
+/// one.
+std::vector<ReportView> views_of(const std::optional<Panorama>& home, const Panorama& current,
+                                 const HomeAnswer& answer) {
+  const HomeVector& found = answer.way.vector;
+  std::vector<ViewMark> marks{{.azimuth_rad = 0.0, .colour = PlotColour::grey}};
+  if (answer.way.direction_rad) {
+    const double towards = found.direction_rad();
+    marks.push_back({.azimuth_rad = towards, .colour = PlotColour::vermilion, .through = true});
+    marks.push_back({.azimuth_rad = wrap_angle(towards + std::numbers::pi),
+                     .colour = PlotColour::blue,
+                     .through = true});
+  }
+  std::vector<ReportView> views;
+  if (home) {  // the robot at home turns to the current heading
+    const double columns = -found.heading_rad / (2.0 * std::numbers::pi) * home->columns();
+    views.push_back({turn_columns(*home, static_cast<int>(std::lround(columns))), marks,
+                     "At home, turned alike"});
+  }
+  views.push_back({current, marks, caption_of(answer)});
+  return views;
 }
 
 }  // namespace
 
-void prepare_home_report(const fs::path& folder) {
-  prepare_report_folder(folder, first_picture, "home");
-}
-
-void write_home_report(const fs::path& folder, const Goal& goal,
+void write_home_report(const std::filesystem::path& folder, const Goal& goal,
                        const std::vector<HomeAnswer>& answers,
                        const std::function<Panorama(std::size_t)>& current) {
   ReportPage page("The way home",
@@ -99,22 +111,16 @@ void write_home_report(const fs::path& folder, const Goal& goal,
                       ? "Above, the view at home, turned as if the robot there faced the same way "
                         "as here; below, what it sees now. "
                       : "") +
-      "Forward is in the middle (grey). Orange: the direction home, where things spread out on the "
+      "Forward is in the middle (grey mark). Orange: the direction home, where things spread out "
+      "on the "
       "way; blue: the opposite one, where they close up.");
-  std::vector<ReportPicture> pictures;
   for (const std::size_t i : shown_of(answers.size())) {
-    const std::string file = "home_" + std::to_string(pictures.size() + 1) + ".png";
-    const Image picture = picture_of_homing(goal.panorama, current(i), answers[i].way.vector,
-                                            answers[i].way.direction_rad.has_value());
-    write_png(folder / file, picture.view());
-    pictures.push_back({file, caption_of(answers[i])});
+    page.views(views_of(goal.panorama, current(i), answers[i]));
   }
-  page.pictures(pictures);
-  if (draw_field(goal, answers, folder / "field.svg")) {
+  if (const auto vectors = field(goal, answers)) {
     page.section("From above");
-    page.pictures({{"field.svg",
-                    "The direction home at each place whose position and heading are "
-                    "known"}});
+    page.plots(
+        {{*vectors, "The direction home at each place whose position and heading are known"}});
   }
   page.section("Numbers");
   std::vector<std::vector<std::string>> rows;
@@ -131,7 +137,7 @@ void write_home_report(const fs::path& folder, const Goal& goal,
   page.table({"view", "direction home", "distance [R]", "turned [degrees]", "correlation",
               "residual", "probability"},
              rows);
-  page.write(folder);
+  page.write(folder, "index.html", "panonav home");
 }
 
 }  // namespace panonav::command

@@ -8,9 +8,6 @@
 
 namespace panonav::command {
 
-/// Makes the folder. Throws FileError when something else is there.
-void prepare_home_report(const std::filesystem::path& folder);
-
 /// Writes index.html and its pictures: both views turned into one frame with the way home, and
 /// where positions are known all home vectors from above. `current(i)` reads the panorama of answer
 /// i. Throws FileError.

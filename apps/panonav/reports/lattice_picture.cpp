@@ -72,32 +72,45 @@ std::optional<LatticeComparison> compare_with_ground_truth(const Lattice& lattic
   return comparison;
 }
 
-void write_lattice_picture(const std::filesystem::path& path, const Lattice& lattice,
-                           const VisualMemory& memory) {
+bool is_known(const Lattice& lattice, const VisualMemory& memory) {
   const Known known = known_of(lattice, memory);
-  const bool comparable = is_comparable(known.arranged, known.truth);
+  return is_comparable(known.arranged, known.truth);
+}
+
+std::vector<std::optional<Point2>> places_of(const Lattice& lattice, const VisualMemory& memory) {
+  const Known known = known_of(lattice, memory);
   Alignment truth_from_lattice;
-  if (comparable) {
+  if (is_comparable(known.arranged, known.truth)) {
     truth_from_lattice =
         align(known.arranged, known.truth, {.allow_scale = true, .allow_reflection = true});
   }
-  std::vector<std::optional<Point2>> arranged;
+  std::vector<std::optional<Point2>> places;
+  for (const LatticeNode& node : lattice.nodes) {
+    places.emplace_back();
+    if (node.component == 0) places.back() = truth_from_lattice.apply(node.pose.position());
+  }
+  return places;
+}
+
+std::vector<MapPlot> lattice_plots(const Lattice& lattice, const VisualMemory& memory) {
+  MapPlot map = plot_of("as the views arrange themselves", lattice, places_of(lattice, memory));
+  if (!is_known(lattice, memory)) {
+    if (!lattice.metric) map.unit = "median distance to the nearest view";
+    return {map};
+  }
   std::vector<std::optional<Point2>> truth;
   for (const LatticeNode& node : lattice.nodes) {
-    arranged.emplace_back();
     truth.emplace_back();
-    if (node.component != 0) continue;
-    arranged.back() = truth_from_lattice.apply(node.pose.position());
     const auto& pose = memory.info(node.view).pose;
-    if (pose) truth.back() = pose->position();
+    if (node.component == 0 && pose) truth.back() = pose->position();
   }
-  MapPlot map = plot_of("as the views arrange themselves", lattice, arranged);
-  if (!comparable) {
-    if (!lattice.metric) map.unit = "median distance to the nearest view";
-    write_plot(path, map);
-    return;
-  }
-  write_plot(path, {plot_of("as they were taken", lattice, truth), map}, 2);
+  return {plot_of("as they were taken", lattice, truth), map};
+}
+
+void write_lattice_picture(const std::filesystem::path& path, const Lattice& lattice,
+                           const VisualMemory& memory) {
+  const auto plots = lattice_plots(lattice, memory);
+  write_plot(path, plots, static_cast<int>(plots.size()));
 }
 
 }  // namespace panonav::command

@@ -3,9 +3,11 @@
 #include <cstddef>
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 #include "panonav/mapping/lattice.hpp"
 #include "panonav/memory/visual_memory.hpp"
+#include "reporting/plot.hpp"
 
 namespace panonav::command {
 
@@ -22,6 +24,18 @@ struct LatticeComparison {
 /// Empty where fewer than three views have a position, or all are at one place.
 [[nodiscard]] std::optional<LatticeComparison> compare_with_ground_truth(
     const Lattice& lattice, const VisualMemory& memory);
+
+/// Whether the memory knows enough positions of the largest component to compare with.
+[[nodiscard]] bool is_known(const Lattice& lattice, const VisualMemory& memory);
+
+/// Places of the largest component's views, laid over the positions that the memory knows; empty
+/// for other views.
+[[nodiscard]] std::vector<std::optional<Point2>> places_of(const Lattice& lattice,
+                                                           const VisualMemory& memory);
+
+/// The largest component with its springs; where the memory knows positions, these stand before it.
+[[nodiscard]] std::vector<MapPlot> lattice_plots(const Lattice& lattice,
+                                                 const VisualMemory& memory);
 
 /// Draws the largest component with its springs; where the memory knows positions, the map is laid
 /// over them and they stand beside it. Throws what `write_plot` throws.

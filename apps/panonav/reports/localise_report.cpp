@@ -1,27 +1,22 @@
 #include "reports/localise_report.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <numbers>
+#include <utility>
 
 #include "panonav/core/statistics.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/io/image_file.hpp"
-#include "reporting/plot.hpp"
-#include "reports/home_picture.hpp"
-#include "reports/report_page.hpp"
+#include "panonav/pipeline/run_recorder.hpp"
+#include "viewer/report_page.hpp"
 
 namespace panonav::command {
 
 namespace {
 
-namespace fs = std::filesystem;
-
-constexpr const char* first_page_picture = "query_1.png";
-constexpr std::size_t max_shown = 20;
+constexpr std::size_t max_shown = 200;
 constexpr std::size_t max_rows = 500;
-constexpr std::size_t max_references = 5000;  // on a map
 
 std::string position_text(const PlacePosition& position) {
   return "x " + fixed(position.x_m, 2) + " m, y " + fixed(position.y_m, 2) + " m";
@@ -44,94 +39,33 @@ std::string answer_text(const LocalisedQuery& query) {
   return "near " + place.matches.front().name;
 }
 
-/// The picture above its best match, which is turned as the robot faced. Gives the caption.
-std::string draw_views(const fs::path& path, const MemoryFile& file, const Panorama& seen,
-                       const Place& place) {
-  std::vector<Panorama> views{seen};
-  std::string caption = "The picture.";
-  if (!place.matches.empty()) {
-    const PlaceMatch& best = place.matches.front();
-    if (const auto remembered = thumbnail_panorama(file, best.view)) {
-      const double turn_rad = best.heading_rad.value_or(0.0);
-      const double columns = turn_rad / (2.0 * std::numbers::pi) * remembered->columns();
-      views.push_back(turn_columns(*remembered, static_cast<int>(std::lround(columns))));
-      caption = "Above, the picture; below, the stored thumbnail of " + best.name + ", turned by " +
-                degrees_text(turn_rad) + " so that both look the same way.";
-    } else {
-      caption =
-          "The picture alone: the memory holds no thumbnail of the best match, " + best.name + ".";
+/// What the run shows of a picture. The first one brings the references.
+RunMoment moment_of(const LocalisedQuery& query, std::size_t number, Panorama&& seen,
+                    const MemoryFile& file) {
+  RunMoment moment{.stamp_s = static_cast<double>(number), .panorama = std::move(seen)};
+  moment.truth = query.pose;
+  const auto& matches = query.place.matches;
+  describe(moment, query.place);
+  moment.values = {{"picture", query.file}, {"answer", answer_text(query)}};
+  if (const auto& position = query.place.position) {
+    moment.values.emplace_back("position", position_text(*position));
+    if (position->radius_m) {
+      moment.values.emplace_back("95 % within", fixed(*position->radius_m, 2) + " m");
     }
   }
-  const Image picture = picture_of_views(views);
-  write_png(path, picture.view());
-  return caption;
-}
-
-/// False where the memory knows no positions.
-bool draw_map(const fs::path& path, const VisualMemory& memory, const LocalisedQuery& query) {
-  MapLayer references{.label = "references", .colour = PlotColour::grey};
-  const std::size_t step = memory.size() / max_references + 1;
-  for (std::size_t i = 0; i < memory.size(); i += step) {
-    const auto& pose = memory.info(memory.views()[i]).pose;
-    if (pose) references.dots.push_back(pose->position());
+  if (const auto& heading = query.place.heading_rad) {
+    moment.values.emplace_back("heading", degrees_text(*heading));
   }
-  if (references.dots.empty()) return false;
-  MapLayer others{.label = "next candidates", .colour = PlotColour::orange};
-  MapLayer best{.label = "best match", .colour = PlotColour::blue};
-  for (const PlaceMatch& match : query.place.matches) {
-    const auto& pose = memory.info(match.view).pose;
-    if (!pose) continue;
-    const bool first = &match == &query.place.matches.front();
-    (first ? best.squares : others.circles).push_back(pose->position());
+  if (matches.empty()) return moment;
+  moment.values.emplace_back("probability that the place is known",
+                             fixed(query.place.known_probability, 2));
+  for (std::size_t i = 0; i < std::min<std::size_t>(3, matches.size()); ++i) {
+    constexpr std::array names{"best match", "second", "third"};
+    moment.values.emplace_back(std::string("difference to the ") + names.at(i),
+                               fixed(matches[i].column_difference, 3) + ", " + matches[i].name);
   }
-  std::vector<MapLayer> layers{references, others, best};
-  if (const auto& found = query.place.position) {
-    MapLayer answer{.label = "answer", .colour = PlotColour::vermilion};
-    const Point2 at{found->x_m, found->y_m};
-    answer.crosses.push_back(at);
-    if (const auto& heading = query.place.heading_rad) {
-      double reach_m = 0.0;
-      for (const Point2& place : references.dots) reach_m = std::max(reach_m, distance(at, place));
-      const double length_m = 0.15 * reach_m;
-      answer.lines.push_back(
-          {at, {at.x_m + length_m * std::cos(*heading), at.y_m + length_m * std::sin(*heading)}});
-    }
-    layers.push_back(answer);
-  }
-  if (query.pose) {
-    layers.push_back({.label = "ground truth",
-                      .colour = PlotColour::black,
-                      .circles = {query.pose->position()}});
-  }
-  write_plot(path, MapPlot{.title = "From above", .layers = layers});
-  return true;
-}
-
-std::vector<std::pair<std::string, std::string>> figures_of(const LocalisedQuery& query) {
-  const Place& place = query.place;
-  std::vector<std::pair<std::string, std::string>> figures;
-  if (place.position) {
-    figures.emplace_back(
-        position_text(*place.position),
-        place.position->radius_m
-            ? "position, within " + fixed(*place.position->radius_m, 2) + " m in 95 % of cases"
-            : "position");
-  }
-  if (place.heading_rad) figures.emplace_back(degrees_text(*place.heading_rad), "heading");
-  if (const auto error = error_m(query)) {
-    figures.emplace_back(fixed(*error, 2) + " m", "from the data set's position");
-  }
-  const auto& matches = place.matches;
-  if (!matches.empty()) {
-    figures.emplace_back(fixed(place.known_probability, 2), "probability that the place is known");
-    figures.emplace_back(
-        fixed(matches[0].column_difference, 3),
-        place.known ? "difference to the best match" : "difference to the most similar view");
-  }
-  if (matches.size() > 1) {
-    figures.emplace_back(fixed(matches[1].column_difference, 3), "to the next, " + matches[1].name);
-  }
-  return figures;
+  if (const auto thumbnail = file.thumbnail(matches.front().view)) moment.best_match = *thumbnail;
+  return moment;
 }
 
 void add_table(ReportPage& page, const std::vector<LocalisedQuery>& queries) {
@@ -168,11 +102,7 @@ void add_table(ReportPage& page, const std::vector<LocalisedQuery>& queries) {
 
 }  // namespace
 
-void prepare_localise_report(const fs::path& folder) {
-  prepare_report_folder(folder, first_page_picture, "localise");
-}
-
-void write_localise_report(const fs::path& folder, const MemoryFile& file,
+void write_localise_report(const std::filesystem::path& folder, const MemoryFile& file,
                            const PlaceRecogniser& recogniser,
                            const std::vector<LocalisedQuery>& queries,
                            const std::function<Panorama(std::size_t)>& panorama) {
@@ -184,11 +114,10 @@ void write_localise_report(const fs::path& folder, const MemoryFile& file,
     known += queries[i].place.known ? 1 : 0;
     if (const auto error = error_m(queries[i])) errors.push_back(*error);
   }
-  ReportPage page(
-      "Where was this?",
-      "What the robot saw, and the view of " + file.path().filename().string() +
-          " that resembles it most, turned as the robot faced. Where both show the "
-          "same things in the same directions, the answer is right. Grey marks: straight ahead.");
+  ReportPage page("Where was this?",
+                  "What the robot saw, and the view of " + file.path().filename().string() +
+                      " that resembles it most, turned as the robot faced. Where both show the "
+                      "same things in the same directions, the answer is right.");
   std::vector<std::pair<std::string, std::string>> summary{
       {std::to_string(known) + " of " + std::to_string(readable.size()),
        "pictures show a known place"}};
@@ -206,32 +135,33 @@ void write_localise_report(const fs::path& folder, const MemoryFile& file,
       "at mirrored views, which show places that do not exist. Below one half the place is "
       "unknown.");
   const std::size_t shown = std::min(max_shown, readable.size());
+  page.section("Picture by picture");
+  page.text(
+      "The upper view is the picture, forward in its middle. Below it stands the most similar view "
+      "of the memory, turned as the robot faced. Grey dots on the map are all views of the memory; "
+      "the large dot with its circle is the answer and where it is in 95 % of cases; the ring is "
+      "the data set's own position.");
   if (shown < readable.size()) {
     page.text("Shown are " + std::to_string(shown) + " of " + std::to_string(readable.size()) +
               " pictures, evenly spread.");
   }
+  RunPage run("", shown);
+  run.unordered();
+  bool thumbnails = true;
   for (std::size_t n = 0; n < shown; ++n) {
     const std::size_t i = readable[n * (readable.size() - 1) / std::max<std::size_t>(1, shown - 1)];
-    const LocalisedQuery& query = queries[i];
-    const std::string picture = "query_" + std::to_string(n + 1) + ".png";
-    const std::string map = "map_" + std::to_string(n + 1) + ".svg";
-    page.section(query.file + ": " + answer_text(query));
-    page.figures(figures_of(query));
-    std::vector<ReportPicture> pictures{
-        {picture, draw_views(folder / picture, file, panorama(i), query.place)}};
-    if (draw_map(folder / map, recogniser.memory(), query)) {
-      pictures.push_back(
-          {map, "From above: all references, those most similar to the picture" +
-                    std::string(query.place.position
-                                    ? ", and the answer, with its heading where it has one."
-                                    : ". There is no answer.")});
-    } else if (n == 0) {
-      page.text("The memory knows no positions, so there is no map.");
-    }
-    page.pictures(pictures);
+    RunMoment moment = moment_of(queries[i], n, panorama(i), file);
+    thumbnails = thumbnails && (queries[i].place.matches.empty() || !moment.best_match.empty());
+    if (n == 0) moment.references = reference_positions(recogniser.memory());
+    run.add(moment);
   }
+  if (!thumbnails) page.text("The memory holds no thumbnail of the best match of some pictures.");
+  if (reference_positions(recogniser.memory()).empty()) {
+    page.text("The memory knows no positions, so there is no map.");
+  }
+  if (shown > 0) page.run(run);
   add_table(page, queries);
-  page.write(folder);
+  page.write(folder, "index.html", "panonav localise");
 }
 
 }  // namespace panonav::command

@@ -20,12 +20,9 @@ struct LocalisedQuery {
   std::string error;                  ///< why it could not be read; empty: it could
 };
 
-/// Throws FileError as `prepare_report_folder`.
-void prepare_localise_report(const std::filesystem::path& folder);
-
 /// A page with what was seen above the best match, turned alike, a map, and the figures by which a
-/// person can judge the answer: of 20 of the queries, evenly spread, and a table of the first 500.
-/// `panorama` gives that of a query by its number. Throws FileError, and what `write_plot` throws.
+/// person can judge the answer: of 200 of the queries, evenly spread, and a table of the first 500.
+/// `panorama` gives that of a query by its number. Throws FileError.
 void write_localise_report(const std::filesystem::path& folder, const MemoryFile& file,
                            const PlaceRecogniser& recogniser,
                            const std::vector<LocalisedQuery>& queries,

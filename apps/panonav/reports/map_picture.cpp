@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <string>
 #include <unordered_map>
+#include <utility>
+#include <vector>
 
+#include "panonav/core/text.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/mapping/map_measures.hpp"
-#include "reporting/plot.hpp"
+#include "viewer/report_page.hpp"
 
 namespace panonav::command {
 
@@ -80,8 +83,7 @@ std::optional<MapComparison> compare_with_ground_truth(const Dataset& recording,
   return comparison;
 }
 
-void write_map_picture(const std::filesystem::path& path, const Dataset& recording,
-                       const MappedRun& run) {
+MapPlot map_plot(const Dataset& recording, const MappedRun& run) {
   const Nodes nodes = nodes_of(recording, run);
   MapPlot plot{.title = "map", .layers = {}};
   std::vector<Point2> map = nodes.map;
@@ -107,7 +109,53 @@ void write_map_picture(const std::filesystem::path& path, const Dataset& recordi
   }
   plot.layers.push_back({.label = "map", .colour = PlotColour::blue, .lines = {map}, .dots = map});
   if (!closures.lines.empty()) plot.layers.push_back(std::move(closures));
-  write_plot(path, plot);
+  return plot;
+}
+
+void write_map_picture(const std::filesystem::path& path, const Dataset& recording,
+                       const MappedRun& run) {
+  write_plot(path, map_plot(recording, run));
+}
+
+void write_map_report(const std::filesystem::path& folder, const std::string& name,
+                      const Dataset& recording, const MappedRun& run, const RunPage& played) {
+  ReportPage page("The map of " + name,
+                  "A robot took " + std::to_string(recording.entries.size()) +
+                      " pictures on its way. Each is placed by what it shows of the step from the "
+                      "one before; where the robot passed a place again, the loop is closed.");
+  const auto closures = std::ranges::count(run.map.edges, LinkKind::closure, &MapEdge::kind);
+  std::vector<std::pair<std::string, std::string>> figures{
+      {std::to_string(run.map.nodes.size()), "places"},
+      {std::to_string(closures), "closures: places that were passed again"}};
+  const std::size_t components = number_of_components(run.map);
+  if (components > 1) {
+    figures.emplace_back(std::to_string(components),
+                         "connected components; the largest one is drawn");
+  }
+  const auto comparison = compare_with_ground_truth(recording, run);
+  if (comparison) {
+    figures.emplace_back(fixed(comparison->rms_m, 2) + " m",
+                         "from the true way, root mean square, after the best alignment" +
+                             std::string(run.wheels ? "" : " with a free scale"));
+    figures.emplace_back(fixed(comparison->shape_difference, 4),
+                         "Procrustes disparity (shape difference): 0 the same shape, 1 none");
+    if (comparison->odometry_shape_difference) {
+      figures.emplace_back(fixed(*comparison->odometry_shape_difference, 4),
+                           "the same of the wheels alone");
+    }
+  }
+  page.figures(figures);
+  page.section("The drive, picture by picture");
+  page.text(
+      "Grey dots are the places of the map, lines its edges. The large dot is where the map puts "
+      "the picture; pictures between places are not in the map.");
+  page.run(played);
+  page.section("The whole map");
+  page.plots({{map_plot(recording, run),
+               comparison ? "The map, turned and moved over the true way: only for the comparison, "
+                            "true positions were not used"
+                          : "The places in the order of the pictures, and the closures"}});
+  page.write(folder, "index.html", "panonav map");
 }
 
 }  // namespace panonav::command

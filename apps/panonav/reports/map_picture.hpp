@@ -2,15 +2,19 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "panonav/io/dataset.hpp"
 #include "panonav/pipeline/mapper.hpp"
+#include "reporting/plot.hpp"
+#include "viewer/page.hpp"
 
 namespace panonav::command {
 
-/// Draws the largest component of the map with its closures; where the recording knows positions,
-/// the map is laid over them, and so is the odometry of its wheels. Throws what `write_plot`
-/// throws.
+/// The largest component of the map with its closures; where the recording knows positions, the map
+/// is laid over them, and so is the odometry of its wheels.
+[[nodiscard]] MapPlot map_plot(const Dataset& recording, const MappedRun& run);
+/// The same as a PNG or SVG file. Throws what `write_plot` throws.
 void write_map_picture(const std::filesystem::path& path, const Dataset& recording,
                        const MappedRun& run);
 
@@ -30,5 +34,10 @@ struct MapComparison {
 /// Empty where fewer than three nodes have a position, or all are at one place.
 [[nodiscard]] std::optional<MapComparison> compare_with_ground_truth(const Dataset& recording,
                                                                      const MappedRun& run);
+
+/// Writes index.html: the drive, picture by picture on its map, and the map beside the truth where
+/// it is known. Throws FileError.
+void write_map_report(const std::filesystem::path& folder, const std::string& name,
+                      const Dataset& recording, const MappedRun& run, const RunPage& played);
 
 }  // namespace panonav::command

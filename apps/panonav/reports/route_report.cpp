@@ -11,15 +11,11 @@
 #include "panonav/geometry/positions.hpp"
 #include "reporting/picture_plot.hpp"
 #include "reporting/plot.hpp"
-#include "reports/report_page.hpp"
+#include "viewer/report_page.hpp"
 
 namespace panonav::command {
 
 namespace {
-
-namespace fs = std::filesystem;
-
-constexpr const char* path_file = "path.svg";
 
 /// Columns of a line as a person sees them: clockwise, forward in the middle. `to` is the first of
 /// `columns` values.
@@ -37,7 +33,7 @@ MapLayer path_layer(std::span<const Pose2> path) {
 }
 
 /// Lines at equal steps of way from the bottom to the top.
-void draw_panorama(const fs::path& path, const RoutePanorama& route) {
+PicturePlot plot_of_panorama(const RoutePanorama& route) {
   constexpr int max_rows = 400;
   const double length_m = route.length_m();
   const int rows = std::clamp(static_cast<int>(route.size()), 1, max_rows);
@@ -68,7 +64,7 @@ void draw_panorama(const fs::path& path, const RoutePanorama& route) {
     for (std::size_t c = 0; c < columns; ++c) grey[c] = static_cast<float>(bytes[c]) / 255.0F;
     put_line(grey, plot.values.data() + static_cast<std::size_t>(row) * columns);
   }
-  write_plot(path, plot);
+  return plot;
 }
 
 /// Pictures spread evenly over those on the route.
@@ -86,8 +82,8 @@ std::vector<std::size_t> spread(const std::vector<FollowedImage>& images, std::s
 }
 
 /// For each chosen picture two bands: seen above, shown by the route below.
-void draw_lines(const fs::path& path, const RouteLines& route,
-                const std::vector<FollowedImage>& images, const std::vector<std::size_t>& chosen) {
+PicturePlot plot_of_lines(const RouteLines& route, const std::vector<FollowedImage>& images,
+                          const std::vector<std::size_t>& chosen) {
   constexpr int band = 3;
   constexpr int gap = 1;
   constexpr int rows_of_pair = 2 * band + gap;
@@ -113,11 +109,10 @@ void draw_lines(const fs::path& path, const RouteLines& route,
                plot.values.data() + (k * rows_of_pair + static_cast<std::size_t>(row)) * columns);
     }
   }
-  write_plot(path, plot);
+  return plot;
 }
 
-void draw_path(const fs::path& path, const RouteLines& route,
-               const std::vector<FollowedImage>& images) {
+MapPlot plot_of_path(const RouteLines& route, const std::vector<FollowedImage>& images) {
   MapLayer truth{.label = "ground truth", .colour = PlotColour::black};
   MapLayer fixes{.label = "fixes", .colour = PlotColour::blue};
   MapLayer changed{.label = "something changed in view", .colour = PlotColour::orange};
@@ -132,11 +127,10 @@ void draw_path(const fs::path& path, const RouteLines& route,
     if (!image.fix && image.truth) off.crosses.push_back(image.truth->position());
   }
   if (true_path.size() > 1) truth.lines.push_back(std::move(true_path));
-  write_plot(path, MapPlot{.title = "From above",
-                           .layers = {path_layer(route.poses()), truth, changed, fixes, off}});
+  return {.title = "From above", .layers = {path_layer(route.poses()), truth, changed, fixes, off}};
 }
 
-void draw_errors(const fs::path& path, const std::vector<FollowedImage>& images) {
+LinePlot plot_of_errors(const std::vector<FollowedImage>& images) {
   Series position{.label = "position [cm]", .style = SeriesStyle::points};
   Series along{.label = "along the route [cm]", .style = SeriesStyle::points};
   Series lost{.label = "not on this route", .style = SeriesStyle::points};
@@ -151,22 +145,35 @@ void draw_errors(const fs::path& path, const std::vector<FollowedImage>& images)
       along.add(number, 100.0 * std::abs(image.fix->along_m - image.true_place->along_m));
     }
   }
-  write_plot(path, LinePlot{.title = "How far off",
-                            .x_label = "picture",
-                            .y_label = "error [cm]",
-                            .series = {position, along, lost}});
+  return {.title = "How far off",
+          .x_label = "picture",
+          .y_label = "error [cm]",
+          .series = {position, along, lost}};
 }
 
-void draw_correlations(const fs::path& path, const std::vector<FollowedImage>& images) {
+LinePlot plot_of_correlations(const std::vector<FollowedImage>& images) {
   Series correlation{.label = "of seen and shown line", .style = SeriesStyle::lines_and_points};
   for (std::size_t i = 0; i < images.size(); ++i) {
     if (!images[i].fix) continue;
     correlation.add(static_cast<double>(i + 1), images[i].fix->fix.correlation);
   }
-  write_plot(path, LinePlot{.title = "How well the route explains the pictures",
-                            .x_label = "picture",
-                            .y_label = "correlation",
-                            .series = {correlation}});
+  return {.title = "How well the route explains the pictures",
+          .x_label = "picture",
+          .y_label = "correlation",
+          .series = {correlation}};
+}
+
+std::vector<RouteMark> marks_of(const std::vector<FollowedImage>& images) {
+  std::vector<RouteMark> marks;
+  for (const FollowedImage& image : images) {
+    RouteMark& mark = marks.emplace_back();
+    if (image.fix) mark.along_m = image.fix->along_m;
+    if (image.true_place) mark.true_along_m = image.true_place->along_m;
+    for (const AzimuthRange& range : image.changed) {
+      mark.changed_deg.emplace_back(degrees(range.from_rad), degrees(range.to_rad));
+    }
+  }
+  return marks;
 }
 
 void add_figure(std::vector<std::pair<std::string, std::string>>& figures,
@@ -178,17 +185,11 @@ void add_figure(std::vector<std::pair<std::string, std::string>>& figures,
 
 }  // namespace
 
-void prepare_route_report(const fs::path& folder, std::string_view verb) {
-  prepare_report_folder(folder, path_file, verb);
-}
-
-void write_record_report(const fs::path& folder, const std::string& name,
+void write_record_report(const std::filesystem::path& folder, const std::string& name,
                          const RoutePanorama& route, double bytes_per_km) {
-  draw_panorama(folder / "panorama.svg", route);
   MapLayer path = path_layer(route.poses());
   MapLayer start{.label = "start", .colour = PlotColour::green};
   start.squares.push_back(route.poses().front().position());
-  write_plot(folder / path_file, MapPlot{.title = "From above", .layers = {path, start}});
   ReportPage page("Route '" + name + "'",
                   "A robot drove this way once. From each place it keeps one line of pixels, what "
                   "its camera sees at its own height, and that is all it needs to follow the way "
@@ -202,15 +203,16 @@ void write_record_report(const fs::path& folder, const std::string& name,
       "Each row is one place, the start at the bottom, the end on top; from left to right all "
       "around the robot, straight ahead in the middle. Things beside the way go from the middle "
       "outwards as the robot passes them, the slower the farther they are.");
-  page.pictures({{"panorama.svg", "Omnidirectional route panorama"}});
+  page.plots({{plot_of_panorama(route), "Omnidirectional route panorama"}});
   page.section("The way");
-  page.pictures({{path_file, "Where the lines were taken"}});
-  page.write(folder);
+  page.plots(
+      {{MapPlot{.title = "From above", .layers = {path, start}}, "Where the lines were taken"}});
+  page.write(folder, "index.html", "panonav route record");
 }
 
-void write_follow_report(const fs::path& folder, const std::string& name, const RouteLines& route,
-                         const std::vector<FollowedImage>& images, const FollowSummary& summary) {
-  draw_path(folder / path_file, route, images);
+void write_follow_report(const std::filesystem::path& folder, const FollowedRoute& route,
+                         const std::vector<FollowedImage>& images, const FollowSummary& summary,
+                         RunPage played) {
   const auto chosen = spread(images, 8);
   std::vector<std::pair<std::string, std::string>> figures{
       {std::to_string(summary.on_route) + " of " + std::to_string(summary.images),
@@ -218,27 +220,34 @@ void write_follow_report(const fs::path& folder, const std::string& name, const 
   add_figure(figures, summary.position_m, 100.0, 1, " cm", "median error of position");
   add_figure(figures, summary.along_m, 100.0, 1, " cm", "median error along the route");
   add_figure(figures, summary.heading_rad, degrees(1.0), 2, " degrees", "median error of heading");
-  ReportPage page("Following route '" + name + "'",
+  ReportPage page("Following route '" + route.name + "'",
                   "A robot that drives the way again, or beside it, looks for the pose from which "
                   "the remembered lines show what it sees.");
   page.figures(figures);
+  played.route(plot_of_panorama(route.panorama), marks_of(images));
+  page.section("The run, picture by picture");
+  page.text(
+      "On the map, the remembered route and where the robot is beside it. Below, the route "
+      "panorama: each row is the horizon at one place of the route, the start at the bottom, "
+      "straight ahead in the middle. The line across it is the row that the robot is at; orange "
+      "marks are directions in which something is not as remembered.");
+  page.run(played);
   page.section("The way");
-  page.pictures({{path_file, "Remembered route, fixes, and the true path where it is known"}});
+  page.plots({{plot_of_path(route.lines, images),
+               "Remembered route, fixes, and the true path where it is known"}});
   if (!chosen.empty()) {
-    draw_lines(folder / "lines.svg", route, images, chosen);
-    draw_correlations(folder / "correlations.svg", images);
     page.section("Seen and shown");
     page.text(
         "For some pictures, spread over the run, what the robot saw (upper band of each pair) and "
         "what the route shows from where it believes to be (lower band), put together from the "
         "lines of many places. Light blue: in this direction the route shows nothing.");
-    page.pictures({{"lines.svg", "Lines seen, and lines made from the route"},
-                   {"correlations.svg", "Correlation of the two, picture by picture"}});
+    page.plots(
+        {{plot_of_lines(route.lines, images, chosen), "Lines seen, and lines made from the route"},
+         {plot_of_correlations(images), "Correlation of the two, picture by picture"}});
   }
   if (!summary.position_m.empty()) {
-    draw_errors(folder / "errors.svg", images);
     page.section("Errors");
-    page.pictures({{"errors.svg", "Distance of each fix from the data set's own pose"}});
+    page.plots({{plot_of_errors(images), "Distance of each fix from the data set's own pose"}});
   }
   const auto stretches = changed_stretches(images);
   if (!stretches.empty()) {
@@ -252,7 +261,7 @@ void write_follow_report(const fs::path& folder, const std::string& name, const 
     }
     page.table({"from", "to"}, rows);
   }
-  page.write(folder);
+  page.write(folder, "index.html", "panonav route follow");
 }
 
 }  // namespace panonav::command

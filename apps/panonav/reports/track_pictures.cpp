@@ -1,10 +1,7 @@
 #include "reports/track_pictures.hpp"
 
-#include <algorithm>
 #include <string>
 #include <utility>
-
-#include "panonav/geometry/positions.hpp"
 
 namespace panonav::command {
 
@@ -34,10 +31,9 @@ Lines lines_of(const std::vector<std::optional<Point2>>& positions,
   return lines;
 }
 
-MapLayer true_path(const std::vector<TrackedImage>& images, std::size_t count,
-                   const TrackBackground& background) {
-  std::vector<std::optional<Point2>> positions(count);
-  for (std::size_t i = 0; i < count; ++i) {
+MapLayer true_path(const std::vector<TrackedImage>& images, const TrackBackground& background) {
+  std::vector<std::optional<Point2>> positions(images.size());
+  for (std::size_t i = 0; i < images.size(); ++i) {
     if (images[i].truth) positions[i] = images[i].truth->position();
   }
   return {.label = "ground truth",
@@ -45,10 +41,10 @@ MapLayer true_path(const std::vector<TrackedImage>& images, std::size_t count,
           .lines = lines_of(positions, background.kidnapped_after)};
 }
 
-MapLayer estimated_path(const std::vector<TrackedImage>& images, std::size_t count,
+MapLayer estimated_path(const std::vector<TrackedImage>& images,
                         const TrackBackground& background) {
-  std::vector<std::optional<Point2>> positions(count);
-  for (std::size_t i = 0; i < count; ++i) {
+  std::vector<std::optional<Point2>> positions(images.size());
+  for (std::size_t i = 0; i < images.size(); ++i) {
     if (is_localised(images[i])) positions[i] = images[i].estimate.pose->position();
   }
   return {.label = "estimated path",
@@ -58,8 +54,8 @@ MapLayer estimated_path(const std::vector<TrackedImage>& images, std::size_t cou
 
 }  // namespace
 
-void draw_track_map(const VisualMemory& memory, const std::vector<TrackedImage>& images,
-                    const TrackBackground& background, const std::filesystem::path& path) {
+MapPlot track_map(const VisualMemory& memory, const std::vector<TrackedImage>& images,
+                  const TrackBackground& background) {
   MapLayer localised{.label = "localised here", .colour = PlotColour::blue};
   MapLayer guessed{.label = "ambiguous: likeliest place", .colour = PlotColour::orange};
   MapLayer lost{.label = "true place where lost", .colour = PlotColour::vermilion};
@@ -80,50 +76,12 @@ void draw_track_map(const VisualMemory& memory, const std::vector<TrackedImage>&
     }
   }
   MapPlot plot{.title = "The whole run from above", .layers = background.surroundings};
-  for (MapLayer& layer :
-       std::vector{references(memory), true_path(images, images.size(), background),
-                   estimated_path(images, images.size(), background), localised, guessed, lost,
-                   start, kidnapped}) {
+  for (MapLayer& layer : std::vector{references(memory), true_path(images, background),
+                                     estimated_path(images, background), localised, guessed, lost,
+                                     start, kidnapped}) {
     plot.layers.push_back(std::move(layer));
   }
-  write_plot(path, plot);
-}
-
-void draw_track_snapshots(const VisualMemory& memory, const std::vector<TrackedImage>& images,
-                          const std::set<std::size_t>& shown, const TrackBackground& background,
-                          const std::filesystem::path& path, const std::vector<Point2>& at_first) {
-  std::vector<MapPlot> panels;
-  if (!at_first.empty()) {
-    MapPlot panel{.title = "before the first image", .layers = background.surroundings};
-    panel.layers.push_back(references(memory));
-    panel.layers.push_back(
-        {.label = "particles", .colour = PlotColour::vermilion, .dots = at_first});
-    panels.push_back(std::move(panel));
-  }
-  for (const std::size_t number : shown) {
-    const TrackedImage& image = images[number];
-    const MapLayer particles{.label = "particles",
-                             .colour = PlotColour::vermilion,
-                             .dots = positions_of(image.particles)};
-    MapLayer estimate{.label = is_localised(image) ? "estimate" : "likeliest place",
-                      .colour = is_localised(image) ? PlotColour::blue : PlotColour::orange};
-    if (image.estimate.pose) estimate.squares.push_back(image.estimate.pose->position());
-    MapLayer truth{.label = "true place", .colour = PlotColour::black};
-    if (image.truth) truth.crosses.push_back(image.truth->position());
-    std::string title =
-        "image " + std::to_string(number + 1) + ": " + std::string(name_of(image.estimate.state));
-    if (background.kidnapped_after && number == *background.kidnapped_after + 1) {
-      title += ", kidnapped to here";
-    }
-    MapPlot panel{.title = std::move(title), .layers = background.surroundings};
-    for (MapLayer& layer :
-         std::vector{references(memory), particles, true_path(images, number + 1, background),
-                     estimated_path(images, number + 1, background), estimate, truth}) {
-      panel.layers.push_back(std::move(layer));
-    }
-    panels.push_back(std::move(panel));
-  }
-  write_plot(path, panels, std::min(3, static_cast<int>(panels.size())));
+  return plot;
 }
 
 }  // namespace panonav::command

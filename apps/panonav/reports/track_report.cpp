@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <set>
 #include <string>
 #include <utility>
 
@@ -13,39 +11,13 @@
 #include "panonav/geometry/angles.hpp"
 #include "reporting/plot.hpp"
 #include "reports/report_page.hpp"
-#include "reports/track_animation.hpp"
 #include "reports/track_pictures.hpp"
 
 namespace panonav::command {
 
 namespace {
 
-namespace fs = std::filesystem;
-constexpr const char* animation_file = "track.html";
-
-/// The first images, those where the state changes, the last, and evenly between.
-std::set<std::size_t> snapshots(const std::vector<TrackedImage>& images) {
-  constexpr std::size_t most = 6;
-  std::set<std::size_t> shown{0, images.size() - 1};
-  if (images.size() > 1) shown.insert(1);
-  for (std::size_t i = 1; i < images.size() && shown.size() < most; ++i) {
-    if (images[i].estimate.state != images[i - 1].estimate.state) shown.insert(i);
-  }
-  while (shown.size() < std::min(most, images.size())) {
-    std::size_t widest = 0;
-    std::size_t middle = 0;
-    for (auto next = std::next(shown.begin()); next != shown.end(); ++next) {
-      const std::size_t before = *std::prev(next);
-      if (*next - before <= widest) continue;
-      widest = *next - before;
-      middle = before + widest / 2;
-    }
-    shown.insert(middle);
-  }
-  return shown;
-}
-
-void draw_errors(const std::vector<TrackedImage>& images, double spacing_m, const fs::path& path) {
+LinePlot plot_of_errors(const std::vector<TrackedImage>& images, double spacing_m) {
   Series localised{.label = "error, localised", .style = SeriesStyle::points};
   Series guessed{.label = "error, ambiguous", .style = SeriesStyle::points};
   Series spread{.label = "spread of particles", .style = SeriesStyle::lines};
@@ -64,14 +36,14 @@ void draw_errors(const std::vector<TrackedImage>& images, double spacing_m, cons
   }
   spacing.x = {1.0, static_cast<double>(images.size())};
   spacing.y = {spacing_m, spacing_m};
-  write_plot(path, LinePlot{.title = "How far off, and how sure",
-                            .x_label = "image",
-                            .y_label = "metres",
-                            .series = {localised, guessed, spread, lost, spacing},
-                            .log_y = true});
+  return LinePlot{.title = "How far off, and how sure",
+                  .x_label = "image",
+                  .y_label = "metres",
+                  .series = {localised, guessed, spread, lost, spacing},
+                  .log_y = true};
 }
 
-void draw_particles(const std::vector<TrackedImage>& images, const fs::path& path) {
+LinePlot plot_of_particles(const std::vector<TrackedImage>& images) {
   Series all{.label = "particles", .style = SeriesStyle::lines};
   Series injected{.label = "drawn anew", .style = SeriesStyle::points};
   Series effective{.label = "effective number", .style = SeriesStyle::lines};
@@ -84,11 +56,11 @@ void draw_particles(const std::vector<TrackedImage>& images, const fs::path& pat
     add(effective, estimate.effective_particles);
     if (estimate.injected > 0) add(injected, estimate.injected);
   }
-  write_plot(path, LinePlot{.title = "Particles",
-                            .x_label = "image",
-                            .y_label = "number",
-                            .series = {all, injected, effective},
-                            .log_y = true});
+  return LinePlot{.title = "Particles",
+                  .x_label = "image",
+                  .y_label = "number",
+                  .series = {all, injected, effective},
+                  .log_y = true};
 }
 
 /// Stretches of images with one state.
@@ -139,10 +111,6 @@ std::vector<std::pair<std::string, std::string>> main_figures(const TrackSummary
 
 }  // namespace
 
-void prepare_track_report(const fs::path& folder) {
-  prepare_report_folder(folder, animation_file, "track");
-}
-
 std::size_t particles_shown(std::size_t images) {
   constexpr std::size_t most = 300;
   constexpr std::size_t least = 30;
@@ -150,14 +118,9 @@ std::size_t particles_shown(std::size_t images) {
   return std::clamp(altogether / std::max<std::size_t>(1, images), least, most);
 }
 
-void write_track_report(const fs::path& folder, const VisualMemory& memory, double spacing_m,
-                        const std::vector<TrackedImage>& images, const TrackSummary& summary) {
-  write_track_animation(folder / animation_file, memory, spacing_m, images);
-  draw_track_snapshots(memory, images, snapshots(images), {}, folder / "snapshots.svg");
-  draw_track_map(memory, images, {}, folder / "map.svg");
-  draw_errors(images, spacing_m, folder / "errors.svg");
-  draw_particles(images, folder / "particles.svg");
-
+void write_track_report(const std::filesystem::path& folder, const VisualMemory& memory,
+                        double spacing_m, const std::vector<TrackedImage>& images,
+                        const TrackSummary& summary, const RunPage& played) {
   const bool truth_known =
       std::ranges::any_of(images, [](const auto& image) { return image.truth.has_value(); });
   ReportPage page(
@@ -167,40 +130,33 @@ void write_track_report(const fs::path& folder, const VisualMemory& memory, doub
           " pictures. After each one, particles say where it may be: far apart while it does not "
           "know, close together once it does.");
   page.figures(main_figures(summary, images.size()));
-  page.link(animation_file, "Play the run, image by image");
-  page.section("Snapshots");
+  page.section("The run, picture by picture");
   page.text(
-      "Each dot is a particle, a place where the robot may be. Grey circles are the remembered "
+      "Each small dot is a particle, a place where the robot may be. Grey dots are the remembered "
       "views, " +
       fixed(100.0 * spacing_m, 0) +
-      " cm apart. The blue square is the estimate, the mean of the heaviest group of particles; "
-      "it is orange while several places or a large area are possible, and missing when the robot "
-      "is lost. The blue line is the estimated path" +
-      std::string(truth_known ? ", the black line the true one; the black cross is where the robot "
-                                "truly is."
-                              : "."));
-  page.pictures({{"snapshots.svg",
-                  "The first images, images at which the state changes, and others between"}});
+      " cm apart. The large dot is the estimate, the mean of the heaviest group of particles; it "
+      "is missing where the robot is lost." +
+      std::string(truth_known ? " The ring is where the robot truly is." : ""));
+  page.run(played);
   page.section("The whole run");
-  page.pictures(
-      {{"map.svg", truth_known ? "True and estimated path; crosses: true places where the robot "
-                                 "was lost"
-                               : "The estimated path; it breaks off where the robot was not "
-                                 "localised"},
-       {"errors.svg", truth_known
-                          ? "Error of each estimate, and how far the particles spread around "
-                            "their mean, on a logarithmic scale"
-                          : "How far the particles spread around their mean, on a logarithmic "
-                            "scale"}});
+  page.plots(
+      {{track_map(memory, images, {}),
+        truth_known ? "True and estimated path; crosses: true places where the robot was lost"
+                    : "The estimated path; it breaks off where the robot was not localised"},
+       {plot_of_errors(images, spacing_m),
+        truth_known ? "Error of each estimate, and how far the particles spread around their "
+                      "mean, on a logarithmic scale"
+                    : "How far the particles spread around their mean, on a logarithmic scale"}});
   page.section("State by state");
   page.table({"images", "state", "median error", "largest error"}, stretches(images));
   page.section("Particles");
   page.text(
       "More are used while much is possible, fewer once they lie close together. By those drawn "
       "anew a robot that was kidnapped is found again.");
-  page.pictures(
-      {{"particles.svg", "Number of particles after each image, on a logarithmic scale"}});
-  page.write(folder);
+  page.plots({{plot_of_particles(images),
+               "Number of particles after each image, on a logarithmic scale"}});
+  page.write(folder, "index.html", "panonav track");
 }
 
 }  // namespace panonav::command

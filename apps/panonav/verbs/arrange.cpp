@@ -17,7 +17,9 @@
 #include "panonav/storage/memory_file.hpp"
 #include "verbs/recording.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES
+#include "reports/arrange_report.hpp"
 #include "reports/lattice_picture.hpp"
+#include "reports/report_page.hpp"
 #endif
 
 namespace panonav::command {
@@ -31,6 +33,7 @@ struct ArrangeArguments {
   std::optional<std::string> tum;
   std::optional<std::string> graph;
   std::optional<std::string> picture;
+  std::optional<std::string> report;
   bool no_save = false;
   LatticeOptions lattice;
   CoarseMotionOptions motion;
@@ -177,9 +180,16 @@ ExitCode arrange_views(const ArrangeArguments& wanted, Session& session) {
     return session.no_answer("panonav arrange: " + wanted.memory + " holds no views");
   }
   session.detail(std::to_string(memory.size()) + " views loaded");
+#ifdef PANONAV_COMMAND_SIMULATES
+  if (wanted.report) prepare_report_folder(*wanted.report, "arrange");
+  LatticeSteps steps;
+  const LatticeWatch watch = wanted.report ? steps.watch() : LatticeWatch();
+#else
+  const LatticeWatch watch;
+#endif
   const Lattice lattice =
       arrange(memory, wanted.lattice, motions_of(wanted, file.header().source, memory, session),
-              session.executor());
+              session.executor(), watch);
   session.detail("views arranged");
   if (!wanted.no_save) store_lattice(lattice, memory, file);
   if (wanted.tum) write_trajectory(*wanted.tum, trajectory_of(lattice, memory));
@@ -189,6 +199,9 @@ ExitCode arrange_views(const ArrangeArguments& wanted, Session& session) {
   }
 #ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.picture) write_lattice_picture(*wanted.picture, lattice, memory);
+  if (wanted.report) {
+    write_arrange_report(*wanted.report, file.path().filename().string(), lattice, memory, steps);
+  }
 #endif
   if (session.json()) {
     session.print(json_line(as_json(wanted, lattice, memory)));
@@ -200,6 +213,7 @@ ExitCode arrange_views(const ArrangeArguments& wanted, Session& session) {
                     std::to_string(lattice.components.front().views) + " of " +
                     std::to_string(lattice.nodes.size()) + " views.");
     }
+    if (wanted.report) tell_report(*wanted.report, session);
 #endif
   }
   return ExitCode::done;
@@ -220,6 +234,9 @@ Run declare_arrange(Arguments& arguments) {
 #ifdef PANONAV_COMMAND_SIMULATES
   arguments.option("--picture FILE", wanted->picture,
                    "Draw the map, beside the truth where it is known, into this PNG or SVG file");
+  arguments.option("--report FOLDER", wanted->report,
+                   "Write a page that shows the arrangement as it unfolds into this folder: a new "
+                   "one, or that of an earlier report");
 #endif
   arguments.flag("--no-save", wanted->no_save, "Leave the memory file as it is");
   arguments.options("lattice", wanted->lattice);
@@ -239,7 +256,7 @@ Verb arrange_verb() {
       "nothing\n"
       "connects is kept as separate components. The map is stored in the memory under the name "
       "lattice.",
-      "  panonav arrange office.panonav --picture lattice.png\n"
+      "  panonav arrange office.panonav --report arranged\n"
       "  panonav arrange hall.panonav --odometry run --graphml hall.graphml --json",
       declare_arrange};
 }

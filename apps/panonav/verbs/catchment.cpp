@@ -8,9 +8,10 @@
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/pipeline/catchment_survey.hpp"
 #include "reports/catchment_report.hpp"
 #include "reports/report_page.hpp"
-#include "verbs/catchment_survey.hpp"
+#include "verbs/homing_pictures.hpp"
 #include "verbs/recording.hpp"
 
 namespace panonav::command {
@@ -34,6 +35,18 @@ struct CatchmentArguments {
   std::optional<std::string> goal;
   std::optional<std::string> report;
 };
+
+/// Shows each work that it hears of.
+WorkProgress bars(Session& session) {
+  return [&session, bar = std::shared_ptr<Progress>(), shown = std::string()](
+             const std::string& work, std::size_t steps, std::size_t total) mutable {
+    if (work != shown) {
+      bar.reset();
+      bar = std::make_shared<Progress>(session, shown = work, total);
+    }
+    bar->advance(steps);
+  };
+}
 
 ordered_json as_json(const CatchmentArguments& wanted, const RecordedViews& goals,
                      const CatchmentResult& result) {
@@ -225,19 +238,21 @@ ExitCode catchment(const Arguments& arguments, const CatchmentArguments& wanted,
   std::optional<Dataset> second;
   if (wanted.current)
     second = open_recording(*wanted.current, wanted.pictures, recording.source, session);
-  if (wanted.report) prepare_catchment_report(*wanted.report);
+  if (wanted.report) prepare_report_folder(*wanted.report, "catchment");
 
   if (wanted.ahead) {
-    const auto views = read_views(recording, wanted.homing, wanted.turn_seed, session);
+    const auto views = read_views(recording, wanted.homing.views, wanted.turn_seed,
+                                  session.executor(), bars(session));
     refuse_unused_rise(arguments, views.views.front(), wanted.dataset);
     return look_ahead(wanted, views, settings.homing, session);
   }
-  const auto goals = read_views(recording, wanted.homing, std::nullopt, session);
+  const auto goals =
+      read_views(recording, wanted.homing.views, std::nullopt, session.executor(), bars(session));
   check_posed(goals, wanted.dataset);
   refuse_unused_rise(arguments, goals.views.front(), wanted.dataset);
   const std::size_t goal = shown_goal(wanted, goals);
-  const auto places =
-      read_views(second ? *second : recording, wanted.homing, wanted.turn_seed, session);
+  const auto places = read_views(second ? *second : recording, wanted.homing.views,
+                                 wanted.turn_seed, session.executor(), bars(session));
   const std::string& places_name = wanted.current ? *wanted.current : wanted.dataset;
   check_posed(places, places_name);
   if (goals.views.front().rows() != places.views.front().rows()) {
@@ -245,7 +260,8 @@ ExitCode catchment(const Arguments& arguments, const CatchmentArguments& wanted,
                                      "; allowed: " + std::to_string(goals.views.front().rows()) +
                                      ", as in " + wanted.dataset);
   }
-  const auto result = survey_catchment(goals, places, settings, places_name, session);
+  const auto result =
+      survey_catchment(goals, places, settings, places_name, session.executor(), bars(session));
   if (session.json()) {
     session.print(json_line(as_json(wanted, goals, result)));
   } else {

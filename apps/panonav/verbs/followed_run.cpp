@@ -7,6 +7,7 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "verbs/recording.hpp"
+#include "verbs/shown_references.hpp"
 
 namespace panonav::command {
 
@@ -41,18 +42,26 @@ void follow(RouteFollower& follower, const Dataset& run, const std::vector<Pose2
   const auto every = static_cast<std::size_t>(every_nth);
   make_in_order((run.entries.size() + every - 1) / every, executor,
                 [&](std::size_t i) {
+                  StageClock clock;
                   const Observation observation = read_observation(run.entries[i * every]);
+                  clock.stage("reading");
                   Seen seen{follower.encode(observation), std::nullopt};
+                  clock.stage("scanline");
                   if (recorded == nullptr) return seen;
                   seen.moment = moment_of(observation, i * every);
                   seen.moment->panorama = recorded->convert(seen.moment->picture->view(),
                                                             observation.tilt.value_or(Tilt{}));
+                  clock.stage("for viewers");
+                  clock.put(*seen.moment);
                   return seen;
                 },
                 [&](std::size_t i, Seen&& seen) {
                   const std::size_t index = i * every;
                   const DatasetEntry& entry = run.entries[index];
+                  StageClock clock;
                   RouteStep step = follower.step(std::move(seen.line), entry.odometry);
+                  clock.stage("matching");
+                  if (seen.moment) clock.put(*seen.moment);
                   FollowedImage image{index,
                                       entry.file,
                                       entry.stamp_s,

@@ -12,6 +12,7 @@
 #include "panonav/io/image_file.hpp"
 #include "reports/report_page.hpp"
 #include "verbs/view_selection.hpp"
+#include "viewer/page.hpp"
 
 namespace panonav::command {
 
@@ -81,21 +82,6 @@ Groups grouped(const std::vector<ViewRecord>& views) {
   return groups;
 }
 
-std::string base64(const std::vector<std::uint8_t>& bytes) {
-  constexpr std::string_view letters =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t three = 0;
-    for (std::size_t j = i; j < i + 3; ++j)
-      three = three << 8U | (j < bytes.size() ? bytes[j] : 0U);
-    for (std::size_t j = 0; j < 4; ++j) {
-      text += i + j <= bytes.size() ? letters[three >> (18 - 6 * j) & 63U] : '=';
-    }
-  }
-  return text;
-}
-
 /// Empty without a picture. It is decoded and written anew: a browser gets nothing else of the
 /// file.
 std::string picture_of(const MemoryFile& memory, const ViewRecord& view) {
@@ -103,7 +89,7 @@ std::string picture_of(const MemoryFile& memory, const ViewRecord& view) {
   if (!bytes) return "";
   try {
     const Image picture = decode_image(*bytes, "thumbnail", {.side_px = 4096});
-    return "data:image/png;base64," + base64(encode_png(picture.view()));
+    return data_url("image/png", encode_png(picture.view()));
   } catch (const FileError&) {
     return "";
   }
@@ -131,7 +117,7 @@ ExitCode gallery(const GalleryArguments& wanted, Session& session) {
                         " views; to get them, memorise the recording into a new memory without "
                         "--no-thumbnails");
   }
-  prepare_report_folder(wanted.out, page_name, "gallery");
+  prepare_report_folder(wanted.out, "gallery", page_name);
   views.resize(std::min(found, max_views));
 
   ReportPage page(
@@ -162,7 +148,7 @@ ExitCode gallery(const GalleryArguments& wanted, Session& session) {
     }
     page.thumbnails(pictures);
   }
-  page.write(wanted.out, page_name);
+  page.write(wanted.out, page_name, "panonav gallery");
   progress.clear();
   const std::string path = (fs::path(wanted.out) / page_name).string();
   if (session.json()) {

@@ -138,7 +138,7 @@ ExitCode home_from_memory(const Arguments& arguments, const HomeArguments& wante
 
 ExitCode home(const Arguments& arguments, const HomeArguments& wanted, Session& session) {
 #ifdef PANONAV_COMMAND_SIMULATES
-  if (wanted.report) prepare_home_report(*wanted.report);
+  if (wanted.report) prepare_report_folder(*wanted.report, "home");
 #endif
   if (wanted.memory) return home_from_memory(arguments, wanted, session);
   const auto& views = wanted.homing.views;

@@ -249,6 +249,11 @@ void LiveRun::take(const std::function<std::string(const Observation&)>& look,
   if (self.live != nullptr) self.live->live().stop();  // what comes from now on is not dropped
 }
 
+std::optional<double> LiveRun::decoding_ms() const {
+  if (implementation_->live == nullptr) return std::nullopt;
+  return milliseconds(implementation_->live->timing().decoding);
+}
+
 const LiveCounts& LiveRun::finish() {
   auto& self = *implementation_;
   self.printer.finish();

@@ -67,6 +67,8 @@ class LiveRun {
             const std::function<void(Observation&&)>& keep);
   /// Waits until all lines are printed: what is to be stored comes before.
   const LiveCounts& finish();
+  /// How long the observation of now took to become pixels; empty where it is not a live one.
+  [[nodiscard]] std::optional<double> decoding_ms() const;
 
  private:
   struct Implementation;

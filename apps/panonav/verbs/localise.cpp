@@ -17,6 +17,7 @@
 #include "verbs/localised_query.hpp"
 #include "verbs/recording.hpp"
 #include "verbs/run_record.hpp"
+#include "verbs/shown_references.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES
 #include "reports/report_page.hpp"
 #endif
@@ -36,7 +37,7 @@ struct LocaliseArguments {
   bool areas = false;
   std::optional<std::string> out;
   std::optional<std::string> report;
-  std::optional<std::string> record;
+  RunRecordArguments record;
   LiveArguments live;
 };
 
@@ -93,19 +94,33 @@ struct Answer {
   std::optional<RunMoment> moment;
 };
 
-/// `name`: what is called the same file.
+/// `name`: what is called the same file. `shown`: null where nothing is recorded.
 Answer answer(const PlaceRecogniser& recogniser, const LocaliseArguments& wanted,
-              const std::string& name, Observation observation, std::size_t index) {
+              const RunRecord& record, const ShownReferences* shown, const std::string& name,
+              Observation observation, std::size_t index) {
   const double turned_rad = turn(observation, recogniser, wanted, index);
-  Answer answer{
-      {observation.name, turned_rad,
-       recogniser.localise(observation, std::span(&name, wanted.exclude_same_file ? 1 : 0)),
-       observation.pose, ""},
-      nullptr,
-      std::nullopt};
-  if (!wanted.record) return answer;
-  RunMoment& moment = answer.moment.emplace(moment_of(observation, index));
-  moment.panorama = recogniser.encoder().panorama(observation);
+  Answer answer;
+  StageClock clock;
+  if (shown != nullptr) answer.moment = record.moment_of(observation, index);
+  clock.restart();
+  if (shown != nullptr && record.wants_pictures()) {
+    answer.moment->panorama = recogniser.encoder().panorama(observation);
+    observation.picture = *answer.moment->panorama;  // it is that of a level robot
+    observation.tilt.reset();
+    clock.stage("unwarping");
+  }
+  answer.query = {
+      observation.name, turned_rad,
+      recogniser.localise(observation, std::span(&name, wanted.exclude_same_file ? 1 : 0)),
+      observation.pose, ""};
+  if (!answer.moment) return answer;
+  RunMoment& moment = *answer.moment;
+  clock.stage(moment.panorama ? "signature, search, ranking" : "unwarping to ranking");
+  if (moment.panorama) {
+    shown->compare(moment, recogniser.memory(), recogniser.encoder().packed(*moment.panorama));
+    clock.stage("for viewers");
+  }
+  clock.put(moment);
   describe(moment, answer.query.place);
   return answer;
 }
@@ -156,8 +171,10 @@ std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
                                        const MemoryFile& file, Session& session) {
   std::vector<std::string> read = wanted.inputs;
   read.push_back(wanted.memory);
-  RunRecord record(wanted.record, read, false, session);
-  auto references = reference_positions(recogniser.memory());  // for the first moment
+  RunRecord record(wanted.record, read, false, session, {.memory = wanted.memory});
+  std::optional<ShownReferences> shown;
+  if (record.wanted()) shown.emplace(recogniser.memory());
+  bool first = true;
   const std::size_t total = recording.entries.size();
   Progress progress(session, "localising", total);
   std::vector<LocalisedQuery> answers;
@@ -167,21 +184,26 @@ std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
       total, session.executor(),
       [&](std::size_t i) -> Answer {
         const DatasetEntry& entry = recording.entries[i];
+        StageClock clock;
         std::optional<Observation> seen;
         try {
           seen = read_observation(entry);
         } catch (const FileError& error) {
           return {{entry.file, 0.0, {}, entry.pose, error.what()}, std::current_exception(), {}};
         }
+        clock.stage("reading");
         // Several pictures are called as they were typed.
-        return answer(recogniser, wanted,
-                      wanted.inputs.size() > 1 ? entry.path.filename().string() : entry.file,
-                      std::move(*seen), i);
+        Answer given =
+            answer(recogniser, wanted, record, shown ? &*shown : nullptr,
+                   wanted.inputs.size() > 1 ? entry.path.filename().string() : entry.file,
+                   std::move(*seen), i);
+        if (given.moment) clock.put(*given.moment);
+        return given;
       },
       [&](std::size_t, Answer&& made) {
         if (made.moment) {
           made.moment->best_match = best_match_of(made.query.place, file);
-          made.moment->references = std::exchange(references, {});
+          if (std::exchange(first, false)) shown->put(*made.moment);
           record.add(std::move(*made.moment));
         }
         answers.push_back(std::move(made.query));
@@ -216,8 +238,10 @@ ExitCode localise_live(const Arguments& arguments, const LocaliseArguments& want
       file, {.localiser = wanted.localiser,
              .source = source->pictures(),
              .areas = wanted.areas ? std::optional(wanted.accuracy) : std::nullopt});
-  RunRecord record(wanted.record, std::span(&wanted.memory, 1), true, session);
-  auto references = reference_positions(recogniser.memory());  // for the first moment
+  RunRecord record(wanted.record, std::span(&wanted.memory, 1), true, session,
+                   {.memory = wanted.memory});
+  std::optional<ShownReferences> shown;
+  if (record.wanted()) shown.emplace(recogniser.memory());
   std::string table(csv_header);
   std::size_t number = 0;
   std::size_t known = 0;
@@ -225,7 +249,12 @@ ExitCode localise_live(const Arguments& arguments, const LocaliseArguments& want
   LiveRun taking(*source, wanted.pictures.part, wanted.live, session);
   taking.take(
       [&](const Observation& seen) {
-        given = answer(recogniser, wanted, seen.name, seen, number);
+        given =
+            answer(recogniser, wanted, record, shown ? &*shown : nullptr, seen.name, seen, number);
+        if (const auto ms = taking.decoding_ms(); given.moment && ms) {
+          given.moment->stages_ms.emplace_back("reading", *ms);
+        }
+        if (given.moment && number == 0) shown->put(*given.moment);
         ++number;
         if (given.query.place.known) ++known;
         if (!session.json()) return as_text(given.query, session);
@@ -236,8 +265,9 @@ ExitCode localise_live(const Arguments& arguments, const LocaliseArguments& want
       [&](Observation&&) {
         if (wanted.out) table += csv_row(given.query);
         if (!given.moment) return;
-        given.moment->best_match = best_match_of(given.query.place, file);
-        given.moment->references = std::exchange(references, {});
+        if (given.moment->panorama) {
+          given.moment->best_match = best_match_of(given.query.place, file);
+        }
         record.add(std::move(*given.moment));
       });
   if (wanted.out) write_file(*wanted.out, std::string_view(table));
@@ -256,7 +286,7 @@ ExitCode localise(const Arguments& arguments, const LocaliseArguments& wanted, S
   }
   refuse_live(arguments, wanted.inputs.front(), true);
 #ifdef PANONAV_COMMAND_SIMULATES
-  if (wanted.report) prepare_localise_report(*wanted.report);
+  if (wanted.report) prepare_report_folder(*wanted.report, "localise");
 #endif
   const auto recording = open_queries(wanted, file, session);
   const PlaceRecogniser recogniser(
@@ -305,6 +335,8 @@ Run declare_localise(Arguments& arguments) {
   declare_pictures(arguments, wanted->pictures);
   declare_live(arguments, wanted->live);
   declare_record(arguments, wanted->record);
+  declare_view(arguments, wanted->record);
+  arguments.uncommon({"--record"});
   arguments.option("-o,--out FILE", wanted->out, "Write a CSV table, one line for each picture");
 #ifdef PANONAV_COMMAND_SIMULATES
   arguments.option("--report FOLDER", wanted->report,

@@ -17,8 +17,11 @@
 #include "verbs/memorising.hpp"
 #include "verbs/recording.hpp"
 #include "verbs/run_record.hpp"
+#include "verbs/shown_map.hpp"
+#include "verbs/shown_references.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES
 #include "reports/map_picture.hpp"
+#include "reports/report_page.hpp"
 #endif
 
 namespace panonav::command {
@@ -33,7 +36,8 @@ struct MapArguments {
   std::optional<std::string> tum;
   std::optional<std::string> graph;
   std::optional<std::string> picture;
-  std::optional<std::string> record;
+  std::optional<std::string> report;
+  RunRecordArguments record;
   PictureArguments pictures;
   SignatureOptions signature;
   MapperOptions mapper;
@@ -122,7 +126,7 @@ void print_result(const MapArguments& wanted, const Dataset& recording, const Ma
                       {"connected_components", sizes},
                       {"closures", number_of_closures(run.map)},
                       {"scale_m", run.scale_m},
-                      {"wheel_lengths", run.wheels},
+                      {"wheels", run.wheels},
                       {"step_ms", step_ms},
                       {"ground_truth", nullptr}};
 #ifdef PANONAV_COMMAND_SIMULATES
@@ -173,38 +177,67 @@ void print_result(const MapArguments& wanted, const Dataset& recording, const Ma
 
 MappedRun map_recording(const Dataset& recording, Mapper& mapper, Session& session) {
   Progress progress(session, "mapping", recording.entries.size());
+  return mapper.map(recording, session.executor(), [&] { progress.advance(); });
+}
+
+/// As `map_recording`, and viewers see how it grows.
+MappedRun map_in_view(const MapArguments& wanted, const Dataset& recording, Mapper& mapper,
+                      Session& session) {
+  RunRecord record({.file = std::nullopt, .view = wanted.record.view},
+                   std::array{wanted.dataset, wanted.memory}, false, session,
+                   {.memory = wanted.memory});
+  struct Seen {
+    Mapper::EncodedView view;
+    RunMoment moment;
+    std::string name;
+  };
+  GrowingMap shown;
+  std::optional<RunMoment> last;  // waits for what comes of it
+  Progress progress(session, "mapping", recording.entries.size());
   make_in_order(
       recording.entries.size(), session.executor(),
-      [&](std::size_t i) { return mapper.encode(read_observation(recording.entries[i])); },
-      [&](std::size_t, Mapper::EncodedView&& seen) {
+      [&](std::size_t i) {
+        StageClock clock;
+        const Observation observation = read_observation(recording.entries[i]);
+        clock.stage("reading");
+        Seen seen{mapper.encode(observation), moment_of(observation, i), observation.name};
+        clock.stage("unwarping, signature");
+        seen.moment.panorama = mapper.encoder().panorama(observation);
+        clock.stage("for viewers");
+        clock.put(seen.moment);
+        return seen;
+      },
+      [&](std::size_t, Seen&& seen) {
+        if (last) record.add(std::move(*last));
+        StageClock clock;
+        const bool is_node = mapper.add(std::move(seen.view));
+        clock.stage("mapping");
+        clock.put(seen.moment);
+        shown.put(seen.moment, mapper.map_so_far(), is_node, seen.name);
+        last = std::move(seen.moment);
         progress.advance();
-        mapper.add(std::move(seen));
       });
-  return mapper.finish();
+  MappedRun run = mapper.finish();
+  if (last) {
+    shown.finish(*last, run.map);
+    record.add(std::move(*last));
+  }
+  record.close();
+  return run;
 }
 
 /// Writes the finished map, then each picture with the pose that it got: of the largest connected
 /// component, as components have no common frame.
 void record_map(const MapArguments& wanted, const Dataset& recording, const MappedRun& run,
-                const ViewEncoder& encoder, Session& session) {
-  RunRecord record(wanted.record, std::array{wanted.dataset, wanted.memory}, false, session);
+                const ViewEncoder& encoder, RunPage& played, Session& session) {
+  RunRecord record({.file = wanted.record.file, .view = std::nullopt},
+                   std::array{wanted.dataset, wanted.memory}, false, session, {});
   const std::size_t component = largest_component(run.map);
-  std::vector<Point2> places;
   std::map<std::size_t, std::size_t> nodes;  // by observation
+  std::vector<std::string> names;
   for (std::size_t i = 0; i < run.map.nodes.size(); ++i) {
     nodes[run.observations[i]] = i;
-    if (run.map.nodes[i].component == component) {
-      places.push_back(run.map.nodes[i].pose.position());
-    }
-  }
-  std::vector<RunEdge> edges;
-  const auto node_of = [&](ViewId view) {
-    return *std::ranges::lower_bound(run.map.nodes, view, {}, &MapNode::view);
-  };
-  for (const MapEdge& edge : run.map.edges) {
-    const MapNode a = node_of(edge.a);
-    if (a.component != component) continue;
-    edges.push_back({a.pose.position(), node_of(edge.b).pose.position(), edge.kind});
+    names.push_back(recording.entries[run.observations[i]].file);
   }
   Progress progress(session, "recording", recording.entries.size());
   make_in_order(
@@ -222,8 +255,12 @@ void record_map(const MapArguments& wanted, const Dataset& recording, const Mapp
         if (moment.sure && run.map.nodes[node->second].component == component) {
           moment.pose = run.map.nodes[node->second].pose;
         }
-        moment.references = std::exchange(places, {});
-        moment.edges = std::exchange(edges, {});
+        if (i == 0) put_component(moment, run.map, component, names);
+        if (wanted.report) {
+          RunMoment shown = moment;
+          shown.truth.reset();  // in another frame than the map's
+          played.add(shown);
+        }
         record.add(std::move(moment));
         progress.advance();
       });
@@ -236,7 +273,7 @@ void refuse_without_effect(const Arguments& arguments, const MapArguments& wante
                            const Dataset& recording, const MemoryHeader& header) {
   const auto has_odometry = [](const DatasetEntry& entry) { return entry.odometry.has_value(); };
   const bool all = std::ranges::all_of(recording.entries, has_odometry);
-  const bool wheels = wanted.mapper.mapping.wheel_lengths && all;
+  const bool wheels = wanted.mapper.mapping.wheels && all;
   if (arguments.given("visual_odometry", "camera_height_m") && !header.elevations) {
     throw FileError(wanted.dataset,
                     "does not tell the elevations of its pictures' rows, without which the ground "
@@ -246,7 +283,7 @@ void refuse_without_effect(const Arguments& arguments, const MapArguments& wante
   if (arguments.given("visual_odometry", "camera_height_m") && wheels) {
     throw FileError(wanted.dataset,
                     "has odometry, which tells the lengths of all steps; allowed with "
-                    "--camera-height-m: recordings without it, or --wheel-lengths false");
+                    "--camera-height-m: recordings without it, or --wheels false");
   }
   if (wheels) {
     arguments.refuse_unused({"--scale-m", "--step-deviation"},
@@ -254,13 +291,16 @@ void refuse_without_effect(const Arguments& arguments, const MapArguments& wante
   }
   if (all) arguments.refuse_unused({"--bridge-m"}, "where odometry tells of all steps");
   if (std::ranges::none_of(recording.entries, has_odometry)) {
-    const std::string why = "as " + wanted.dataset + " has no odometry";
-    arguments.refuse_unused({"--wheel-deviation"}, why);
-    if (wanted.mapper.mapping.wheel_lengths) arguments.refuse_unused({"--wheel-lengths"}, why);
+    if (wanted.mapper.mapping.wheels) {
+      arguments.refuse_unused({"--wheels"}, "as " + wanted.dataset + " has no odometry");
+    }
   }
 }
 
 ExitCode map(const Arguments& arguments, const MapArguments& wanted, Session& session) {
+#ifdef PANONAV_COMMAND_SIMULATES
+  if (wanted.report) prepare_report_folder(*wanted.report, "map");
+#endif
   const bool there = fs::exists(wanted.memory);
   std::optional<MemoryFile> memory;
   if (there) memory = MemoryFile::open(wanted.memory, Access::read_write);
@@ -280,7 +320,8 @@ ExitCode map(const Arguments& arguments, const MapArguments& wanted, Session& se
   options.thumbnails = !wanted.no_thumbnails;
   Mapper mapper(std::move(*memory), recording.source, options);
   if (there) check_known_views(recording, mapper.memory(), mapper.encoder(), session.executor());
-  const MappedRun run = map_recording(recording, mapper, session);
+  const MappedRun run = wanted.record.view ? map_in_view(wanted, recording, mapper, session)
+                                           : map_recording(recording, mapper, session);
   if (wanted.tum) write_trajectory(*wanted.tum, trajectory_of(recording, run, wanted.dataset));
   if (wanted.graph) {
     write_graph(*wanted.graph, run.map, [&](ViewId view) {
@@ -289,11 +330,21 @@ ExitCode map(const Arguments& arguments, const MapArguments& wanted, Session& se
       return recording.entries[run.observations[number]].file;
     });
   }
-  if (wanted.record) record_map(wanted, recording, run, mapper.encoder(), session);
+  RunPage played("", recording.entries.size());
+  if (wanted.record.file || wanted.report) {
+    record_map(wanted, recording, run, mapper.encoder(), played, session);
+  }
 #ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.picture) write_map_picture(*wanted.picture, recording, run);
+  if (wanted.report) {
+    write_map_report(*wanted.report, fs::path(wanted.memory).filename().string(), recording, run,
+                     played);
+  }
 #endif
   print_result(wanted, recording, run, session);
+#ifdef PANONAV_COMMAND_SIMULATES
+  if (wanted.report) tell_report(*wanted.report, session);
+#endif
   return ExitCode::done;
 }
 
@@ -311,9 +362,15 @@ Run declare_map(Arguments& arguments) {
       "that ends in .csv");
   arguments.option("--graphml FILE", wanted->graph, "Write the map as a graph to this file");
   declare_record(arguments, wanted->record);
+  declare_view(arguments, wanted->record);
+  arguments.uncommon({"--record"});
 #ifdef PANONAV_COMMAND_SIMULATES
   arguments.option("--picture FILE", wanted->picture,
                    "Draw the map, beside the truth where it is known, into this PNG or SVG file");
+  arguments.option("--report FOLDER", wanted->report,
+                   "Write a page that plays the drive on its map into this folder: a new one, or "
+                   "that of an earlier report");
+  arguments.uncommon({"--picture"});
 #endif
   arguments.flag("--no-thumbnails", wanted->no_thumbnails,
                  "Do not keep small pictures of the views");
@@ -343,13 +400,13 @@ Verb map_verb() {
   return {"map", "Make a map from pictures in the order in which they were taken",
           "Each picture is placed by what its view shows of the step from the one before; places "
           "that are\n"
-          "passed again close the loop. Where the data set has odometry, the lengths of steps are "
-          "its; all\n"
-          "else comes from the views. Without odometry, --camera-height-m makes metres of lengths. "
-          "What\n"
-          "nothing connects is kept as separate components.",
+          "passed again close the loop. Where the data set has odometry, steps are its, with turns "
+          "that\n"
+          "the views steady. Without it, --camera-height-m makes metres of lengths. What nothing "
+          "connects\n"
+          "is kept as separate components.",
           "  panonav map office_run office.panonav\n"
-          "  panonav map office_run office.panonav --picture map.png --graphml map.graphml\n"
+          "  panonav map office_run office.panonav --report mapped --graphml map.graphml\n"
           "  panonav map walk walk.panonav --camera-height-m 0.6\n"
           "  panonav map walk walk.panonav --capture-difference 0.1 --json",
           declare_map};

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -13,11 +14,17 @@
 #include "cli/verbs.hpp"
 #include "experiments/runs/mission_picture.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/navigation/direction_field.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
+#include "panonav/storage/memory_file.hpp"
+#include "reports/navigate_report.hpp"
+#include "reports/report_page.hpp"
 #include "verbs/navigated_run.hpp"
 #include "verbs/run_record.hpp"
+#include "verbs/shown_references.hpp"
 
 namespace panonav::command {
 
@@ -33,8 +40,9 @@ struct NavigateArguments {
   std::optional<std::string> route;
   std::optional<std::string> log;
   std::optional<std::string> picture;
-  std::optional<std::string> record;
-  SimulationArguments simulation;
+  std::optional<std::string> report;
+  RunRecordArguments record;
+  SimulatedWorldOptions simulation;
   MissionOptions mission;
   KnownRouteOptions known_route;
 };
@@ -226,16 +234,21 @@ class MissionMoments {
       : robot_(robot), remembered_(remembered), field_(field) {}
 
   void saw(const Image& picture, const Panorama& panorama) {
+    clock_.stage("driving, picture");
     picture_ = picture;
     panorama_ = panorama;
   }
-  RunMoment of(const NavigationDecision& decision, const Pose2& pose) {
+  void restart() { clock_.restart(); }
+  RunMoment of(const NavigationDecision& decision, const Pose2& pose, const Scene& scene) {
+    clock_.stage("signature, decision");
     RunMoment moment{.stamp_s = static_cast<double>(number_++), .pose = pose};
+    if (decision.homing && panorama_) moment.homing = homing();
     moment.picture = std::exchange(picture_, std::nullopt);
     moment.panorama = std::exchange(panorama_, std::nullopt);
     moment.truth = ReferencePose{pose.x_m, pose.y_m, pose.heading_rad};
     moment.sure = decision.probability >= 0.5;
     moment.state = name_of(decision.state);
+    moment.probability = decision.probability;
     moment.values.emplace_back("probability", fixed(decision.probability, 4));
     for (const NavigationEvent event : decision.events) {
       moment.values.emplace_back("event", name_of(event));
@@ -247,7 +260,13 @@ class MissionMoments {
       const auto way = planned_from(*decision.nearest);
       if (way != plan_) moment.plan = plan_ = way;
     }
-    if (number_ == 1) add_field(moment);
+    if (number_ == 1) moment.walls = walls_of(scene);
+    if (shown_goal_ != robot_.goal()) {
+      add_field(moment);
+      shown_goal_ = robot_.goal();
+    }
+    clock_.stage("for viewers");
+    clock_.put(moment);
     return moment;
   }
 
@@ -267,17 +286,31 @@ class MissionMoments {
     }
     return way;
   }
-  /// The views, where each sends the robot, and the goal.
+  /// From what is seen to where the goal's view was taken.
+  [[nodiscard]] RunHoming homing() {
+    const ViewId goal = robot_.goal();
+    const VisualMemory views = robot_.memory().load({&goal, 1});
+    const HomeVector home = home_vector(homing_view(views.signature(goal)),
+                                        homing_view(robot_.encoder().signature(*panorama_)));
+    return {home.direction_rad(), home.confidence};
+  }
+  /// The views with their areas, where each sends the robot, and the goal.
   void add_field(RunMoment& moment) const {
     const auto guides = direction_field(remembered_.graph, robot_.goal(), field_);
+    std::vector<std::size_t> areas;
     for (std::size_t i = 0; i < guides.size(); ++i) {
       const Pose2& pose = remembered_.truth[i];
       if (!is_known(pose)) continue;
       moment.references.push_back(pose.position());
+      moment.reference_views.push_back(
+          {robot_.info(remembered_.graph.view(i)).name,
+           std::isfinite(pose.heading_rad) ? std::optional(pose.heading_rad) : std::nullopt});
+      areas.push_back(robot_.planner().areas().area_of[i]);
       if (!guides[i].direction_rad || !std::isfinite(pose.heading_rad)) continue;
       moment.directions.push_back(
           {pose.x_m, pose.y_m, wrap_angle(pose.heading_rad + *guides[i].direction_rad)});
     }
+    moment.regions = regions_of(moment.references, areas);
     Pose2 goal = remembered_.truth[*remembered_.graph.node_of(robot_.goal())];
     if (!is_known(goal)) return;
     if (!std::isfinite(goal.heading_rad)) goal.heading_rad = 0.0;
@@ -291,13 +324,34 @@ class MissionMoments {
   std::optional<Panorama> panorama_;
   std::vector<Pose2> plan_;
   std::size_t number_ = 0;
+  std::optional<ViewId> shown_goal_;
+  StageClock clock_;
 };
 
+/// The remembered view nearest to where a viewer has clicked; empty where none did, or no way leads
+/// there.
+std::optional<ViewId> goal_as_wished(RobotNavigator& robot, const RememberedPlace& remembered,
+                                     RunRecord& record, Session& session) {
+  const auto wish = record.take_wish();
+  if (!wish) return std::nullopt;
+  std::optional<std::size_t> nearest;
+  double least_m = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < remembered.truth.size(); ++i) {
+    const double away_m = distance(remembered.truth[i].position(), wish->position());
+    if (robot.graph().exits(i).empty() || !(away_m < least_m)) continue;
+    nearest = i;
+    least_m = away_m;
+  }
+  if (!nearest) return std::nullopt;
+  const ViewId view = robot.graph().view(*nearest);
+  const std::string name = robot.info(view).name;
+  robot.set_goal(name);
+  session.note("a viewer sends the robot to " + readable_line(name));
+  return view;
+}
+
 ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, Session& session) {
-  const auto given = [&](const std::string& section, const std::string& name) {
-    return arguments.given(section, name);
-  };
-  if (given("odometry", "drive")) {
+  if (arguments.given("odometry", "drive")) {
     throw UsageError("--odometry-drive: the robot's drive is --drive here; leave it out");
   }
   RobotNavigatorOptions options{.navigator = wanted.mission.navigator,
@@ -310,18 +364,21 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
   if (robot.memory().header().source.kind != PictureKind::mirror) {
     arguments.refuse_unused({"--vignetting"}, "on the panoramas of this memory");
   }
-  const std::string goal_file = robot.info(robot.goal()).name;
   const RememberedPlace remembered = remembered_by(robot);
   if (wanted.kidnap &&
       !std::isfinite(remembered.truth[*remembered.graph.node_of(robot.goal())].x_m)) {
-    throw FileError(wanted.memory, "does not know where the view " + goal_file +
+    throw FileError(wanted.memory, "does not know where the view " + robot.info(robot.goal()).name +
                                        " was taken, so half of the way neither; leave out "
                                        "--kidnap");
   }
-  RunRecord record(wanted.record, std::span(&wanted.memory, 1), false, session);
+  if (wanted.report) prepare_report_folder(*wanted.report, "navigate");
+  RunPage played("", 100);
+  RunRecord record(wanted.record, std::span(&wanted.memory, 1), false, session,
+                   {.memory = wanted.memory, .takes = ViewWish::goal});
+  if (wanted.report) record.also_into(played);
   MissionMoments moments(robot, remembered, wanted.mission.planner.field);
   const MissionPlace place = place_as_remembered(
-      wanted.scene, wanted.simulation, robot, given, session,
+      wanted.scene, wanted.simulation, robot, typed_options(arguments), session,
       record.wanted()
           ? [&](const Image& picture, const Panorama& panorama) { moments.saw(picture, panorama); }
           : SightReport());
@@ -334,17 +391,22 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
                        ? "an arrangement made now (panonav arrange would keep one)"
                        : "the memory's " + std::string(name_of(robot.origin()))));
   }
-  const MissionRun run =
-      run_mission(place, remembered, robot.navigator(), mission, wanted.mission, seed,
-                  [&](const NavigationDecision& decision, const Pose2& pose) {
-                    if (record.wanted()) record.add(moments.of(decision, pose));
-                    if (session.json()) {
-                      session.print(json_line(as_json(decision, pose, robot)));
-                    } else if (!decision.events.empty()) {
-                      session.print(as_text(decision, robot));
-                    }
-                  });
+  const MissionRun run = run_mission(
+      place, remembered, robot.navigator(), mission, wanted.mission, seed,
+      [&](const NavigationDecision& decision, const Pose2& pose) {
+        if (record.wanted()) {
+          record.add(moments.of(decision, pose, place.scene));
+          moments.restart();
+        }
+        if (session.json()) {
+          session.print(json_line(as_json(decision, pose, robot)));
+        } else if (!decision.events.empty()) {
+          session.print(as_text(decision, robot));
+        }
+      },
+      [&] { return goal_as_wished(robot, remembered, record, session); });
   record.close();
+  const std::string goal_file = robot.info(robot.goal()).name;  // a viewer may have changed it
   if (wanted.log) write_log(*wanted.log, run);
   if (wanted.picture) {
     write_mission_picture(
@@ -352,10 +414,18 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
         "to " + goal_file + " in " + place.scene.name + ": " + std::string(name_of(run.end)), place,
         remembered, wanted.mission.planner, robot.goal(), run);
   }
+  if (wanted.report) {
+    write_navigate_report(
+        *wanted.report,
+        {goal_file, std::string(reason_of(run.end)), run,
+         mission_plot("", place, remembered, wanted.mission.planner, robot.goal(), run)},
+        played);
+  }
   if (session.json()) {
     session.print(json_line(summary_json(wanted, robot, goal_file, mission.start, run)));
   } else {
     print_summary(run, session);
+    if (wanted.report) tell_report(*wanted.report, session);
   }
   return run.end == NavigationState::arrived ? ExitCode::done : ExitCode::no_answer;
 }
@@ -382,8 +452,12 @@ Run declare_navigate(Arguments& arguments) {
   arguments.option("--picture FILE", wanted->picture,
                    "Draw the directions to the goal, the way planned and the way driven into this "
                    "PNG or SVG file");
+  arguments.option("--report FOLDER", wanted->report,
+                   "Write a page that plays the mission with its decisions into this folder: a new "
+                   "one, or that of an earlier report");
   declare_record(arguments, wanted->record);
-  arguments.uncommon({"--record"});
+  declare_view(arguments, wanted->record);
+  arguments.uncommon({"--record", "--view", "--picture"});
   arguments.options("simulation", wanted->simulation.simulation.scene);
   arguments.options("navigator", wanted->mission.navigator);
   arguments.options("planner", wanted->mission.planner);
@@ -418,8 +492,8 @@ Verb navigate_verb() {
           "from the\n"
           "goal it ended, and which views lie beside a --route. The exit code is 1 unless the "
           "robot arrives: blocked, lost or unreachable.",
-          "  panonav navigate office.panonav --goal view_00012.png --scene office --picture "
-          "way.png\n"
+          "  panonav navigate office.panonav --goal view_00012.png --scene office --report "
+          "mission\n"
           "  panonav navigate office.panonav --goal 3 --scene office --light 0.7 --moved-objects "
           "0.1 --json\n"
           "  panonav navigate drive.panonav --goal 60 --scene loop --route route",

@@ -67,10 +67,9 @@ std::function<FourierSignature(const Pose2& pose, std::uint64_t seed)> sight_thr
   };
 }
 
-MissionPlace place_as_remembered(
-    const std::string& scene, SimulationArguments wanted, const RobotNavigator& robot,
-    const std::function<bool(const std::string&, const std::string&)>& given, Session& session,
-    SightReport seen) {
+MissionPlace place_as_remembered(const std::string& scene, SimulatedWorldOptions wanted,
+                                 const RobotNavigator& robot, const GivenOption& given,
+                                 Session& session, SightReport seen) {
   const MemoryHeader& header = robot.memory().header();
   const bool mirror = header.source.kind == PictureKind::mirror;
   if (!mirror) {
@@ -92,8 +91,8 @@ MissionPlace place_as_remembered(
   const RecordingCamera camera = mirror ? RecordingCamera(*header.source.camera) : world.camera();
   const PictureSource source = mirror ? header.source : world.source();
   const auto pipeline = std::make_shared<const ViewEncoder>(header, source);
-  MissionPlace place = world.place();
-  const SimulationArguments& settled = world.arguments();
+  MissionPlace place = mission_place(world);
+  const SimulatedWorldOptions& settled = world.options();
   place.sight = sight_through(place.renderer, camera, settled.frame, settled.sensor, pipeline,
                               &session.executor(), std::move(seen));
   if (const RouteSource* const route = robot.route()) {

@@ -33,9 +33,10 @@ using SightReport = std::function<void(const Image& picture, const Panorama& pan
 /// is the header's. Where the robot goes along a route it takes lines from these pictures, too.
 /// Throws FileError when the memory does not know which elevations its rows show; else as
 /// `SimulatedWorld`. `session` must outlive the place.
-[[nodiscard]] MissionPlace place_as_remembered(
-    const std::string& scene, SimulationArguments wanted, const RobotNavigator& robot,
-    const std::function<bool(const std::string&, const std::string&)>& given, Session& session,
-    SightReport seen = {});
+[[nodiscard]] MissionPlace place_as_remembered(const std::string& scene,
+                                               SimulatedWorldOptions wanted,
+                                               const RobotNavigator& robot,
+                                               const GivenOption& given, Session& session,
+                                               SightReport seen = {});
 
 }  // namespace panonav::command

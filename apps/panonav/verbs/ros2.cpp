@@ -60,17 +60,16 @@ std::vector<std::string> without_ros_arguments(std::span<const std::string> type
       return word == flag || word.starts_with(flag + "=");
     });
   };
-  std::vector<std::string_view> names;
-  std::vector<std::string> own_names;
-  for (const auto& info : infos) own_names.push_back(parameter_name(info));
-  names.assign(own_names.begin(), own_names.end());
+  std::vector<std::string> names;
+  for (const auto& info : infos) names.push_back(parameter_name(info));
   for (const auto& [name, values, where] : read.parameters) {
-    const auto found = std::ranges::find(own_names, name);
-    if (found == own_names.end()) {
+    const auto found = std::ranges::find(names, name);
+    if (found == names.end()) {
+      const std::vector<std::string_view> known(names.begin(), names.end());
       throw UsageError(where + ": the node has no parameter '" + readable_line(name) + "'" +
-                       did_you_mean(name, names));
+                       did_you_mean(name, known));
     }
-    const auto& info = infos[static_cast<std::size_t>(found - own_names.begin())];
+    const auto& info = infos[static_cast<std::size_t>(found - names.begin())];
     if (info.name == "MEMORY") {
       const bool given = std::ranges::any_of(
           read.words, [](const std::string& word) { return word.ends_with(".panonav"); });

@@ -13,6 +13,7 @@
 #include "verbs/followed_run.hpp"
 #include "verbs/recording.hpp"
 #include "verbs/run_record.hpp"
+#include "viewer/page.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES
 #include "reports/report_page.hpp"
 #include "reports/route_report.hpp"
@@ -32,7 +33,7 @@ struct FollowArguments {
   bool no_odometry = false;
   std::optional<std::string> tum;
   std::optional<std::string> report;
-  std::optional<std::string> record;
+  RunRecordArguments record;
   RouteTrackerOptions tracker;
   RouteFitOptions fit;
 };
@@ -154,18 +155,24 @@ ExitCode follow_run(const Arguments& arguments, const FollowArguments& wanted, S
   std::vector<double> seconds;
   if (wanted.tum) seconds = seconds_of(run, wanted, session);
 #ifdef PANONAV_COMMAND_SIMULATES
-  if (wanted.report) prepare_route_report(*wanted.report, "route follow");
+  if (wanted.report) prepare_report_folder(*wanted.report, "route follow");
 #endif
   std::vector<FollowedImage> images;
   Progress progress(session, "following", (run.entries.size() - 1) / wanted.every + 1);
-  RunRecord record(wanted.record, std::array{wanted.dataset, wanted.memory}, false, session);
+  RunRecord record(wanted.record, std::array{wanted.dataset, wanted.memory}, false, session, {});
   std::optional<PanoramaReader> recorded;
-  if (record.wanted()) recorded.emplace(run.source, PanoramaShape{});
+  if (record.wanted() || wanted.report) recorded.emplace(run.source, PanoramaShape{});
+  RunPage played("", (run.entries.size() - 1) / static_cast<std::size_t>(wanted.every) + 1);
   follow(follower, run, truth, wanted.every, recorded ? &*recorded : nullptr, session.executor(),
          [&](FollowedImage&& image) {
            progress.clear();
            session.print(session.json() ? json_line(as_json(image, headings_known))
                                         : as_text(image, session));
+           if (wanted.report) {
+             RunMoment moment = *image.moment;
+             moment.values.insert(moment.values.begin(), {"picture", image.file});
+             played.add(moment);
+           }
            if (image.moment) record.add(std::move(*image.moment));
            image.moment.reset();
            images.push_back(std::move(image));
@@ -185,8 +192,9 @@ ExitCode follow_run(const Arguments& arguments, const FollowArguments& wanted, S
   if (!session.json()) print_summary(summary, images, session);
 #ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) {
-    write_follow_report(*wanted.report, follower.name(), follower.tracker().lines(), images,
-                        summary);
+    const auto panorama = memory.route(follower.name());
+    write_follow_report(*wanted.report, {follower.name(), *panorama, follower.tracker().lines()},
+                        images, summary, std::move(played));
     tell_report(*wanted.report, session);
   }
 #endif
@@ -211,6 +219,7 @@ Run declare_route_follow(Arguments& arguments) {
                    "Write the poses on the route to this file: TUM text, or CSV for a name that "
                    "ends in .csv");
   declare_record(arguments, wanted->record);
+  declare_view(arguments, wanted->record);
 #ifdef PANONAV_COMMAND_SIMULATES
   arguments.option("--report FOLDER", wanted->report,
                    "Write pictures of the route, the fixes, and what was seen beside what the "

@@ -14,6 +14,7 @@
 #include "verbs/memorising.hpp"
 #include "verbs/recording.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES
+#include "reports/report_page.hpp"
 #include "reports/route_report.hpp"
 #endif
 
@@ -55,18 +56,6 @@ std::pair<int, int> rows_from_text(const std::string& text) {
                    "'; allowed: FIRST-LAST, rows from 0 at the top, such as 17-20");
 }
 
-/// The entries that become lines: those far enough from the last.
-std::vector<std::size_t> chosen_entries(const std::vector<Pose2>& poses, double every_m) {
-  std::vector<std::size_t> chosen;
-  std::optional<Pose2> last;
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    if (!RouteRecorder::is_due(last, poses[i], every_m)) continue;
-    chosen.push_back(i);
-    last = poses[i];
-  }
-  return chosen;
-}
-
 /// The poses to remember and the frame that they are in.
 std::vector<Pose2> recorded_poses(const RecordArguments& wanted, const Dataset& dataset,
                                   bool& from_odometry, Session& session) {
@@ -95,30 +84,6 @@ std::vector<Pose2> recorded_poses(const RecordArguments& wanted, const Dataset& 
   }
   from_odometry = true;
   return poses;
-}
-
-RecordedRoute record_lines(const RecordArguments& wanted, const Dataset& dataset,
-                           const std::vector<Pose2>& poses, bool from_odometry,
-                           RouteRecorder& recorder, Session& session) {
-  auto chosen = chosen_entries(poses, wanted.every_m.value_or(0.1));
-  std::vector<Pose2> drive;
-  for (const std::size_t entry : chosen) drive.push_back(poses[entry]);
-  const std::size_t recorded = recorder.skip_recorded(drive);
-  chosen.erase(chosen.begin(), chosen.begin() + static_cast<std::ptrdiff_t>(recorded));
-  Progress progress(session, "recording", chosen.size());
-  make_in_order(
-      chosen.size(), session.executor(),
-      [&](std::size_t i) {
-        Observation seen = read_observation(dataset.entries[chosen[i]]);
-        const Pose2& pose = poses[chosen[i]];
-        if (!from_odometry) seen.pose = ReferencePose{pose.x_m, pose.y_m, pose.heading_rad};
-        return recorder.encode(seen);
-      },
-      [&](std::size_t, RouteRecorder::EncodedLine&& line) {
-        recorder.add(std::move(line));
-        progress.advance();
-      });
-  return recorder.finish();
 }
 
 std::string rows_text(const std::optional<std::pair<int, int>>& rows) {
@@ -164,7 +129,7 @@ ExitCode record(const Arguments& arguments, const RecordArguments& wanted, Sessi
   choose_lines(arguments, wanted, dataset.source, memory, options);
   const auto poses = recorded_poses(wanted, dataset, options.odometry, session);
 #ifdef PANONAV_COMMAND_SIMULATES
-  if (wanted.report) prepare_route_report(*wanted.report, "route record");
+  if (wanted.report) prepare_report_folder(*wanted.report, "route record");
 #endif
   // Views can be memorised into a new file later; what they need of the pictures is known now.
   RouteRecorder recorder(
@@ -172,7 +137,12 @@ ExitCode record(const Arguments& arguments, const RecordArguments& wanted, Sessi
              : MemoryFile::create(wanted.memory,
                                   header_from_first_views(dataset, {}, {}, session.executor())),
       dataset.source, options);
-  const auto recorded = record_lines(wanted, dataset, poses, options.odometry, recorder, session);
+  std::optional<Progress> bar;
+  const auto recorded = recorder.record(dataset, poses, session.executor(), [&](std::size_t lines) {
+    if (!bar) bar.emplace(session, "recording", lines);
+    bar->advance();
+  });
+  bar.reset();
   const double length_m = recorded.route.length_m();
   const double bytes_per_km = recorded.bytes_per_km();
 #ifdef PANONAV_COMMAND_SIMULATES

@@ -18,6 +18,7 @@
 #include "verbs/memorising.hpp"
 #include "verbs/recording.hpp"
 #include "verbs/run_record.hpp"
+#include "verbs/shown_references.hpp"
 #include "verbs/tracked_run.hpp"
 
 namespace panonav::command {
@@ -33,7 +34,7 @@ struct RunArguments {
   bool learn = false;
   std::optional<double> learn_interval_s;
   LiveArguments live;
-  std::optional<std::string> record;
+  RunRecordArguments record;
   std::optional<std::string> route;
   SignatureOptions signature;
   PreprocessingOptions preprocessing;
@@ -115,21 +116,31 @@ class RunMoments {
   RunMoments(const LiveMemory& memory, std::string path)
       : memory_(memory), path_(std::move(path)) {}
 
-  RunMoment of(const Observation& seen, const LiveMemory::Answer& answer) {
-    RunMoment moment = moment_of(seen, number_++);
+  RunMoment of(const Observation& seen, const LiveMemory::Answer& answer, const RunRecord& record,
+               StageClock& stages) {
+    RunMoment moment = record.moment_of(seen, number_++);
+    stages.put(moment);
     const PlaceRecogniser* const recogniser = memory_.recogniser();
-    moment.panorama = memory_.panorama();
+    if (record.wants_pictures()) moment.panorama = memory_.panorama();
     if (!answer.place) {
       moment.state = "no memory yet";
       return moment;
     }
     describe(moment, *answer.place);
+    StageClock clock;
     if (!file_) file_ = MemoryFile::open(path_, Access::read_only);
-    moment.best_match = best_match_of(*answer.place, *file_);
-    // Rarely: the cloud is that of all views.
-    if (memory_.views() > references_ + references_ / 8) {
+    if (record.wants_pictures()) moment.best_match = best_match_of(*answer.place, *file_);
+    // Rarely: the cloud is that of all views. A memory that was read anew has other ids.
+    if (memory_.views() > references_ + references_ / 8 || recogniser != shown_of_) {
       references_ = memory_.views();
-      moment.references = reference_positions(recogniser->memory());
+      shown_of_ = recogniser;
+      shown_.emplace(recogniser->memory());
+      shown_->put(moment);
+    }
+    if (moment.panorama) {
+      shown_->compare(moment, recogniser->memory(), recogniser->encoder().packed(*moment.panorama));
+      clock.stage("for viewers");
+      clock.put(moment);
     }
     return moment;
   }
@@ -140,6 +151,8 @@ class RunMoments {
   std::optional<MemoryFile> file_;  // there is none before a new memory's first views
   std::size_t number_ = 0;
   std::size_t references_ = 0;  // that are in the record
+  std::optional<ShownReferences> shown_;
+  const PlaceRecogniser* shown_of_ = nullptr;
 };
 
 RoutePoses route_poses(const Dataset& recording) {
@@ -196,24 +209,33 @@ ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& se
                             .localiser = {}};
   if (wanted.learn_interval_s) options.min_interval_s = *wanted.learn_interval_s;
   LiveMemory memory(wanted.memory, options);
-  RunRecord record(wanted.record, std::array{wanted.source, wanted.memory}, live, session);
+  RunRecord record(wanted.record, std::array{wanted.source, wanted.memory}, live, session,
+                   {.memory = wanted.memory});
   RunMoments moments(memory, wanted.memory);
   std::size_t known = 0;
   std::chrono::duration<double, std::milli> unwrapping{};
   LiveMemory::Answer answer;
   std::optional<RouteStep> step;
+  StageClock stages;
   LiveRun taking(*source, wanted.pictures.part, wanted.live, session);
   taking.take(
       [&](const Observation& seen) {
+        stages = StageClock();
+        if (const auto ms = taking.decoding_ms()) stages.add("reading", *ms);
         answer = memory.answer(seen);
+        stages.part("unwarping", answer.unwrapping);
+        stages.stage("signature, search, ranking");
         if (answer.place && answer.place->known) ++known;
         unwrapping += answer.unwrapping;
-        if (follower) step = follower->step(seen);
+        if (follower) {
+          step = follower->step(seen);
+          stages.stage("route");
+        }
         return line_of(seen, answer, step, session);
       },
       [&](Observation&& seen) {
         if (route) route->add(seen, memory);
-        if (record.wanted()) record.add(moments.of(seen, answer));
+        if (record.wanted()) record.add(moments.of(seen, answer, record, stages));
         if (answer.is_new) memory.learn(std::move(seen));
       });
   memory.finish();  // a reader of the lines may never go on
@@ -241,6 +263,7 @@ Run declare_run(Arguments& arguments) {
   arguments.option("--learn-interval-s", wanted->learn_interval_s,
                    "Time between two views that are added, at least; default 0.5");
   declare_record(arguments, wanted->record);
+  declare_view(arguments, wanted->record);
   arguments.option("--route NAME", wanted->route,
                    "Follow this route of the memory; with --learn record it, a line each 0.1 m");
   declare_live(arguments, wanted->live);

@@ -1,6 +1,11 @@
 #include "verbs/run_record.hpp"
 
+#include <arpa/inet.h>
+
+#include <charconv>
 #include <filesystem>
+#include <functional>
+#include <memory>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -8,26 +13,100 @@
 
 namespace panonav::command {
 
-void declare_record(Arguments& arguments, std::optional<std::string>& file) {
-  arguments.option("--record FILE", file,
+namespace {
+
+/// "8080" and "192.168.1.5:8080".
+ViewServerOptions place_of(const std::string& text) {
+  ViewServerOptions options;
+  const std::size_t colon = text.rfind(':');
+  if (colon != std::string::npos) options.address = text.substr(0, colon);
+  const char* const from = text.data() + (colon == std::string::npos ? 0 : colon + 1);
+  const char* const to = text.data() + text.size();
+  const auto [end, error] = std::from_chars(from, to, options.port);
+  in_addr ignored{};
+  if (error != std::errc() || end != to || options.port < 0 || options.port > 65535 ||
+      inet_pton(AF_INET, options.address.c_str(), &ignored) != 1) {
+    throw UsageError("--view is " + readable_line(text) +
+                     "; allowed: a port, 0 to 65535, or an IPv4 address of this machine with a " +
+                     "port, such as 192.168.1.5:8080");
+  }
+  return options;
+}
+
+/// The thumbnails of a memory that may not be there yet, for one thread.
+std::function<std::vector<std::uint8_t>(const std::string&)> thumbnails_of(std::string memory) {
+  return [memory = std::move(memory), file = std::shared_ptr<MemoryFile>()](
+             const std::string& name) mutable -> std::vector<std::uint8_t> {
+    try {
+      if (!file) {
+        file = std::make_shared<MemoryFile>(MemoryFile::open(memory, Access::read_only));
+      }
+      const auto view = file->find(name);
+      const auto picture = view ? file->thumbnail(*view) : std::nullopt;
+      return picture.value_or(std::vector<std::uint8_t>{});
+    } catch (const FileError&) {
+      return {};  // the viewer is told that there is none
+    }
+  };
+}
+
+}  // namespace
+
+void declare_record(Arguments& arguments, RunRecordArguments& record) {
+  arguments.option("--record FILE", record.file,
                    "Write what is seen and answered as MCAP, for Rerun, Foxglove and Lichtblick");
 }
 
-RunRecord::RunRecord(const std::optional<std::string>& file, std::span<const std::string> read,
-                     bool live, Session& session)
-    : session_(session) {
-  if (!file) return;
-  for (const std::string& other : read) {
-    std::error_code ignored;
-    if (std::filesystem::equivalent(*file, other, ignored)) {
-      throw UsageError("--record is " + *file + ", which the run reads; allowed: another file");
+void declare_view(Arguments& arguments, RunRecordArguments& record) {
+  arguments.option("--view PORT", record.view,
+                   "Show the run in browsers of this machine, at this port (0: a free one); "
+                   "ADDRESS:PORT shows it to the network of that address, too");
+}
+
+RunRecord::RunRecord(const RunRecordArguments& wanted, std::span<const std::string> read, bool live,
+                     Session& session, const Offers& offers)
+    : session_(session), live_(live) {
+  if (wanted.file) {
+    for (const std::string& other : read) {
+      std::error_code ignored;
+      if (std::filesystem::equivalent(*wanted.file, other, ignored)) {
+        throw UsageError("--record is " + *wanted.file +
+                         ", which the run reads; allowed: another file");
+      }
     }
+    recorder_.emplace(*wanted.file, RunRecorderOptions{.wait = !live});
   }
-  recorder_.emplace(*file, RunRecorderOptions{.wait = !live});
+  if (wanted.view) {
+    ViewServerOptions options = place_of(*wanted.view);
+    options.title = "panonav: " + (read.empty() ? std::string() : read.front());
+    options.replay = !live;
+    options.takes = offers.takes;
+    if (!offers.memory.empty()) options.thumbnail = thumbnails_of(offers.memory);
+    viewer_.emplace(options);
+    session_.ask("Open " + viewer_->url() + " in a browser" +
+                 (live ? "" : "; the run waits for it"));
+  }
+}
+
+bool RunRecord::wants_pictures() const {
+  return recorder_ || page_ != nullptr || (viewer_ && (!live_ || viewer_->viewers() > 0));
+}
+
+RunMoment RunRecord::moment_of(const Observation& seen, std::size_t number) const {
+  if (wants_pictures()) return panonav::moment_of(seen, number);
+  return {.stamp_s = seen.stamp_s.value_or(static_cast<double>(number)),
+          .odometry = seen.odometry,
+          .tilt = seen.tilt,
+          .truth = seen.pose};
 }
 
 void RunRecord::add(RunMoment moment) {
-  if (!recorder_ || failed_) return;
+  if (page_ != nullptr) page_->add(moment);
+  if (!recorder_ || failed_) {
+    if (viewer_) viewer_->add(std::move(moment));
+    return;
+  }
+  if (viewer_) viewer_->add(moment);
   try {
     recorder_->add(std::move(moment));
   } catch (const Error& error) {
@@ -37,6 +116,7 @@ void RunRecord::add(RunMoment moment) {
 }
 
 void RunRecord::close() {
+  viewer_.reset();
   if (!recorder_ || failed_) return;
   try {
     recorder_->close();

@@ -10,31 +10,62 @@
 #include "cli/session.hpp"
 #include "panonav/pipeline/run_recorder.hpp"
 #include "panonav/storage/memory_file.hpp"
+#include "viewer/page.hpp"
+#include "viewer/view_server.hpp"
 
 namespace panonav::command {
 
-/// Adds --record.
-void declare_record(Arguments& arguments, std::optional<std::string>& file);
+/// Where a run is kept and shown.
+struct RunRecordArguments {
+  std::optional<std::string> file;
+  std::optional<std::string> view;  ///< [ADDRESS:]PORT
+};
 
-/// What --record writes of a run. A record that cannot be written any more ends with a note, and
-/// the run goes on: its answers are worth more.
+/// Adds --record.
+void declare_record(Arguments& arguments, RunRecordArguments& record);
+/// Adds --view.
+void declare_view(Arguments& arguments, RunRecordArguments& record);
+
+/// What --record writes of a run, and --view shows. A record that cannot be written any more ends
+/// with a note, and the run goes on: its answers are worth more.
 class RunRecord {
  public:
-  /// Does nothing without a file. Of a live run moments are left out that the disk does not keep up
-  /// with. Throws UsageError where the file is one of those that the run reads, FileError where it
-  /// cannot be made.
-  RunRecord(const std::optional<std::string>& file, std::span<const std::string> read, bool live,
-            Session& session);
+  /// What viewers may ask of a run, and tell it.
+  struct Offers {
+    std::string memory;  ///< whose thumbnails they see; empty: none
+    ViewWish takes = ViewWish::none;
+  };
 
-  [[nodiscard]] bool wanted() const noexcept { return recorder_.has_value(); }
+  /// Does nothing where nothing is wanted. Of a live run moments are left out that the disk or a
+  /// viewer does not keep up with; any other run waits for both. Throws UsageError where the file
+  /// is one of those that the run reads or there is no such address, FileError where the file
+  /// cannot be made.
+  RunRecord(const RunRecordArguments& wanted, std::span<const std::string> read, bool live,
+            Session& session, const Offers& offers);
+
+  /// Moments are added to the page, too, which must outlive the run.
+  void also_into(RunPage& page) noexcept { page_ = &page; }
+  /// Whether `add` does anything.
+  [[nodiscard]] bool wanted() const noexcept { return recorder_ || viewer_ || page_ != nullptr; }
+  /// Whether somebody looks at pictures: a file, or a viewer who is there or waited for.
+  [[nodiscard]] bool wants_pictures() const;
+  /// What is known of an observation, with its picture where it is wanted.
+  [[nodiscard]] RunMoment moment_of(const Observation& seen, std::size_t number) const;
   void add(RunMoment moment);
-  /// All that waits is written.
+  /// What a viewer wished since the last time.
+  [[nodiscard]] std::optional<ReferencePose> take_wish() {
+    return viewer_ ? viewer_->take_wish() : std::nullopt;
+  }
+  /// All that waits is written, and viewers know that the run has ended.
   void close();
   [[nodiscard]] std::size_t left_out() const { return recorder_ ? recorder_->left_out() : 0; }
 
  private:
   Session& session_;
+  bool live_;
   std::optional<RunRecorder> recorder_;
+  std::optional<ViewServer> viewer_;
+  RunPage* page_ = nullptr;
   bool failed_ = false;
 };
 

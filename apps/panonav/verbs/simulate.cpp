@@ -29,8 +29,8 @@ struct SimulateArguments {
   std::optional<double> grid_m;
   std::optional<std::uint64_t> random;
   std::optional<std::string> trajectory;
-  std::optional<std::string> record;
-  SimulationArguments simulation;
+  RunRecordArguments record;
+  SimulatedWorldOptions simulation;
 #ifdef PANONAV_COMMAND_SPEAKS_DDS
   ros2::SimulatedRobotOptions robot;
 #endif
@@ -61,34 +61,13 @@ void apply_shorthands(const Arguments& arguments, SimulateArguments& wanted) {
     recording.poses = static_cast<int>(*wanted.random);
   }
   if (arguments.given("recording", "heading")) return;
-  switch (recording.path) {
-    case RecordingPath::grid:
-    case RecordingPath::zigzag:
-      recording.heading = RecordingHeading::fixed;
-      break;
-    case RecordingPath::tour:
-    case RecordingPath::walk:
-      recording.heading = RecordingHeading::path;
-      break;
-    case RecordingPath::random:
-      recording.heading = RecordingHeading::random;
-      break;
-  }
+  recording.heading = usual_heading(recording.path);
 }
 
-std::vector<RecordedPose> poses_of_file(const std::string& path,
-                                        const SimulationArguments& wanted) {
-  std::vector<RecordedPose> recorded;
-  std::vector<Pose2> poses;
-  for (const auto& stamped : read_trajectory(path)) {
-    recorded.push_back({stamped.stamp_s, stamped.pose, {}});
-    poses.push_back(stamped.pose);
-  }
-  if (recorded.empty()) throw FileError(path, "holds no pose; allowed: one or more");
-  const auto odometry = simulate_odometry(poses, wanted.odometry,
-                                          static_cast<std::uint64_t>(wanted.simulation.scene.seed));
-  for (std::size_t i = 0; i < recorded.size(); ++i) recorded[i].odometry = odometry[i];
-  return recorded;
+std::vector<RecordedPose> poses_of_file(const std::string& path, const SimulatedWorld& world) {
+  const auto trajectory = read_trajectory(path);
+  if (trajectory.empty()) throw FileError(path, "holds no pose; allowed: one or more");
+  return world.plan_along(trajectory);
 }
 
 void check_out(const std::string& out) {
@@ -114,8 +93,7 @@ RunMoment moment_of(const DatasetEntry& entry, const Image& picture,
 #ifdef PANONAV_COMMAND_SPEAKS_DDS
 ExitCode drive_robot(const SimulatedWorld& world, const ros2::SimulatedRobotOptions& options,
                      Session& session) {
-  const SimulationArguments& settled = world.arguments();
-  const auto seed = static_cast<std::uint64_t>(settled.simulation.scene.seed);
+  const auto seed = static_cast<std::uint64_t>(world.options().simulation.scene.seed);
   Random random(seed, 0);
   const Scene& scene = world.scene();
   Pose2 start = world.free_space().random_pose(random);
@@ -127,10 +105,9 @@ ExitCode drive_robot(const SimulatedWorld& world, const ros2::SimulatedRobotOpti
       {.node = "panonav_simulation"}, options,
       {start, [&](Point2 place) { return world.free_space().is_free(place); },
        [&](const Pose2& pose, std::uint64_t number) {
-         return take_picture(world.renderer(), pose, world.camera(), settled.frame, settled.sensor,
-                             number, session.executor());
+         return world.take_picture(pose, number, session.executor());
        }},
-      settled.odometry, seed, [&](const std::string& line) { session.note(line); });
+      world.options().odometry, seed, [&](const std::string& line) { session.note(line); });
   const StopSignals signals([&] { robot.stop(); });
   session.note("panonav simulate: a robot is in " + scene.name + " at " + fixed(start.x_m, 2) +
                ", " + fixed(start.y_m, 2) + "; it obeys cmd_vel, and Ctrl-C ends it");
@@ -147,12 +124,8 @@ ExitCode simulate(const Arguments& arguments, SimulateArguments wanted, Session&
   const std::string out = wanted.ros2 ? "" : wanted.out.front();
   apply_shorthands(arguments, wanted);
   if (!wanted.ros2) check_out(out);
-  const SimulatedWorld world(
-      wanted.scene, wanted.simulation,
-      [&](const std::string& section, const std::string& name) {
-        return arguments.given(section, name);
-      },
-      session.executor());
+  const SimulatedWorld world(wanted.scene, wanted.simulation, typed_options(arguments),
+                             session.executor());
   for (const auto& warning : world.scene().warnings) session.note("warning: " + warning);
   if (wanted.ros2) {
 #ifdef PANONAV_COMMAND_SPEAKS_DDS
@@ -162,15 +135,10 @@ ExitCode simulate(const Arguments& arguments, SimulateArguments wanted, Session&
         "this panonav was built without Cyclone DDS; install cyclonedds-dev and build it again");
 #endif
   }
-  const auto& settled = world.arguments();
-  const auto poses =
-      wanted.trajectory
-          ? poses_of_file(*wanted.trajectory, settled)
-          : plan_recording(world.scene(), world.free_space(), settled.recording, settled.odometry,
-                           static_cast<std::uint64_t>(settled.simulation.scene.seed));
+  const auto poses = wanted.trajectory ? poses_of_file(*wanted.trajectory, world) : world.plan();
   const bool with_path =
-      wanted.trajectory.has_value() || settled.recording.path != RecordingPath::random;
-  RunRecord record(wanted.record, {}, false, session);
+      wanted.trajectory.has_value() || world.options().recording.path != RecordingPath::random;
+  RunRecord record(wanted.record, {}, false, session, {});
   const PanoramaReader panoramas(world.source(), {});
   std::size_t number = 0;
   Progress progress(session, "rendering", poses.size());

@@ -57,7 +57,7 @@ struct TrackArguments {
   std::optional<double> start_heading_deg;
   std::optional<std::string> tum;
   std::optional<std::string> report;
-  std::optional<std::string> record;
+  RunRecordArguments record;
   LiveArguments live;
   StartOptions start;
   MonteCarloOptions filter;
@@ -227,6 +227,20 @@ ExitCode exit_code_of(const TrackSummary& summary) {
   return summary.localised > 0 ? ExitCode::done : ExitCode::no_answer;
 }
 
+/// A viewer has told where the robot is; false where none did.
+bool start_as_wished(Tracker& tracker, RunRecord& record) {
+  // A finger on a map, and an arrow beside it.
+  constexpr double deviation_m = 0.3;
+  constexpr double heading_deviation_deg = 20.0;
+  constexpr double any_heading_deg = 180.0;
+  const auto wish = record.take_wish();
+  if (!wish) return false;
+  const double heading_rad = wrap_angle(wish->heading_rad.value_or(0.0));
+  tracker.start_at({wish->x_m, wish->y_m, heading_rad}, deviation_m,
+                   radians(wish->heading_rad ? heading_deviation_deg : any_heading_deg));
+  return true;
+}
+
 /// Follows a robot through pictures as they come, until the source ends or the user interrupts. A
 /// live source has no odometry: motion is read from the pictures.
 ExitCode track_live(const Arguments& arguments, const TrackArguments& wanted,
@@ -240,9 +254,11 @@ ExitCode track_live(const Arguments& arguments, const TrackArguments& wanted,
   session.note("panonav track: motion is read from the pictures; one unit of the views is " +
                short_number(odometry.scale_m()) + " m, as in the memory");
   start(tracker, wanted);
-  RunRecord record(wanted.record, std::span(&wanted.memory, 1), true, session);
-  auto references = reference_positions(tracker.memory());  // for the first moment
-  const TrackSettings settings{.recorded = record.wanted() ? &file : nullptr};
+  RunRecord record(wanted.record, std::span(&wanted.memory, 1), true, session,
+                   {.memory = wanted.memory, .takes = ViewWish::pose});
+  std::optional<ShownReferences> shown;
+  if (record.wanted()) shown.emplace(tracker.memory());
+  const TrackSettings settings{.recorded = &file, .shown = shown ? &*shown : nullptr};
   std::vector<StampedPose> trajectory;
   TrackSummary summary;
   std::size_t index = 0;
@@ -251,18 +267,31 @@ ExitCode track_live(const Arguments& arguments, const TrackArguments& wanted,
   taking.take(
       [&](const Observation& seen) -> std::string {
         const std::size_t number = index++;
-        odometry.add(OdometryView(tracker.encoder().signature(seen)));
+        const ViewEncoder& encoder = tracker.encoder();
+        StageClock clock;
+        if (const auto ms = taking.decoding_ms()) clock.add("reading", *ms);
+        std::optional<Panorama> unwarped;
+        if (record.wants_pictures()) unwarped = encoder.panorama(seen);
+        if (unwarped) clock.stage("unwarping");
+        const FourierSignature view =
+            unwarped ? encoder.signature(*unwarped) : encoder.signature(seen);
+        clock.stage(unwarped ? "signature" : "unwarping and signature");
+        odometry.add(OdometryView(view));
         tracker.move_to(odometry.pose());
+        clock.stage("visual odometry");
+        const bool moved_by_hand = start_as_wished(tracker, record);
         if (number % static_cast<std::size_t>(wanted.every) != 0) return "";
         if (record.wanted()) {
-          moment = moment_of(seen, number);
+          moment = record.moment_of(seen, number);
+          moment->panorama = std::move(unwarped);
           moment->odometry = odometry.pose();
-          moment->panorama = tracker.encoder().panorama(seen);
-          moment->references = std::exchange(references, {});
+          if (number == 0) shown->put(*moment);
+          clock.put(*moment);
         }
-        TrackedImage image =
-            track_image(tracker, tracker.encoder().packed(seen), settings, std::move(moment));
+        TrackedImage image = track_image(tracker, pack(view, encoder.header().full_scale), settings,
+                                         std::move(moment));
         moment = std::move(image.moment);
+        if (moment && moved_by_hand) tell_wish(*moment);
         image.index = number;
         image.file = seen.name;
         image.stamp_s = seen.stamp_s;
@@ -310,19 +339,28 @@ ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Ses
   TrackSettings settings{.every = wanted.every};
 #ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) {
-    prepare_track_report(*wanted.report);
+    prepare_report_folder(*wanted.report, "track");
     settings.particles_kept = particles_shown(run.entries.size());
   }
 #endif
 
-  RunRecord record(wanted.record, std::array{wanted.dataset, wanted.memory}, false, session);
-  if (record.wanted()) settings.recorded = &file;
+  RunRecord record(wanted.record, std::array{wanted.dataset, wanted.memory}, false, session,
+                   {.memory = wanted.memory, .takes = ViewWish::pose});
+  const std::size_t looked_at = (run.entries.size() - 1) / settings.every + 1;
+  std::optional<ShownReferences> shown;
+  if (record.wanted() || wanted.report) {
+    settings.recorded = &file;
+    settings.shown = &shown.emplace(tracker.memory());
+    settings.wished = [&] { return start_as_wished(tracker, record); };
+  }
+  RunPage played("panonav track: " + readable_line(wanted.dataset), looked_at);
   std::vector<TrackedImage> images;
-  Progress progress(session, "tracking", (run.entries.size() - 1) / settings.every + 1);
+  Progress progress(session, "tracking", looked_at);
   track(tracker, run, settings, session.executor(), [&](TrackedImage&& image) {
     progress.clear();
     session.print(session.json() ? json_line(as_json(image)) : as_text(image, session));
-    if (image.moment) record.add(std::move(*image.moment));
+    if (wanted.report) add(played, image);
+    if (record.wanted()) record.add(std::move(*image.moment));
     image.moment.reset();
     images.push_back(std::move(image));
     progress.advance();
@@ -342,7 +380,7 @@ ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Ses
 #ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) {
     write_track_report(*wanted.report, tracker.memory(), tracker.localiser().model().spacing_m,
-                       images, summary);
+                       images, summary, played);
     tell_report(*wanted.report, session);
   }
 #endif
@@ -369,10 +407,11 @@ Run declare_track(Arguments& arguments) {
                    "Write the trajectory of localised images to this file: TUM text, or CSV for a "
                    "name that ends in .csv");
   declare_record(arguments, wanted->record);
+  declare_view(arguments, wanted->record);
   declare_live(arguments, wanted->live);
 #ifdef PANONAV_COMMAND_SIMULATES
   arguments.option("--report FOLDER", wanted->report,
-                   "Write pictures and an animation of particles, estimate and truth into this "
+                   "Write pictures and a page that plays the run into this "
                    "folder: a new one, or that of an earlier report");
 #endif
   arguments.options("start", wanted->start, "start");

@@ -53,17 +53,41 @@ TrackSummary summarise_track(const std::vector<TrackedImage>& images) {
 TrackedImage track_image(Tracker& tracker, const PackedSignature& view,
                          const TrackSettings& settings, std::optional<RunMoment> moment) {
   TrackedImage image;
+  StageClock clock;
   image.estimate = tracker.observe(view);
+  clock.stage("filter");
   image.particles = even_sample(tracker.localiser().particles(), settings.particles_kept);
   if (moment) {
     describe(*moment, image.estimate);
     moment->particles = even_sample(tracker.localiser().particles(), 500);
-    const auto found = tracker.memory().search(view, {.top = 1});
-    moment->best_match = settings.recorded->thumbnail(found.matches.front().view)
-                             .value_or(std::vector<std::uint8_t>{});
+    if (moment->panorama) {
+      if (settings.shown != nullptr) settings.shown->compare(*moment, tracker.memory(), view);
+      const ViewId best = tracker.memory().search(view, {.top = 1}).matches.front().view;
+      moment->best_match = settings.recorded->thumbnail(best).value_or(std::vector<std::uint8_t>{});
+      const auto& reference = tracker.memory().info(best).pose;
+      if (moment->pose && reference && reference->heading_rad) {
+        moment->best_match_turn_rad =
+            angle_difference(moment->pose->heading_rad, *reference->heading_rad);
+      }
+    }
+    clock.stage("for viewers");
+    clock.put(*moment);
     image.moment = std::move(moment);
   }
   return image;
+}
+
+void tell_wish(RunMoment& moment) {
+  moment.values.emplace_back("event", "a viewer tells where the robot is");
+}
+
+void add(RunPage& page, const TrackedImage& image) {
+  RunMoment moment = *image.moment;
+  moment.particles = image.particles;
+  constexpr std::size_t max_compared = 50;  // else they would be most of a page of many pictures
+  if (moment.comparisons.size() > max_compared) moment.comparisons.resize(max_compared);
+  moment.values.insert(moment.values.begin(), {"picture", image.file});
+  page.add(moment);
 }
 
 void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, Executor& executor,
@@ -78,23 +102,31 @@ void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, 
     std::vector<std::optional<RunMoment>> moments(count);
     for_each_entry(executor, count, [&](std::size_t i) {
       const std::size_t index = (begin + i) * every;
+      StageClock clock;
       Observation seen = read_observation(entries[index]);
+      clock.stage("reading");
       if (settings.recorded == nullptr) {
         signatures[i] = tracker.encoder().packed(seen);
         return;
       }
       RunMoment& moment = moments[i].emplace(moment_of(seen, index));
+      clock.restart();
       moment.panorama = tracker.encoder().panorama(seen);
+      clock.stage("unwarping");
       signatures[i] = tracker.encoder().packed(*moment.panorama);
-      if (index == 0) moment.references = reference_positions(tracker.memory());
+      clock.stage("signature");
+      clock.put(moment);
+      if (index == 0 && settings.shown != nullptr) settings.shown->put(moment);
     });
     for (std::size_t i = 0; i < count; ++i) {
       const std::size_t index = (begin + i) * every;
+      const bool wished = settings.wished && settings.wished();
       for (std::size_t e = index - std::min(index, every - 1); e <= index; ++e) {
         tracker.move_to(*entries[e].odometry);
       }
       const DatasetEntry& entry = entries[index];
       TrackedImage image = track_image(tracker, *signatures[i], settings, std::move(moments[i]));
+      if (image.moment && wished) tell_wish(*image.moment);
       image.index = index;
       image.file = entry.file;
       image.stamp_s = entry.stamp_s;

@@ -15,6 +15,8 @@
 #include "panonav/pipeline/tracker.hpp"
 #include "panonav/pipeline/visual_motion.hpp"
 #include "panonav/storage/memory_file.hpp"
+#include "verbs/shown_references.hpp"
+#include "viewer/page.hpp"
 
 namespace panonav::command {
 
@@ -49,15 +51,26 @@ void add(TrackSummary& summary, const TrackedImage& image);
 
 struct TrackSettings {
   int every = 1;                   ///< pictures between those that are looked at, plus one
-  std::size_t particles_kept = 0;  ///< of each image, for pictures
+  std::size_t particles_kept = 0;  ///< of each image, for pictures and its page
   /// The memory's file, for the thumbnails of best matches: moments are filled. Null: they are not.
   const MemoryFile* recorded = nullptr;
+  /// Which references the views are compared with, for moments; null: with none.
+  const ShownReferences* shown = nullptr;
+  /// Asked before each image: whether somebody has told the tracker where the robot is. Empty:
+  /// nobody can.
+  std::function<bool()> wished;
 };
 
-/// What the filter says of the image, and with `recorded` what is recorded of it.
+/// What the filter says of the image and, where a moment is given, what is recorded of it.
 [[nodiscard]] TrackedImage track_image(Tracker& tracker, const PackedSignature& view,
                                        const TrackSettings& settings,
                                        std::optional<RunMoment> moment);
+
+/// That a viewer has told where the robot is.
+void tell_wish(RunMoment& moment);
+
+/// Adds the image to the page that plays the run. Its moment must be there.
+void add(RunPage& page, const TrackedImage& image);
 
 /// Runs the filter over a recording whose entries all have odometry: it moves with every entry and
 /// looks at every `settings.every`-th picture, the first one included. Signatures are computed on

@@ -85,6 +85,10 @@ std::vector<std::uint8_t> encode_png(ImageView image) {
   return detail::encode_png(image);
 }
 
+std::vector<std::uint8_t> encode_jpeg(ImageView image, int quality) {
+  return detail::encode_jpeg(image, quality);
+}
+
 void write_png(const std::filesystem::path& path, ImageView image) {
   const auto bytes = encode_png(image);
   write_file(path, bytes);

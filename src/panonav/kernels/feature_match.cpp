@@ -22,14 +22,13 @@ void nearest_descriptors(std::span<const std::uint64_t> a, std::span<const std::
   });
 }
 
-void count_explained(std::span<const BearingLane> lanes, std::span<const float> directions,
-                     float square_tolerance, std::span<std::int32_t> counts,
+void count_explained(const MatchedBearings& matched, const ViewTurn& turn, const MotionAxes& axes,
+                     const BearingTolerance& tolerance, std::span<std::int32_t> counts,
                      Instructions instructions) {
-  require(directions.size() == 2 * counts.size(), "cosines and sines of directions",
-          static_cast<double>(directions.size()), "two for each count");
+  require(counts.size() == 2 * motion_axes, "counts", static_cast<double>(counts.size()),
+          "two for each axis");
   with_body<FeatureMatchBody>(instructions, [&](auto body) {
-    body.count_explained(lanes.data(), lanes.size(), directions.data(), counts.size(),
-                         square_tolerance, counts.data());
+    body.count_explained(matched, turn, axes, tolerance, counts.data());
   });
 }
 

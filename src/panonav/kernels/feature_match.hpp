@@ -15,12 +15,13 @@ void nearest_descriptors(std::span<const std::uint64_t> a, std::span<const std::
                          std::span<std::uint16_t> nearest_of_a,
                          std::span<std::uint16_t> nearest_of_b, Instructions instructions);
 
-/// Counts for each direction of motion how many matched bearings it explains (docs/equations.md,
-/// Local features): `counts[d]` for `directions[2 d]`, `directions[2 d + 1]`, the cosine and the
-/// sine of direction d. All instruction sets give the same numbers. Throws ContractError on sizes
+/// Counts for each direction of motion how many matched bearings it explains after the reference
+/// has been turned by `turn` (docs/equations.md, Local features): `counts[d]` for axis d and
+/// `counts[d + motion_axes]` for its opposite. Bearings that the turn leaves a right angle or more
+/// apart do not count. All instruction sets give the same numbers. Throws ContractError on sizes
 /// that do not fit.
-void count_explained(std::span<const BearingLane> lanes, std::span<const float> directions,
-                     float square_tolerance, std::span<std::int32_t> counts,
+void count_explained(const MatchedBearings& matched, const ViewTurn& turn, const MotionAxes& axes,
+                     const BearingTolerance& tolerance, std::span<std::int32_t> counts,
                      Instructions instructions);
 
 }  // namespace panonav::kernels

@@ -31,15 +31,30 @@ inline constexpr int matched_bands = 16;
 /// Descriptors of 256 bits that `nearest_descriptors` takes of a view.
 inline constexpr int max_descriptors = 256;
 
-/// Matched bearings side by side, in a frame between those of both views. Tangents are those of the
-/// elevations. Azimuths of both are mirrored where the query's lies clockwise of the reference's,
-/// so that the angle from the direction of motion to either must have a sine of at least
-/// `min_sine`; 2 for a lane without a match.
-struct BearingLane {
-  static constexpr int size = 16;
-  float query_sine[size], query_cosine[size], query_tangent[size];
-  float reference_sine[size], reference_cosine[size], reference_tangent[size];
-  float min_sine[size];
+/// Bearings of features that two views share, an array for each number. Tangents are those of the
+/// elevations; `sine` and `cosine` belong to the azimuth in the query minus that in the reference.
+struct MatchedBearings {
+  const float *query_sine, *query_cosine, *query_tangent;
+  const float *reference_sine, *reference_cosine, *reference_tangent;
+  const float *sine, *cosine;
+  size_t count;
+};
+
+/// A turn between two views, and its half.
+struct ViewTurn {
+  float sine, cosine, half_sine, half_cosine;
+};
+
+/// Directions of motion of which the opposite ones are tried as well.
+inline constexpr int motion_axes = 16;
+struct MotionAxes {
+  float cosine[motion_axes], sine[motion_axes];
+};
+
+/// How far a bearing may be off, below a right angle, and how many times as far as a landmark the
+/// views may be apart.
+struct BearingTolerance {
+  float sine, cosine, max_ratio;
 };
 
 inline constexpr int similarity_lanes = 12;

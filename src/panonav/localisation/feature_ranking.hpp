@@ -13,6 +13,11 @@ namespace panonav {
 /// The local features of a view of the memory; empty where it has none.
 using FeatureSource = std::function<std::optional<LocalFeatures>(ViewId)>;
 
+/// Makes the local features of a query where they are needed, as it was seen or of its mirror image
+/// (`mirrored`); empty where elevations are unknown.
+enum class Handedness { as_seen, mirrored };
+using QueryFeatures = std::function<std::optional<LocalFeatures>(Handedness)>;
+
 /// Matches that are compared by local features: enough that the right one is among them in a memory
 /// with references 2 m apart, few enough that a query stays below 5 ms.
 inline constexpr int verified_candidates = 24;

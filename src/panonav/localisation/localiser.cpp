@@ -25,6 +25,16 @@ PackedSignature with_rows(PackedSignature signature, std::span<const std::uint8_
   return signature;
 }
 
+// Without the features in rows that do not count.
+std::optional<LocalFeatures> with_rows(std::optional<LocalFeatures> features,
+                                       std::span<const std::uint8_t> allowed_rows) {
+  if (features && !allowed_rows.empty()) {
+    std::erase_if(features->features,
+                  [&](const LocalFeature& feature) { return allowed_rows[feature.row] == 0; });
+  }
+  return features;
+}
+
 constexpr std::size_t references = 4;  // the corners of a grid's square
 
 // The mean of what the nearest references say. The error of the compass grows with the distance,
@@ -120,7 +130,7 @@ Localiser::Localiser(const VisualMemory& memory, const PlaceModel& place_model,
 }
 
 Localisation Localiser::localise(const PackedSignature& query, const SearchMask& mask,
-                                 const LocalFeatures* features) const {
+                                 const QueryFeatures& features) const {
   Localisation result;
   result.components = options_.components == 0 ? memory_->shape().components : options_.components;
   const auto nearest = [&](int wanted) {
@@ -131,7 +141,11 @@ Localisation Localiser::localise(const PackedSignature& query, const SearchMask&
     result.views_compared += found.matches.size();
     return ranking_->rank(query, found.matches, mask.allowed_rows);
   };
-  const bool by_features = features != nullptr && features_ && options_.reranked_views > 0;
+  std::optional<LocalFeatures> seen_features;
+  if (features && ranks_by_features() && options_.reranked_views > 0) {
+    seen_features = with_rows(features(Handedness::as_seen), mask.allowed_rows);
+  }
+  const bool by_features = seen_features.has_value();
   const int first =
       std::max({options_.top, PositionModel::candidates, by_features ? verified_candidates : 0});
   std::vector<RankedMatch> ranked = nearest(first);
@@ -144,14 +158,25 @@ Localisation Localiser::localise(const PackedSignature& query, const SearchMask&
     ranked = nearest(options_.reranked_views);
   }
   result.evidence = criterion_.evidence(query, ranked, mask);
-  result.known_probability = place_probability(result.evidence);
-  result.known = result.known_probability >= 0.5;
   // Profiles of the references are kept over all rows.
   if (options_.reranked_views > 0 && mask.allowed_rows.empty()) {
     support_.put_best_supported_first(ColumnProfiles(query, options_.components), ranked,
                                       mask.excluded_views);
   }
-  if (by_features) put_verified_first(*features, features_, ranked);
+  if (by_features) put_verified_first(*seen_features, features_, ranked);
+  const bool known_by_columns = place_probability(result.evidence) >= 0.5;
+  if (features && features_ && leave_doubt(result.evidence)) {
+    if (!seen_features) {
+      seen_features = with_rows(features(Handedness::as_seen), mask.allowed_rows);
+    }
+    const auto mirrored = with_rows(features(Handedness::mirrored), mask.allowed_rows);
+    if (seen_features && mirrored) {
+      result.evidence.features =
+          criterion_.feature_evidence(*seen_features, *mirrored, features_, ranked, mask);
+    }
+  }
+  result.known_probability = place_probability(result.evidence);
+  result.known = result.known_probability >= 0.5;
   if (options_.reranked_views == 0) {
     std::ranges::sort(ranked, {}, [](const RankedMatch& r) {
       return std::pair(r.match.dissimilarity, r.match.view);
@@ -172,6 +197,11 @@ Localisation Localiser::localise(const PackedSignature& query, const SearchMask&
   }
   if (result.known) {
     result.position = interpolate_position(*ranking_, position_model_, ranked);
+    // Columns alone do not know the place: so much do they say of the position.
+    if (!known_by_columns && result.position && result.position->radius_m) {
+      result.position->radius_m =
+          std::max(*result.position->radius_m, position_model_.neighbourhood_m);
+    }
     result.heading_rad = absolute_heading(*memory_, result.matches);
     if (result.position && options_.reranked_views > 0 && !by_features) {
       put_nearest_first(*memory_, result.position->position, result.matches);

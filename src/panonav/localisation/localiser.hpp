@@ -41,7 +41,8 @@ struct Localisation {
   /// local features decide, those with most verified features come first instead.
   std::vector<LocalisedMatch> matches;
   /// Interpolated between references; empty when the place is unknown or the nearest view has no
-  /// pose.
+  /// pose. Where local features alone know the place, the radius is at least the neighbourhood of
+  /// the interpolation (`PositionModel`).
   std::optional<PositionEstimate> position;
   /// Absolute, in [-pi, pi); empty when the place is unknown or none of the four nearest views has
   /// a heading.
@@ -76,10 +77,14 @@ class Localiser {
             const PositionModel& position_model, const LocaliserOptions& options = {},
             std::optional<double> spacing_m = std::nullopt);
 
-  /// From now on local features decide between the best matches, in queries that come with theirs.
-  /// For memories in which `features_tell_more`.
-  void rank_by_features(FeatureSource features) { features_ = std::move(features); }
-  [[nodiscard]] bool ranks_by_features() const noexcept { return static_cast<bool>(features_); }
+  /// From now on, in queries that come with theirs, local features are evidence of whether the
+  /// place is known, where columns leave doubt. `rank`: they also decide between the best matches,
+  /// for memories in which `FeatureTrial::tell_more`.
+  void use_features(FeatureSource features, bool rank) {
+    features_ = std::move(features);
+    rank_by_features_ = rank;
+  }
+  [[nodiscard]] bool ranks_by_features() const noexcept { return features_ && rank_by_features_; }
 
   [[nodiscard]] const PlaceModel& place_model() const noexcept { return place_model_; }
   [[nodiscard]] const PositionModel& position_model() const noexcept { return position_model_; }
@@ -93,10 +98,12 @@ class Localiser {
   /// between the references [M04 footnote 1] and the absolute heading: the weighted mean over the
   /// four nearest references, so that the opposite parallaxes of references on opposite sides
   /// cancel. Throws ContractError on a query of another shape. Cost: one exact search and about 0.2
-  /// ms; 3 ms and a second search when 1000 views are compared; 3 ms more where features decide.
-  /// `features`: those of the query; null: they do not decide.
+  /// ms; 3 ms and a second search when 1000 views are compared; 2 ms more where features decide
+  /// between matches, 3 ms where columns leave doubt whether the place is known, 4 ms for both.
+  /// `features`: makes those of the query where they are needed, each at most once; empty: they do
+  /// not count.
   [[nodiscard]] Localisation localise(const PackedSignature& query, const SearchMask& mask = {},
-                                      const LocalFeatures* features = nullptr) const;
+                                      const QueryFeatures& features = {}) const;
 
  private:
   Localiser(const VisualMemory& memory, std::shared_ptr<const ColumnRanking> ranking,
@@ -110,7 +117,8 @@ class Localiser {
   PlaceCriterion criterion_;
   PlaceModel place_model_;
   PositionModel position_model_;
-  FeatureSource features_;  ///< empty: features do not decide
+  FeatureSource features_;  ///< empty: features do not count
+  bool rank_by_features_ = false;
 };
 
 }  // namespace panonav

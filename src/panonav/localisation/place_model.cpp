@@ -43,6 +43,7 @@ std::optional<ViewId> nearest_in_space(const VisualMemory& memory, ViewId view) 
 
 constexpr std::size_t chance_views = 64;
 constexpr std::size_t spare_views = 16;  // for excluded ones
+constexpr std::size_t feature_views = 12;
 constexpr std::size_t examined_matches = 16;
 constexpr double decile_deviations = 1.2816;  // of a Gaussian, below its mean
 
@@ -61,6 +62,16 @@ double better_half(const ColumnProfiles& query, const ColumnProfiles& reference,
 double tenth_of(std::vector<double> differences) {
   std::ranges::sort(differences);
   return differences[std::min<std::size_t>(10, differences.size()) - 1];
+}
+
+double log_odds_by_columns(const PlaceEvidence& evidence) {
+  constexpr std::array<double, place_features> learnt{-1.58, -16.46, -9.30, -0.60, -6.43, 0.91};
+  const auto features = features_of(evidence);
+  return std::inner_product(learnt.begin(), learnt.end(), features.begin(), 0.0);
+}
+
+double log_share(int verified, int chance) {
+  return std::log((1.0 + verified) / (1.0 + chance));
 }
 
 // Each by its own number.
@@ -154,10 +165,26 @@ std::array<double, place_features> features_of(const PlaceEvidence& evidence) no
 
 double place_probability(const PlaceEvidence& evidence) noexcept {
   if (evidence.views < 1 || !(evidence.chance > 0.0)) return 0.0;
-  constexpr std::array<double, place_features> learnt{-1.58, -16.46, -9.30, -0.60, -6.43, 0.91};
-  const auto features = features_of(evidence);
+  const double by_columns = 1.0 / (1.0 + std::exp(-log_odds_by_columns(evidence)));
+  if (!evidence.features || !leave_doubt(evidence)) return by_columns;
+  constexpr std::array<double, doubtful_features> learnt{-2.99, 0.23, 3.10, 1.53};
+  const FeatureEvidence& found = *evidence.features;
+  if (learnt[0] + learnt[2] * log_share(found.seen, found.chance) <= 0.0) return by_columns;
+  const auto features = doubtful_features_of(evidence);
   const double z = std::inner_product(learnt.begin(), learnt.end(), features.begin(), 0.0);
   return 1.0 / (1.0 + std::exp(-z));
+}
+
+bool leave_doubt(const PlaceEvidence& evidence) noexcept {
+  if (evidence.views < 1 || !(evidence.chance > 0.0)) return false;
+  static const double doubtful = std::log(0.98 / 0.02);
+  return std::abs(log_odds_by_columns(evidence)) < doubtful;
+}
+
+std::array<double, doubtful_features> doubtful_features_of(const PlaceEvidence& evidence) noexcept {
+  const FeatureEvidence found = evidence.features.value_or(FeatureEvidence{});
+  return {1.0, log_odds_by_columns(evidence), log_share(found.verified, found.chance),
+          log_share(found.verified, found.neighbour)};
 }
 
 PlaceCriterion::PlaceCriterion(const ColumnRanking& ranking)
@@ -229,6 +256,46 @@ PlaceEvidence PlaceCriterion::evidence(const PackedSignature& query,
   found.difference = *std::ranges::min_element(differences);
   found.tenth = tenth_of(std::move(differences));
   found.chance = chance(query, asked, mask);
+  return found;
+}
+
+std::optional<FeatureEvidence> PlaceCriterion::feature_evidence(
+    const LocalFeatures& query, const LocalFeatures& mirrored_query, const FeatureSource& features,
+    std::span<const RankedMatch> matches, const SearchMask& mask) const {
+  if (query.features.empty() || matches.empty() || !features(matches.front().match.view)) {
+    return std::nullopt;
+  }
+  std::vector<int> by_chance;
+  for (const ViewId view : sample_) {
+    if (std::ranges::find(mask.excluded_views, view) != mask.excluded_views.end()) continue;
+    const auto there = features(view);
+    if (!there) continue;
+    by_chance.push_back(match_features(mirrored_query, *there).verified);
+    if (by_chance.size() == feature_views) break;
+  }
+  if (by_chance.empty()) return std::nullopt;
+  FeatureEvidence found{.chance = upper_median(std::move(by_chance)),
+                        .seen = static_cast<int>(query.features.size())};
+  std::vector<LocalFeatures> candidates;
+  std::size_t best = 0;
+  for (const RankedMatch& match :
+       matches.first(std::min<std::size_t>(verified_candidates, matches.size()))) {
+    auto there = features(match.match.view);
+    if (!there) continue;
+    const int verified = match.verified_features
+                             ? *match.verified_features
+                             : match_features(query, *there, found.verified).verified;
+    if (verified > found.verified) best = candidates.size();
+    found.verified = std::max(found.verified, verified);
+    candidates.push_back(std::move(*there));
+  }
+  // Where there is no other view, neighbours tell nothing.
+  if (candidates.size() < 2) found.neighbour = found.verified;
+  for (std::size_t i = 0; i < std::min(candidates.size(), feature_views + 1); ++i) {
+    if (i == best) continue;
+    const int shared = match_features(candidates[best], candidates[i], found.neighbour).verified;
+    found.neighbour = std::max(found.neighbour, shared);
+  }
   return found;
 }
 

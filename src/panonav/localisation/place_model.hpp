@@ -8,6 +8,7 @@
 
 #include "panonav/core/options.hpp"
 #include "panonav/localisation/column_ranking.hpp"
+#include "panonav/localisation/feature_ranking.hpp"
 #include "panonav/memory/view_source.hpp"
 
 namespace panonav {
@@ -64,6 +65,18 @@ struct PlaceModel {
 [[nodiscard]] PlaceModel learn_place_model(const ColumnRanking& ranking,
                                            const PlaceModelOptions& options = {});
 
+/// What the local features of one query tell of whether its place is in the memory.
+struct FeatureEvidence {
+  int verified = 0;  ///< most that a match shares with the query (`match_features`)
+  /// Median of what the mirrored query shares with views drawn from the memory: so many agree with
+  /// one turn and one direction of motion by chance.
+  int chance = 0;
+  /// Most that the match with most verified features shares with another one: what views side by
+  /// side in this memory share. A place that is only built alike shares less.
+  int neighbour = 0;
+  int seen = 0;  ///< features of the query
+};
+
 /// What one query tells of whether its place is in the memory.
 struct PlaceEvidence {
   /// Of the best match, as `ColumnMatch::difference`, over the better half of the compared columns
@@ -79,6 +92,8 @@ struct PlaceEvidence {
   double chance = 1.0;
   int views = 0;       ///< of which the best was chosen
   int components = 0;  ///< of the memory
+  /// Empty where no features were compared.
+  std::optional<FeatureEvidence> features = std::nullopt;
 };
 
 /// What `place_probability` weighs: 1 and the logarithms of the difference's shares of chance and
@@ -94,7 +109,20 @@ inline constexpr int place_features = 6;
 /// as many queries are from the memory's place, from another that is built alike and from
 /// elsewhere. Logistic regression with coefficients that `bench/place_probability` learns on
 /// built-in scenes (docs/decisions.md). 0 where there is nothing to see.
+///
+/// A sequential test: local features count only where columns `leave_doubt`. There the log odds are
+/// a sum of those by columns and of the logarithms of the verified features' shares, so that more
+/// of them never lower the probability. A query with too few features to raise it is judged by
+/// columns alone.
 [[nodiscard]] double place_probability(const PlaceEvidence& evidence) noexcept;
+/// By the columns alone, the probability is between 0.02 and 0.98.
+[[nodiscard]] bool leave_doubt(const PlaceEvidence& evidence) noexcept;
+/// What `place_probability` weighs where columns leave doubt and features were compared: 1, the log
+/// odds by columns alone and the logarithms of the verified features' shares of chance and of what
+/// neighbours share, all counts increased by 1.
+inline constexpr int doubtful_features = 4;
+[[nodiscard]] std::array<double, doubtful_features> doubtful_features_of(
+    const PlaceEvidence& evidence) noexcept;
 
 /// Tells a place of the memory from an unknown one, view by view. All components of the memory
 /// count, however many the search compares.
@@ -112,6 +140,15 @@ class PlaceCriterion {
   [[nodiscard]] PlaceEvidence evidence(const PackedSignature& query,
                                        std::span<const RankedMatch> matches,
                                        const SearchMask& mask = {}) const;
+  /// What the query's features tell. `matches`: the best first, as above; the first
+  /// `verified_candidates` are compared, but for those whose features were (`verified_features`).
+  /// Chance is that of the first 12 drawn views that are not excluded and have features, and the
+  /// match with most verified features is compared with the first 12 others. Empty where the query,
+  /// the first match or all drawn views have none. Cost: 0.1 ms a view compared.
+  [[nodiscard]] std::optional<FeatureEvidence> feature_evidence(
+      const LocalFeatures& query, const LocalFeatures& mirrored_query,
+      const FeatureSource& features, std::span<const RankedMatch> matches,
+      const SearchMask& mask = {}) const;
   /// What the query tells of one place, right or not, instead of the best match's: that of
   /// `candidates.front()`. The others are the views of the memory most like the query.
   [[nodiscard]] PlaceEvidence evidence_for_first(const PackedSignature& query,

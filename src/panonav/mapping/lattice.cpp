@@ -44,8 +44,8 @@ void check(const CoarseMotion& motion) {
 class Arranger {
  public:
   Arranger(const VisualMemory& memory, const LatticeOptions& options,
-           std::span<const CoarseMotion> motion, Executor& executor)
-      : options_(options), executor_(executor), views_(memory, options) {
+           std::span<const CoarseMotion> motion, Executor& executor, const LatticeWatch& watch)
+      : options_(options), executor_(executor), watch_(watch), views_(memory, options) {
     const auto ids = memory.views();
     for (const ViewId view : ids) lattice_.nodes.push_back({.view = view});
     for (const CoarseMotion& step : motion) {
@@ -83,6 +83,7 @@ class Arranger {
         relax();
       }
       set_unit();
+      if (watch_) watch_(start_.poses, start_.components);
     }
     finish();
     return std::move(lattice_);
@@ -274,7 +275,7 @@ class Arranger {
   /// these holds to their component leave it.
   void grow() {
     measure(proposals_);
-    auto grown = grow_components(size(), measured_, lattice_.errors.phase_unit, start_);
+    auto grown = grow_components(size(), measured_, lattice_.errors.phase_unit, start_, watch_);
     start_ = std::move(grown.start);
     proposals_ = std::move(grown.proposals);
     lattice_.energy = grown.energy;
@@ -413,7 +414,9 @@ class Arranger {
 
   void relax() {
     learn_errors(lattice_.springs, lattice_.curve, lattice_.errors);
-    const auto solution = solve_lattice(terms(), start_.poses);
+    const auto solution = solve_lattice(terms(), start_.poses, {}, [this] {
+      if (watch_) watch_(start_.poses, start_.components);
+    });
     for (std::size_t s = 0; s < lattice_.springs.size(); ++s) {
       lattice_.springs[s].weight = solution.weights[s];
     }
@@ -477,6 +480,7 @@ class Arranger {
 
   LatticeOptions options_;
   Executor& executor_;
+  const LatticeWatch& watch_;
   SpringViews views_;
   std::vector<NodeMotion> motions_;
   std::map<NodePair, std::size_t> motion_between_;  // the first motion of two nodes
@@ -530,9 +534,10 @@ CoarseMotion coarse_motion(ViewId from, ViewId to, const Pose2& step,
 }
 
 Lattice arrange(const VisualMemory& memory, const LatticeOptions& options,
-                std::span<const CoarseMotion> motion, Executor& executor) {
+                std::span<const CoarseMotion> motion, Executor& executor,
+                const LatticeWatch& watch) {
   validate(options);
-  return Arranger(memory, options, motion, executor).arrange();
+  return Arranger(memory, options, motion, executor, watch).arrange();
 }
 
 }  // namespace panonav

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -98,6 +99,12 @@ struct Lattice {
   int iterations = 0;
 };
 
+/// Hears how an arrangement unfolds, after each step: the poses of all views in the memory's order,
+/// each in the frame of its component, and to which component each belongs. Lengths change their
+/// unit from step to step. The spans end with the call.
+using LatticeWatch =
+    std::function<void(std::span<const Pose2> poses, std::span<const std::size_t> components)>;
+
 /// Arranges the views of a memory by their similarity alone [M04 section 3], in any order. Poses
 /// that the memory may hold are not used.
 ///
@@ -122,9 +129,10 @@ struct Lattice {
 /// connects are laid out by it first, and only consistent springs are taken from similarity, so
 /// that places that look alike are not confused. It makes the map metric. Throws OptionError, and
 /// ContractError on a motion with an unknown view or numbers that are not finite. The same input
-/// gives the same bits on any number of threads.
+/// gives the same bits on any number of threads, watched or not.
 [[nodiscard]] Lattice arrange(const VisualMemory& memory, const LatticeOptions& options,
-                              std::span<const CoarseMotion> motion, Executor& executor);
+                              std::span<const CoarseMotion> motion, Executor& executor,
+                              const LatticeWatch& watch = {});
 
 /// Adds the views of the memory that the lattice does not have, one after the other. A view gets
 /// springs to the most similar views of the lattice and the place of minimum energy among those

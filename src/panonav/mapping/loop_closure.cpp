@@ -48,17 +48,23 @@ void visit_options(LoopClosureOptions& options, OptionVisitor& visitor) {
 }
 
 LoopClosureFinder::LoopClosureFinder(const VisualMemory& memory, const LoopClosureOptions& options,
-                                     const VisualOdometryOptions& odometry)
-    : memory_(&memory), options_(options), odometry_(odometry) {
+                                     const VisualOdometryOptions& odometry, ClosureScope scope)
+    : memory_(&memory), options_(options), odometry_(odometry), scope_(scope) {
   validate(options);
   validate(odometry);
   odometry_.rule = StepRule::home_vector;  // the other gives no direction
   odometry_.max_residual = options.max_residual;
 }
 
-std::vector<ViewId> LoopClosureFinder::near_on_way(std::span<const PassedNode> nodes,
-                                                   std::size_t node) const {
+std::vector<ViewId> LoopClosureFinder::excluded_for(std::span<const PassedNode> nodes,
+                                                    std::size_t node) const {
   std::vector<ViewId> views;
+  if (scope_ == ClosureScope::other_components) {
+    for (const PassedNode& other : nodes) {
+      if (other.component == nodes[node].component) views.push_back(other.view);
+    }
+    return views;
+  }
   const double here_m = nodes[node].way_m;
   for (std::size_t i = node;; --i) {
     if (here_m - nodes[i].way_m > options_.min_loop_m) break;
@@ -104,7 +110,7 @@ std::optional<LoopClosure> LoopClosureFinder::best_closure(std::span<const Passe
                                                            std::span<const Pose2> poses,
                                                            const OdometryView& view) const {
   const std::size_t here = nodes.size() - 1;
-  const auto excluded = near_on_way(nodes, here);
+  const auto excluded = excluded_for(nodes, here);
   const auto found = memory_->search(memory_->packed(nodes[here].view),
                                      {.top = options_.candidates * views_per_candidate},
                                      {.excluded_views = excluded});
@@ -140,7 +146,7 @@ std::optional<LoopClosure> LoopClosureFinder::best_closure(std::span<const Passe
 bool LoopClosureFinder::is_reciprocal(std::span<const PassedNode> nodes,
                                       std::span<const Pose2> poses,
                                       const LoopClosure& closure) const {
-  const auto excluded = near_on_way(nodes, closure.earlier);
+  const auto excluded = excluded_for(nodes, closure.earlier);
   const auto found =
       memory_->search(memory_->packed(nodes[closure.earlier].view),
                       {.top = options_.reciprocal_rank}, {.excluded_views = excluded});
@@ -148,19 +154,27 @@ bool LoopClosureFinder::is_reciprocal(std::span<const PassedNode> nodes,
     const auto node = node_of(nodes, match.view);
     if (!node) return false;
     return nodes[closure.later].way_m - nodes[*node].way_m < options_.min_loop_m ||
-           gap(poses[*node], poses[closure.earlier]) < options_.max_length * odometry_.scale_m;
+           (nodes[*node].component == nodes[closure.earlier].component &&
+            gap(poses[*node], poses[closure.earlier]) < options_.max_length * odometry_.scale_m);
   });
 }
 
 bool LoopClosureFinder::is_in_reach(std::span<const PassedNode> nodes, std::span<const Pose2> poses,
                                     const LoopClosure& closure) const {
+  // No drift leads from one connected component to another.
+  if (nodes[closure.earlier].component != nodes[closure.later].component) return true;
   const double here_m = nodes[closure.later].way_m;
   const double loop_m = here_m - nodes[closure.earlier].way_m;
   const double since_m = std::min(loop_m, here_m - closed_way_m_);
   constexpr double share_within_closed = 0.2;
   const double allowed_m =
       odometry_.scale_m + options_.max_drift * (since_m + share_within_closed * (loop_m - since_m));
-  return gap(poses[closure.earlier] * closure.earlier_from_later, poses[closure.later]) < allowed_m;
+  // A heading error that grows evenly to an angle is a drift by half of it for each metre.
+  const double allowed_rad = options_.heading_tolerance_rad + 2.0 * options_.max_drift;
+  const Pose2 closed = poses[closure.earlier] * closure.earlier_from_later;
+  const Pose2& reached = poses[closure.later];
+  return gap(closed, reached) < allowed_m &&
+         std::abs(angle_difference(closed.heading_rad, reached.heading_rad)) < allowed_rad;
 }
 
 bool LoopClosureFinder::agree(const LoopClosure& a, const LoopClosure& b,

@@ -37,7 +37,8 @@ struct LoopClosureOptions {
   /// Distance along the path between reported closures: closer ones add nothing and cost time.
   double spacing_m = 0.5;
   /// Drift of the odometry, in metres for each metre, beyond which no closure is believed: counted
-  /// from the last closure, and a fifth of it along the rest of the loop. One R comes on top.
+  /// from the last closure, and a fifth of it along the rest of the loop. One R comes on top. The
+  /// heading may be off by twice this, in rad, and `heading_tolerance_rad`.
   double max_drift = 0.1;
 };
 void visit_options(LoopClosureOptions& options, OptionVisitor& visitor);
@@ -45,7 +46,8 @@ void visit_options(LoopClosureOptions& options, OptionVisitor& visitor);
 /// A node of the map for the search for closures.
 struct PassedNode {
   ViewId view;
-  double way_m = 0.0;  ///< along the way of the robot from its first view to here
+  double way_m = 0.0;         ///< along the way of the robot from its first view to here
+  std::size_t component = 0;  ///< its connected component, in whose frame its pose is
 };
 
 /// Two nodes that see the same place.
@@ -57,6 +59,12 @@ struct LoopClosure {
   friend bool operator==(const LoopClosure&, const LoopClosure&) = default;
 };
 
+/// Where the finder looks for the other node of a closure.
+enum class ClosureScope {
+  everywhere,
+  other_components,  ///< not in the connected component of the latest node
+};
+
 /// Finds loop closures while the robot drives. Candidates come from the memory's search. Home
 /// vectors in both directions must agree with the compass and be each other's inverse; the search
 /// from the candidate must lead back to here; no other place may explain the view as well; the
@@ -65,7 +73,8 @@ class LoopClosureFinder {
  public:
   /// `memory` must outlive the finder. Throws OptionError.
   LoopClosureFinder(const VisualMemory& memory, const LoopClosureOptions& options,
-                    const VisualOdometryOptions& odometry);
+                    const VisualOdometryOptions& odometry,
+                    ClosureScope scope = ClosureScope::everywhere);
 
   /// The last of `nodes` is new and its view is in the memory; `poses` is the map so far, by which
   /// places are told from each other and the sequence is judged. `scale_m` as of the odometry.
@@ -89,14 +98,16 @@ class LoopClosureFinder {
                                  const LoopClosure& closure) const;
   [[nodiscard]] bool agree(const LoopClosure& a, const LoopClosure& b,
                            std::span<const Pose2> poses) const;
-  [[nodiscard]] std::vector<ViewId> near_on_way(std::span<const PassedNode> nodes,
-                                                std::size_t node) const;
+  /// Views that are no candidates for a closure with the node.
+  [[nodiscard]] std::vector<ViewId> excluded_for(std::span<const PassedNode> nodes,
+                                                 std::size_t node) const;
   [[nodiscard]] std::optional<std::size_t> node_of(std::span<const PassedNode> nodes,
                                                    ViewId view) const;
 
   const VisualMemory* memory_;
   LoopClosureOptions options_;
   VisualOdometryOptions odometry_;
+  ClosureScope scope_;
   double closed_way_m_ = 0.0;  // where the last closure was
   struct Pending {
     LoopClosure closure;

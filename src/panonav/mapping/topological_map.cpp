@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/motion/odometry.hpp"
 #include "panonav/relative_pose/fourier_homing.hpp"
 
 namespace panonav {
@@ -23,8 +25,9 @@ constexpr double closure_deviation = 1.0;
 constexpr double closure_position_deviation_m = 0.02;
 constexpr double closure_turn_deviation = 0.05;
 constexpr double closure_heading_deviation_rad = 0.01;
-// Known steps by which the scale is judged: the latest, as R is another in every room.
-constexpr std::size_t max_known_lengths = 15;
+// Steps with wheels by which the views are judged: the latest, as R is another in every room, and
+// so is what stands nearer on one side.
+constexpr std::size_t steps_kept = 15;
 constexpr double refuted_weight = 0.1;
 // Closures that are right within so many standard deviations do not pull.
 constexpr double pulling_deviations = 3.0;
@@ -33,10 +36,14 @@ double length(const Pose2& step) {
   return std::hypot(step.x_m, step.y_m);
 }
 
-Pose2 with_length(const Pose2& step, double length_m) {
-  const double now_m = length(step);
-  if (!(now_m > 0.0)) return {length_m, 0.0, step.heading_rad};
-  return {step.x_m * length_m / now_m, step.y_m * length_m / now_m, step.heading_rad};
+template <class T>
+void keep_latest(std::vector<T>& steps, const T& latest) {
+  if (steps.size() == steps_kept) steps.erase(steps.begin());
+  steps.push_back(latest);
+}
+
+double squared(double value) {
+  return value * value;
 }
 
 }  // namespace
@@ -94,13 +101,12 @@ void visit_options(MappingOptions& options, OptionVisitor& visitor) {
       option<&T::close_loops>("look for places passed before"),
       option<&T::bridge_m>(
           "length of steps that neither views nor wheels show; 0: a new component begins", 0, 1e6),
-      option<&T::wheel_lengths>("take the length of steps from the wheels"),
+      option<&T::wheels>("take steps from the wheels, and the turn from the views, too")
+          .formerly("wheel_lengths"),
       option<&T::step_deviation>("deviation of positions read from views, for each metre", above(0),
                                  10),
       option<&T::turn_deviation>("deviation of headings read from views (rad), for each metre",
                                  above(0), 10),
-      option<&T::wheel_deviation>(
-          "deviation of positions where wheels tell the length, for each metre", above(0), 10),
   };
   table.visit(options, visitor);
 }
@@ -133,29 +139,59 @@ void TopologicalMapper::add_step(const std::optional<VisualStep>& step,
         {here - 1, here, {options_.bridge_m, 0.0, 0.0}, options_.bridge_m, any_heading_rad});
     weights_.push_back(1.0);
     poses_.push_back(poses_.back() * edges_.back().a_from_b);
-    components_.push_back(components_.back());
+    nodes_[here].component = nodes_[here - 1].component;
     nodes_[here].way_m = nodes_[here - 1].way_m + options_.bridge_m;
     return;
   }
   if (!step && !moved) {
     // A frame of its own; the way goes on, so that its views are no candidates for each other.
     update.new_component = true;
-    components_.push_back(components_.back() + 1);
+    nodes_[here].component = nodes_[here - 1].component + 1;
     poses_.emplace_back();
     nodes_[here].way_m = nodes_[here - 1].way_m;
     return;
   }
-  Pose2 motion = step ? step->before_from_after : *moved;
-  const bool wheels = moved && (options_.wheel_lengths || !step);
-  if (step && wheels) motion = with_length(motion, length(*moved));
-  const double length_m = length(motion);
-  const double position = wheels ? options_.wheel_deviation : options_.step_deviation;
-  edges_.push_back({here - 1, here, motion, position * length_m + min_position_deviation_m,
-                    options_.turn_deviation * length_m + min_heading_deviation_rad});
+  const bool wheels = moved && (options_.wheels || !step);
+  if (wheels) {
+    edges_.push_back(wheel_step(*moved, step));
+  } else {
+    const Pose2& motion = step->before_from_after;
+    edges_.push_back({here - 1, here, motion,
+                      options_.step_deviation * length(motion) + min_position_deviation_m,
+                      options_.turn_deviation * length(motion) + min_heading_deviation_rad});
+  }
+  const Pose2& motion = edges_.back().a_from_b;
   weights_.push_back(1.0);
   poses_.push_back(poses_.back() * motion);
-  components_.push_back(components_.back());
-  nodes_[here].way_m = nodes_[here - 1].way_m + length_m;
+  nodes_[here].component = nodes_[here - 1].component;
+  nodes_[here].way_m = nodes_[here - 1].way_m + length(motion);
+}
+
+// A turn of the views is off where things stand nearer on one side, step after step, and nothing in
+// the views tells it: over some steps it shows against the wheels, whose error is known.
+PoseEdge TopologicalMapper::wheel_step(const Pose2& moved, const std::optional<VisualStep>& step) {
+  const std::size_t here = nodes_.size() - 1;
+  const double length_m = length(moved);
+  const StepSampler error(moved, OdometryNoise{});
+  PoseEdge edge{here - 1, here, moved, error.translation_deviation_m() + min_position_deviation_m,
+                error.rotation_deviation_rad() + min_heading_deviation_rad};
+  if (!step) return edge;
+  const double view_turn_rad = step->before_from_after.heading_rad;
+  const double difference_rad = angle_difference(moved.heading_rad, view_turn_rad);
+  keep_latest(turns_, {difference_rad, squared(edge.heading_deviation_rad),
+                       squared(options_.turn_deviation * length_m + min_heading_deviation_rad)});
+  TurnDifference sum{};
+  for (const TurnDifference& each : turns_) {
+    sum.difference_rad += each.difference_rad;
+    sum.wheel_variance += each.wheel_variance;
+    sum.view_variance += each.view_variance;
+  }
+  const double view_variance =
+      std::max(sum.view_variance, squared(sum.difference_rad) - sum.wheel_variance);
+  const double wheel_share = view_variance / (view_variance + sum.wheel_variance);
+  edge.a_from_b.heading_rad = wrap_angle(view_turn_rad + wheel_share * difference_rad);
+  edge.heading_deviation_rad *= std::sqrt(wheel_share);
+  return edge;
 }
 
 MapUpdate TopologicalMapper::add(ViewId view, OdometryView seen,
@@ -169,15 +205,13 @@ MapUpdate TopologicalMapper::add(ViewId view, OdometryView seen,
   }
   MapUpdate update;
   update.step = odometry_.add(std::move(seen));
-  nodes_.push_back({view, 0.0});
+  nodes_.push_back({view});
   if (nodes_.size() == 1) {
     poses_.emplace_back();
-    components_.push_back(0);
     update.new_component = true;
   } else {
-    if (moved && update.step && options_.wheel_lengths) {
-      known_lengths_.push_back({update.step->length_in_views, length(*moved)});
-      if (known_lengths_.size() > max_known_lengths) known_lengths_.erase(known_lengths_.begin());
+    if (moved && update.step && options_.wheels) {
+      keep_latest(known_lengths_, {update.step->length_in_views, length(*moved)});
     }
     add_step(update.step, moved, update);
   }
@@ -240,14 +274,14 @@ void TopologicalMapper::optimise_latest() {
 }
 
 void TopologicalMapper::join_components(const LoopClosure& closure) {
-  const std::size_t kept = components_[closure.earlier];
-  const std::size_t joined = components_[closure.later];
+  const std::size_t kept = nodes_[closure.earlier].component;
+  const std::size_t joined = nodes_[closure.later].component;
   if (kept == joined) return;
   const Pose2 kept_from_joined =
       poses_[closure.earlier] * closure.earlier_from_later * inverse(poses_[closure.later]);
   for (std::size_t i = 0; i < size(); ++i) {
-    if (components_[i] != joined) continue;
-    components_[i] = kept;
+    if (nodes_[i].component != joined) continue;
+    nodes_[i].component = kept;
     poses_[i] = kept_from_joined * poses_[i];
   }
 }
@@ -276,7 +310,7 @@ TopologicalMap TopologicalMapper::map() const {
   TopologicalMap map;
   std::map<std::size_t, std::size_t> number;
   for (std::size_t i = 0; i < size(); ++i) {
-    const auto component = number.try_emplace(components_[i], number.size()).first->second;
+    const auto component = number.try_emplace(nodes_[i].component, number.size()).first->second;
     map.nodes.push_back({nodes_[i].view, poses_[i], component});
   }
   for (std::size_t i = 0; i < edges_.size(); ++i) {

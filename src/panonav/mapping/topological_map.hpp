@@ -59,15 +59,15 @@ struct MappingOptions {
   /// uncertain as it is long: for recordings whose pictures are far apart. 0: a new connected
   /// component begins.
   double bridge_m = 0.0;
-  /// Lengths of steps are taken from the wheels where these are known; turns and directions come
-  /// from the views all the same.
-  bool wheel_lengths = true;
+  /// Steps are taken from the wheels where these are known: length and direction are theirs, and
+  /// the turn is the mean of theirs and that of the views, weighted by how far both are right. The
+  /// error of the views' turns is learnt from the last steps: it is what the wheels' own error,
+  /// that of `OdometryNoise`, does not explain of their difference.
+  bool wheels = true;
   /// Standard deviation of the position after a step read from views, for each metre of it.
   double step_deviation = 0.08;
   /// The same of the heading (rad).
   double turn_deviation = 0.02;
-  /// The same of the position where the length comes from wheels.
-  double wheel_deviation = 0.02;
 };
 void visit_options(MappingOptions& options, OptionVisitor& visitor);
 
@@ -118,6 +118,8 @@ class TopologicalMapper {
  private:
   void add_step(const std::optional<VisualStep>& step, const std::optional<Pose2>& moved,
                 MapUpdate& update);
+  /// From the node before to the latest.
+  [[nodiscard]] PoseEdge wheel_step(const Pose2& moved, const std::optional<VisualStep>& step);
   void close_loops(MapUpdate& update);
   void join_components(const LoopClosure& closure);
   void optimise_latest();
@@ -130,10 +132,14 @@ class TopologicalMapper {
   LoopClosureFinder finder_;
   std::vector<PassedNode> nodes_;
   std::vector<Pose2> poses_;
-  std::vector<std::size_t> components_;
   std::vector<PoseEdge> edges_;
   std::vector<double> weights_;
   std::vector<KnownLength> known_lengths_;
+  /// The turn of the wheels less that of the views, and the variances of both as they are told.
+  struct TurnDifference {
+    double difference_rad, wheel_variance, view_variance;
+  };
+  std::vector<TurnDifference> turns_;
   std::size_t optimised_size_ = 0;  // nodes when the map was last optimised
   std::size_t anchored_ = 0;        // the latest node of the closures so far
   bool changed_ = false;            // by closures since then

@@ -60,6 +60,10 @@ class StepSampler {
   /// The same in its parts, for many poses at once: the step with its heading in [-pi, pi),
   [[nodiscard]] const Pose2& step() const noexcept { return step_; }
   [[nodiscard]] bool holonomic() const noexcept { return holonomic_; }
+  /// Standard deviations of its travel (m; of each of x and y for a holonomic drive) and turn
+  /// (rad),
+  [[nodiscard]] double translation_deviation_m() const noexcept { return translation_deviation_m_; }
+  [[nodiscard]] double rotation_deviation_rad() const noexcept { return rotation_deviation_rad_; }
   /// the error of travel and turn that normal deviates of mean 0 and deviation 1 stand for (the
   /// third for a holonomic drive only), in the frame of the robot before the step, which the error
   /// of the turn turns first by this share of itself.

@@ -60,6 +60,16 @@ double Panorama::azimuth_rad(int column) const noexcept {
   return wrap_angle(2.0 * std::numbers::pi * column / columns_);
 }
 
+Panorama mirrored(const Panorama& panorama) {
+  Panorama image = panorama;
+  for (int y = 0; y < panorama.rows(); ++y) {
+    for (int x = 1; x < panorama.columns(); ++x) {
+      image.at(y, x) = panorama.at(y, panorama.columns() - x);
+    }
+  }
+  return image;
+}
+
 Panorama turn_columns(const Panorama& panorama, int columns_turned) {
   const int columns = panorama.columns();
   const int shift = (columns_turned % columns + columns) % columns;

@@ -58,6 +58,8 @@ class Panorama {
 /// What the robot sees after turning on the spot by `columns_turned` columns counter-clockwise:
 /// I'(phi) = I(phi + delta), so column c of the result is column c + columns_turned.
 [[nodiscard]] Panorama turn_columns(const Panorama& panorama, int columns_turned);
+/// The left of the robot becomes its right: column c goes to -c.
+[[nodiscard]] Panorama mirrored(const Panorama& panorama);
 
 /// As a picture for people: clockwise, forward in the middle, 0..1 as 0..255 (clamped). No column
 /// is mixed with another: column 0 becomes the picture's column columns / 2, so that reading the

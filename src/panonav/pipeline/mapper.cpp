@@ -6,6 +6,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/observation_source.hpp"
 
 namespace panonav {
 
@@ -82,13 +83,25 @@ bool Mapper::add(EncodedView seen) {
   return true;
 }
 
+MappedRun Mapper::map(const Dataset& recording, Executor& executor,
+                      const std::function<void()>& mapped) {
+  make_in_order(
+      recording.entries.size(), executor,
+      [&](std::size_t i) { return encode(read_observation(recording.entries[i])); },
+      [&](std::size_t, EncodedView&& seen) {
+        add(std::move(seen));
+        if (mapped) mapped();
+      });
+  return finish();
+}
+
 MappedRun Mapper::finish() {
   const auto start = Clock::now();
   mapper_.finish();
   run_.mapping_s += seconds_since(start);
   run_.map = mapper_.map();
   run_.scale_m = mapper_.scale_m();
-  run_.wheels = options_.mapping.wheel_lengths && all_odometry_;
+  run_.wheels = options_.mapping.wheels && all_odometry_;
   std::vector<Link> links;
   for (const MapEdge& edge : run_.map.edges) links.push_back({edge.a, edge.b, edge.kind});
   file_.change([&] {

@@ -3,9 +3,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <vector>
 
+#include "panonav/core/executor.hpp"
+#include "panonav/io/dataset.hpp"
 #include "panonav/mapping/topological_map.hpp"
 #include "panonav/pipeline/observation.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
@@ -31,7 +34,7 @@ struct MappedRun {
   std::vector<std::size_t> observations;  ///< by node: its number, counted from 0
   std::size_t skipped = 0;                ///< observations that differed too little from a node
   double scale_m = 0.0;                   ///< metres for each unit of length of the views
-  bool wheels = false;     ///< all observations had odometry, and lengths come from it
+  bool wheels = false;                    ///< all observations had odometry, and steps come from it
   double mapping_s = 0.0;  ///< time of the mapping itself, without pictures and files
 };
 
@@ -67,11 +70,18 @@ class Mapper {
   bool add(EncodedView seen);
   bool add(const Observation& observation) { return add(encode(observation)); }
 
+  /// All of a recording, then `finish`. Calls `mapped` after each picture. Throws as `add`, and
+  /// FileError on a picture that cannot be read.
+  MappedRun map(const Dataset& recording, Executor& executor,
+                const std::function<void()>& mapped = {});
+
   /// Optimises what is not yet, and stores the map and a link for each of its edges. Where no
   /// observation had a pose, the views of the largest component get those of the map. More
   /// observations may follow. Throws FileError.
   MappedRun finish();
 
+  /// As far as it is made, for people to look at: `finish` still moves nodes. Cost: a copy.
+  [[nodiscard]] TopologicalMap map_so_far() const { return mapper_.map(); }
   [[nodiscard]] const MemoryFile& memory() const noexcept { return file_; }
   [[nodiscard]] const ViewEncoder& encoder() const noexcept { return encoder_; }
 

@@ -1,7 +1,9 @@
 #include "panonav/pipeline/place_recogniser.hpp"
 
+#include <algorithm>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -19,16 +21,31 @@ VisualMemory views_of(const MemoryFile& file) {
   return memory;
 }
 
-/// All of the file's, so that it is not needed afterwards.
-FeatureSource kept_features(const FeatureSource& in_file, const VisualMemory& memory) {
-  auto views = std::make_shared<std::map<ViewId, LocalFeatures>>();
-  for (const ViewId view : memory.views()) {
-    if (auto features = in_file(view)) views->emplace(view, std::move(*features));
-  }
-  return [views = std::shared_ptr<const std::map<ViewId, LocalFeatures>>(std::move(views))](
-             ViewId view) -> std::optional<LocalFeatures> {
-    const auto found = views->find(view);
-    return found == views->end() ? std::nullopt : std::optional(found->second);
+/// Those of the views that are in the file now, each read when it is first asked for, by a handle
+/// of its own: the caller's is not needed afterwards.
+FeatureSource kept_features(const MemoryFile& file, const VisualMemory& memory) {
+  struct Kept {
+    Kept(const std::filesystem::path& path, ViewId last_view)
+        : file(MemoryFile::open(path, Access::read_only)), last(last_view) {}
+    MemoryFile file;
+    ViewId last;
+    FeatureSource read = features_in(file);
+    std::map<ViewId, std::optional<LocalFeatures>> views;
+    std::mutex mutex;
+  };
+  const auto kept = std::make_shared<Kept>(file.path(), std::ranges::max(memory.views()));
+  if (!kept->read) return {};
+  return [kept](ViewId view) -> std::optional<LocalFeatures> {
+    if (kept->last < view) return std::nullopt;
+    const std::scoped_lock lock(kept->mutex);
+    const auto found = kept->views.find(view);
+    if (found != kept->views.end()) return found->second;
+    std::optional<LocalFeatures> features;
+    try {
+      features = kept->read(view);
+    } catch (const ContractError&) {  // forgotten since by somebody else
+    }
+    return kept->views.emplace(view, std::move(features)).first->second;
   };
 }
 
@@ -49,10 +66,10 @@ Localiser localiser_for(const MemoryFile& file, const VisualMemory& memory,
   Localiser localiser =
       models ? Localiser(memory, models->place, models->position, options, models->spacing_m)
              : Localiser(memory, options);
-  const FeatureSource features = features_in(file);
-  if (features &&
-      (models ? models->by_features : features_tell_more(memory, features, options.components))) {
-    localiser.rank_by_features(kept_features(features, memory));
+  if (const FeatureSource features = kept_features(file, memory)) {
+    const bool rank =
+        models ? models->by_features : features_tell_more(memory, features, options.components);
+    localiser.use_features(features, rank);
   }
   return localiser;
 }
@@ -87,21 +104,22 @@ PlaceRecogniser& PlaceRecogniser::operator=(PlaceRecogniser&&) noexcept = defaul
 Place PlaceRecogniser::localise(const Observation& observation,
                                 std::span<const std::string> excluded_names) const {
   const auto& [memory, encoder, localiser, accuracy, areas] = std::as_const(*implementation_);
-  std::optional<LocalFeatures> features;
-  PackedSignature query;
-  if (localiser.ranks_by_features()) {
-    const Panorama panorama = encoder.panorama(observation);
-    features = encoder.features(panorama);
-    query = encoder.packed(panorama);
-  } else {
-    query = encoder.packed(observation);
-  }
+  std::optional<Panorama> unwarped;  // where it is needed
+  const auto panorama = [&, &made = encoder]() -> const Panorama& {
+    if (!unwarped) unwarped = made.panorama(observation);
+    return *unwarped;
+  };
+  const PackedSignature query =
+      localiser.ranks_by_features() ? encoder.packed(panorama()) : encoder.packed(observation);
   std::vector<ViewId> excluded;
   for (const std::string& name : excluded_names) {
     if (const auto view = memory.find(name)) excluded.push_back(*view);
   }
   const SearchMask mask{excluded, {}};
-  const Localisation found = localiser.localise(query, mask, features ? &*features : nullptr);
+  const Localisation found =
+      localiser.localise(query, mask, [&, &made = encoder](Handedness handedness) {
+        return made.features(handedness == Handedness::as_seen ? panorama() : mirrored(panorama()));
+      });
   Place place{.known_probability = found.known_probability,
               .known = found.known,
               .heading_rad = found.heading_rad,

@@ -32,13 +32,13 @@ void RouteDriver::start_at(Point2 place) {
   });
   start_m_ = pass == passes.end() ? place_on_route(poses(), place).along_m : pass->along_m;
   // At its very end there still is a path.
-  constexpr double least_way_m = 0.01;
-  const double from_m = std::min(start_m_, std::max(0.0, length_m_ - least_way_m));
+  constexpr double min_way_m = 0.01;
+  const double from_m = std::min(start_m_, std::max(0.0, length_m_ - min_way_m));
   path_.emplace(stretch_of_route(poses(), from_m, length_m_), options_.path);
 }
 
 RouteDriveStep RouteDriver::step(const Observation& observation,
-                                 const std::optional<Pose2>& elsewise) {
+                                 const std::optional<Pose2>& other_estimate) {
   if (!observation.odometry) {
     throw ContractError("odometry of the observation", "unknown", "known, to repeat a route");
   }
@@ -48,9 +48,9 @@ RouteDriveStep RouteDriver::step(const Observation& observation,
   step.length_m = length_m_;
   step.fix = follower_.step(observation).fix;
   const auto& robot = follower_.tracker().pose();
-  const bool confirmed =
-      robot && elsewise &&
-      distance(robot->position(), elsewise->position()) < options_.follower.tracker.recovery_m;
+  const bool confirmed = robot && other_estimate &&
+                         distance(robot->position(), other_estimate->position()) <
+                             options_.follower.tracker.recovery_m;
   blind_m_ = step.fix || confirmed ? 0.0 : blind_m_ + std::hypot(moved.x_m, moved.y_m);
   if (!path_) {
     if (!step.fix) {

@@ -51,12 +51,12 @@ class RouteDriver {
   RouteDriver(const MemoryFile& memory, const std::optional<PictureSource>& source,
               const RouteDriverOptions& options = {});
 
-  /// To be called once in each period of the base, until it arrived or is lost. `elsewise`: where
-  /// the robot is in the frame of the route as others find it (`Tracker`); as long as that agrees
-  /// with the odometry since the last fix, it is not lost. Throws as `LineEncoder::line`,
-  /// ContractError on an observation without odometry.
+  /// To be called once in each period of the base, until it arrived or is lost. `other_estimate`:
+  /// pose of the robot in the frame of the route by another method (`Tracker`); as long as it
+  /// agrees with the odometry since the last fix, the robot is not lost. Throws as
+  /// `LineEncoder::line`, ContractError on an observation without odometry.
   [[nodiscard]] RouteDriveStep step(const Observation& observation,
-                                    const std::optional<Pose2>& elsewise = std::nullopt);
+                                    const std::optional<Pose2>& other_estimate = std::nullopt);
 
   [[nodiscard]] const RouteFollower& follower() const noexcept { return follower_; }
 

@@ -2,6 +2,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
+#include "panonav/pipeline/observation_source.hpp"
 
 namespace panonav {
 
@@ -139,6 +140,35 @@ void RouteRecorder::flush() {
     appended_ += file_.append_route(options_.name, more);
   });
   source_kept_ = true;
+}
+
+RecordedRoute RouteRecorder::record(const Dataset& drive, std::span<const Pose2> poses,
+                                    Executor& executor,
+                                    const std::function<void(std::size_t lines)>& recorded) {
+  std::vector<std::size_t> chosen;
+  std::vector<Pose2> way;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    if (!is_due(way.empty() ? std::nullopt : std::optional(way.back()), poses[i],
+                options_.every_m)) {
+      continue;
+    }
+    chosen.push_back(i);
+    way.push_back(poses[i]);
+  }
+  const std::size_t first = skip_recorded(way);
+  make_in_order(
+      chosen.size() - first, executor,
+      [&](std::size_t i) {
+        Observation seen = read_observation(drive.entries[chosen[first + i]]);
+        const Pose2& pose = way[first + i];
+        if (!options_.odometry) seen.pose = ReferencePose{pose.x_m, pose.y_m, pose.heading_rad};
+        return encode(seen);
+      },
+      [&](std::size_t, EncodedLine&& line) {
+        add(std::move(line));
+        if (recorded) recorded(chosen.size() - first);
+      });
+  return finish();
 }
 
 RecordedRoute RouteRecorder::finish() {

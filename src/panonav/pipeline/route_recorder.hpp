@@ -3,12 +3,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "panonav/core/executor.hpp"
+#include "panonav/io/dataset.hpp"
 #include "panonav/pipeline/line_encoder.hpp"
 #include "panonav/pipeline/observation.hpp"
 #include "panonav/storage/memory_file.hpp"
@@ -67,6 +70,11 @@ class RouteRecorder {
   void add(EncodedLine line);
   /// The next observation; whether a line was due. Throws as `encode` and the other.
   bool add(const Observation& observation);
+  /// A whole drive: those entries at which a line is due, at these poses, one for each entry; what
+  /// the route holds of it is skipped. Calls `recorded` with their number after each line. Throws
+  /// as `add` and `finish`; those before a picture that cannot be read are kept.
+  RecordedRoute record(const Dataset& drive, std::span<const Pose2> poses, Executor& executor,
+                       const std::function<void(std::size_t lines)>& recorded = {});
   /// What was added is on the disk. Throws FileError; ContractError when nothing ever was added.
   RecordedRoute finish();
 

@@ -103,6 +103,7 @@ std::vector<Point2> reference_positions(const VisualMemory& memory) {
 
 void describe(RunMoment& moment, const MonteCarloEstimate& estimate) {
   moment.pose = estimate.pose;
+  moment.modes = estimate.modes;
   if (estimate.pose && !estimate.modes.empty()) {
     moment.covariance = estimate.modes.front().covariance;
   }
@@ -110,6 +111,7 @@ void describe(RunMoment& moment, const MonteCarloEstimate& estimate) {
   moment.state = moment.sure                                      ? "localised"
                  : estimate.state == LocalisationState::ambiguous ? "ambiguous"
                                                                   : "lost";
+  moment.probability = estimate.probability;
   moment.values = {{"probability", fixed(estimate.probability, 4)},
                    {"inside", fixed(estimate.inside, 4)},
                    {"modes", std::to_string(estimate.modes.size())},
@@ -119,8 +121,12 @@ void describe(RunMoment& moment, const MonteCarloEstimate& estimate) {
 void describe(RunMoment& moment, const Place& place) {
   moment.sure = place.known;
   moment.state = place.known ? "known place" : "unknown place";
+  moment.probability = place.known_probability;
   moment.values = {{"known_probability", fixed(place.known_probability, 4)}};
-  if (!place.matches.empty()) moment.values.emplace_back("best_match", place.matches.front().name);
+  if (!place.matches.empty()) {
+    moment.best_match_turn_rad = place.matches.front().heading_rad;
+    moment.values.emplace_back("best_match", place.matches.front().name);
+  }
   if (!place.known || !place.position || !place.heading_rad) return;
   moment.pose = Pose2{place.position->x_m, place.position->y_m, *place.heading_rad};
   if (place.position->radius_m) {

@@ -29,28 +29,64 @@ struct RunEdge {
   LinkKind kind = LinkKind::sequence;
 };
 
+/// What is known of a reference besides its position.
+struct RunReference {
+  std::string name;
+  std::optional<double> heading_rad;
+};
+
+/// A region of the floor that belongs to an area of the memory.
+struct RunRegion {
+  std::vector<Point2> outline;
+  std::size_t area = 0;
+};
+
+/// A reference that was compared with what is seen.
+struct RunComparison {
+  std::size_t reference = 0;        ///< its place in `RunMoment::references`
+  std::uint32_t dissimilarity = 0;  ///< as `Match`: the less, the more alike
+};
+
+/// Where the home vector points, and how far it is to be believed.
+struct RunHoming {
+  double direction_rad = 0.0;  ///< in the frame of the robot
+  double confidence = 0.0;     ///< 0 .. 1, as `HomeVector`
+};
+
 /// What is known at one moment of a run, for people to look at. What is empty is not written.
-/// Positions and poses are in the frame "map" unless said otherwise.
+/// Positions and poses are in the frame "map" unless said otherwise. Records (`RunRecorder`) leave
+/// out what is marked so.
 struct RunMoment {
   double stamp_s = 0.0;
   std::optional<Image> picture;               ///< as the camera delivered it
   std::vector<std::uint8_t> encoded_picture;  ///< the same as PNG or JPEG; one of the two is enough
   std::optional<Panorama> panorama;
-  std::vector<std::uint8_t> best_match;  ///< its thumbnail, PNG
-  std::optional<Pose2> pose;             ///< of the robot
+  std::vector<std::uint8_t> best_match;       ///< its thumbnail, PNG
+  std::optional<double> best_match_turn_rad;  ///< heading of the robot relative to it
+  std::optional<Pose2> pose;                  ///< of the robot
   /// Of x, y and heading, row-major, m^2, m rad and rad^2.
   std::optional<std::array<double, 9>> covariance;
   std::vector<Pose2> particles;
+  std::vector<PoseMode> modes;             ///< heaviest first; not in records
+  std::vector<RunComparison> comparisons;  ///< not in records
+  std::optional<RunHoming> homing;         ///< not in records
+  /// What the robot spent its time with since the moment before, ms; not in records.
+  std::vector<std::pair<std::string, double>> stages_ms;
   std::optional<Pose2> odometry;  ///< absolute, in a frame of its own
   std::optional<Tilt> tilt;
   std::optional<ReferencePose> truth;
   // What stays until it is given anew.
   std::vector<Point2> references;
+  std::vector<RunReference> reference_views;  ///< of each, or empty; not in records
+  std::vector<RunRegion> regions;             ///< not in records
+  std::vector<std::vector<Point2>> walls;  ///< lines; outlines end where they begin; not in records
   std::vector<RunEdge> edges;
   std::vector<Pose2> plan;        ///< the way to go along
   std::vector<Pose2> directions;  ///< places, and which way they send the robot
   std::optional<Pose2> goal;
   bool sure = false;  ///< diagnostics: fine, otherwise a warning
+  /// That the robot is where it is said to be, or the place a known one: 0 .. 1.
+  std::optional<double> probability;
   std::string state;  ///< "localised", "unknown place", ...; empty: no diagnostics
   std::vector<std::pair<std::string, std::string>> values;  ///< what else diagnostics tell
 };

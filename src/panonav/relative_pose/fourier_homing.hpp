@@ -74,6 +74,7 @@ struct FourierHomingOptions {
   /// Two more unknowns: the robot's tilt against the home view, a degree or two on uneven ground.
   /// Used only where elevations are known.
   bool tilt = true;
+  friend bool operator==(const FourierHomingOptions&, const FourierHomingOptions&) = default;
 };
 void visit_options(FourierHomingOptions& options, OptionVisitor& visitor);
 

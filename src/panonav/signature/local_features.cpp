@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -205,6 +206,7 @@ struct Bearings {
     words.reserve(4 * view.features.size());
     for (const LocalFeature& feature : view.features) {
       const double azimuth = column_rad * feature.column;
+      azimuths.push_back(azimuth);
       sines.push_back(static_cast<float>(std::sin(azimuth)));
       cosines.push_back(static_cast<float>(std::cos(azimuth)));
       tangents.push_back(
@@ -212,12 +214,78 @@ struct Bearings {
       words.insert(words.end(), feature.bits.begin(), feature.bits.end());
     }
   }
+  std::vector<double> azimuths;
   std::vector<float> sines, cosines, tangents;
   std::vector<std::uint64_t> words;
 };
 
+// The features that are each other's nearest, by the azimuth in the query minus that in the
+// reference: those that a turn brings within a right angle of each other stand side by side. All
+// stand there twice, so that this holds beyond the end.
+class MutualMatches {
+ public:
+  struct Window {
+    int turn, begin, count;
+  };
+
+  MutualMatches(const Bearings& query, const Bearings& reference,
+                std::span<const std::uint16_t> of_query,
+                std::span<const std::uint16_t> of_reference) {
+    struct Pair {
+      double azimuth_rad;
+      std::size_t query, reference;
+    };
+    std::vector<Pair> pairs;
+    for (std::size_t i = 0; i < of_query.size() && !of_reference.empty(); ++i) {
+      const std::size_t j = of_query[i];
+      if (of_reference[j] == i) pairs.push_back({query.azimuths[i] - reference.azimuths[j], i, j});
+    }
+    for (Pair& pair : pairs) {
+      if (pair.azimuth_rad < 0.0) pair.azimuth_rad += 2.0 * std::numbers::pi;
+    }
+    std::ranges::sort(pairs, {}, [](const Pair& p) { return std::pair(p.azimuth_rad, p.query); });
+    for (const double once_more : {0.0, 2.0 * std::numbers::pi}) {
+      for (const auto& [azimuth_rad, i, j] : pairs) {
+        azimuths_.push_back(azimuth_rad + once_more);
+        const float numbers[numbers_of_each] = {
+            query.sines[i],
+            query.cosines[i],
+            query.tangents[i],
+            reference.sines[j],
+            reference.cosines[j],
+            reference.tangents[j],
+            query.sines[i] * reference.cosines[j] - query.cosines[i] * reference.sines[j],
+            query.cosines[i] * reference.cosines[j] + query.sines[i] * reference.sines[j]};
+        for (std::size_t n = 0; n < numbers_of_each; ++n) values_[n].push_back(numbers[n]);
+      }
+    }
+  }
+
+  [[nodiscard]] std::size_t size() const { return azimuths_.size() / 2; }
+
+  /// Of a turn by `turn` steps, 0 <= turn * step_rad < 2 pi.
+  [[nodiscard]] Window within_right_angle(int turn, double step_rad) const {
+    constexpr double right_angle = 0.5 * std::numbers::pi;
+    double from = -turn * step_rad - right_angle;
+    while (from < 0.0) from += 2.0 * std::numbers::pi;
+    const auto begin = std::ranges::upper_bound(azimuths_, from);
+    const auto end = std::lower_bound(begin, azimuths_.end(), from + 2.0 * right_angle);
+    return {turn, static_cast<int>(begin - azimuths_.begin()), static_cast<int>(end - begin)};
+  }
+
+  [[nodiscard]] kernels::MatchedBearings bearings(int begin, int count) const {
+    const auto at = [&](std::size_t n) { return values_[n].data() + begin; };
+    return {
+        at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7), static_cast<std::size_t>(count)};
+  }
+
+ private:
+  static constexpr std::size_t numbers_of_each = 8;
+  std::vector<double> azimuths_;
+  std::array<std::vector<float>, numbers_of_each> values_;  // as MatchedBearings has them
+};
+
 constexpr int turns = 128;
-constexpr int directions = 32;
 constexpr double tolerance_rad = radians(2.0);
 // A feature is at least half as far away as the views are apart, as seen from either.
 constexpr float max_ratio = 2.0F;
@@ -318,7 +386,8 @@ LocalFeatures unpack_features(std::span<const std::uint8_t> bytes, PanoramaShape
   return view;
 }
 
-FeatureMatch match_features(const LocalFeatures& query, const LocalFeatures& reference) {
+FeatureMatch match_features(const LocalFeatures& query, const LocalFeatures& reference,
+                            int more_than) {
   if (query.shape != reference.shape || query.elevations != reference.elevations) {
     throw ContractError("local features", "of another panorama", "of one shape and band");
   }
@@ -329,85 +398,42 @@ FeatureMatch match_features(const LocalFeatures& query, const LocalFeatures& ref
   std::vector<std::uint16_t> of_reference(reference.features.size());
   const kernels::Instructions instructions = kernels::chosen_instructions();
   kernels::nearest_descriptors(seen.words, there.words, of_query, of_reference, instructions);
-  struct Pair {
-    std::size_t query, reference;
-    float sine, cosine;  // of the azimuth in the query minus that in the reference
-  };
-  std::vector<Pair> pairs;
-  for (std::size_t i = 0; i < count && !of_reference.empty(); ++i) {
-    const std::size_t j = of_query[i];
-    if (of_reference[j] != i) continue;
-    pairs.push_back({i, j, seen.sines[i] * there.cosines[j] - seen.cosines[i] * there.sines[j],
-                     seen.cosines[i] * there.cosines[j] + seen.sines[i] * there.sines[j]});
-  }
+  const MutualMatches matched(seen, there, of_query, of_reference);
+  if (static_cast<std::int64_t>(matched.size()) <= more_than) return {};
 
   static const Circle2 whole = circle_of(2.0 * std::numbers::pi / turns);
   static const Circle2 half = circle_of(std::numbers::pi / turns);
-  static const std::array<float, 2 * directions> motions = [] {
-    std::array<float, 2 * directions> made{};
-    for (std::size_t d = 0; d < directions; ++d) {
-      const double angle = 2.0 * std::numbers::pi * static_cast<double>(d) / directions;
-      made[2 * d] = static_cast<float>(std::cos(angle));
-      made[2 * d + 1] = static_cast<float>(std::sin(angle));
+  static const kernels::MotionAxes axes = [] {
+    kernels::MotionAxes made{};
+    for (int d = 0; d < kernels::motion_axes; ++d) {
+      made.cosine[d] = static_cast<float>(std::cos(std::numbers::pi * d / kernels::motion_axes));
+      made.sine[d] = static_cast<float>(std::sin(std::numbers::pi * d / kernels::motion_axes));
     }
     return made;
   }();
-  static const auto sine_tolerance = static_cast<float>(std::sin(tolerance_rad));
-  static const auto cosine_tolerance = static_cast<float>(std::cos(tolerance_rad));
+  static const kernels::BearingTolerance tolerance{static_cast<float>(std::sin(tolerance_rad)),
+                                                   static_cast<float>(std::cos(tolerance_rad)),
+                                                   max_ratio};
 
   // No turn explains more than the features that it brings within a right angle of each other.
-  std::array<std::pair<int, int>, turns> bounds;  // negative, then the turn: the best come first
+  std::array<MutualMatches::Window, turns> windows;
   for (std::size_t t = 0; t < turns; ++t) {
-    int bound = 0;
-    for (const Pair& p : pairs) {
-      bound += p.cosine * whole.cosines[t] - p.sine * whole.sines[t] > 0.0F ? 1 : 0;
-    }
-    bounds[t] = {-bound, static_cast<int>(t)};
+    windows[t] = matched.within_right_angle(static_cast<int>(t), 2.0 * std::numbers::pi / turns);
   }
-  std::ranges::sort(bounds);
+  std::ranges::sort(windows, [](const auto& a, const auto& b) {  // the best come first
+    return std::pair(-a.count, a.turn) < std::pair(-b.count, b.turn);
+  });
 
   FeatureMatch match;
-  constexpr std::size_t lane_size = kernels::BearingLane::size;
-  std::vector<kernels::BearingLane> lanes((pairs.size() + lane_size - 1) / lane_size);
-  std::array<std::int32_t, directions> explained{};
-  for (const auto& [negative_bound, turn] : bounds) {
-    if (-negative_bound <= match.verified) break;
+  std::array<std::int32_t, 2 * std::size_t{kernels::motion_axes}> explained{};
+  for (const auto& [turn, begin, bound] : windows) {
+    if (bound <= std::max(match.verified, more_than)) break;
     const auto t = static_cast<std::size_t>(turn);
-    const float sine = half.sines[t];
-    const float cosine = half.cosines[t];
-    std::size_t used = 0;
-    for (const Pair& p : pairs) {
-      if (p.cosine * whole.cosines[t] - p.sine * whole.sines[t] <= 0.0F) continue;
-      // Parallax, counter-clockwise from the reference's bearing to the query's.
-      const float parallax = p.sine * whole.cosines[t] + p.cosine * whole.sines[t];
-      const float size = std::abs(parallax);
-      const float sign = parallax < 0.0F ? -1.0F : 1.0F;
-      kernels::BearingLane& lane = lanes[used / lane_size];
-      const std::size_t i = used % lane_size;
-      ++used;
-      lane.query_sine[i] = sign * (seen.sines[p.query] * cosine + seen.cosines[p.query] * sine);
-      lane.query_cosine[i] = sign * (seen.cosines[p.query] * cosine - seen.sines[p.query] * sine);
-      lane.reference_sine[i] =
-          sign * (there.sines[p.reference] * cosine - there.cosines[p.reference] * sine);
-      lane.reference_cosine[i] =
-          sign * (there.cosines[p.reference] * cosine + there.sines[p.reference] * sine);
-      lane.query_tangent[i] = seen.tangents[p.query];
-      lane.reference_tangent[i] = there.tangents[p.reference];
-      lane.min_sine[i] =
-          size <= sine_tolerance ? -2.0F : (size * cosine_tolerance - sine_tolerance) / max_ratio;
-    }
-    const std::size_t used_lanes = (used + lane_size - 1) / lane_size;
-    for (std::size_t i = used; i < used_lanes * lane_size; ++i) {
-      kernels::BearingLane& lane = lanes[i / lane_size];
-      const std::size_t at = i % lane_size;
-      lane.query_sine[at] = lane.query_cosine[at] = lane.query_tangent[at] = 0.0F;
-      lane.reference_sine[at] = lane.reference_cosine[at] = lane.reference_tangent[at] = 0.0F;
-      lane.min_sine[at] = 2.0F;
-    }
-    kernels::count_explained(std::span(lanes).first(used_lanes), motions,
-                             sine_tolerance * sine_tolerance, explained, instructions);
+    kernels::count_explained(matched.bearings(begin, bound),
+                             {whole.sines[t], whole.cosines[t], half.sines[t], half.cosines[t]},
+                             axes, tolerance, explained, instructions);
     const std::int32_t most = *std::ranges::max_element(explained);
-    if (most > match.verified) {
+    if (most > std::max(match.verified, more_than)) {
       match.verified = most;
       match.heading_rad = wrap_angle(2.0 * std::numbers::pi * turn / turns);
     }

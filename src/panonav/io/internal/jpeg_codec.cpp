@@ -3,6 +3,7 @@
 #include <csetjmp>
 #include <cstddef>
 #include <cstdio>
+#include <cstdlib>
 #include <string>
 #include <utility>
 
@@ -145,7 +146,64 @@ ImageSize open(Reader& reader, std::span<const std::uint8_t> bytes, std::string_
   return size;
 }
 
+struct Writer {
+  jpeg_compress_struct jpeg{};
+  jpeg_error_mgr errors{};
+  std::jmp_buf on_failure{};
+  char message[JMSG_LENGTH_MAX] = {};
+  unsigned char* bytes = nullptr;  // by malloc
+  unsigned long size = 0;
+  ~Writer() {
+    jpeg_destroy_compress(&jpeg);
+    std::free(bytes);
+  }
+};
+
+[[noreturn]] void on_write_error(j_common_ptr jpeg) {
+  auto* writer = static_cast<Writer*>(jpeg->client_data);
+  writer->errors.format_message(jpeg, writer->message);
+  std::longjmp(writer->on_failure, 1);
+}
+
+bool write_steps(Writer& writer, const ImageView& image, int quality) {
+  if (setjmp(writer.on_failure)) return false;
+  jpeg_create_compress(&writer.jpeg);
+  jpeg_mem_dest(&writer.jpeg, &writer.bytes, &writer.size);
+  writer.jpeg.image_width = static_cast<JDIMENSION>(image.width);
+  writer.jpeg.image_height = static_cast<JDIMENSION>(image.height);
+  writer.jpeg.input_components = image.channels;
+  writer.jpeg.in_color_space = image.channels == 1 ? JCS_GRAYSCALE : JCS_RGB;
+  jpeg_set_defaults(&writer.jpeg);
+  jpeg_set_quality(&writer.jpeg, quality, TRUE);
+  jpeg_start_compress(&writer.jpeg, TRUE);
+  while (writer.jpeg.next_scanline < writer.jpeg.image_height) {
+    // libjpeg does not write to the rows of its input.
+    JSAMPROW row = const_cast<JSAMPROW>(
+        image.data + static_cast<std::ptrdiff_t>(writer.jpeg.next_scanline) * image.stride);
+    jpeg_write_scanlines(&writer.jpeg, &row, 1);
+  }
+  jpeg_finish_compress(&writer.jpeg);
+  return true;
+}
+
 }  // namespace
+
+std::vector<std::uint8_t> encode_jpeg(ImageView image, int quality) {
+  const auto side_fits = [](int side) { return side >= 1 && side <= JPEG_MAX_DIMENSION; };
+  require(side_fits(image.width), "image width in pixels", image.width, "1 .. 65500");
+  require(side_fits(image.height), "image height in pixels", image.height, "1 .. 65500");
+  require(image.channels == 1 || image.channels == 3, "image channels", image.channels, "1 or 3");
+  require(quality >= 1 && quality <= 100, "quality", quality, "1 .. 100");
+  Writer writer;
+  writer.jpeg.err = jpeg_std_error(&writer.errors);
+  writer.errors.error_exit = on_write_error;
+  writer.errors.output_message = on_output;
+  writer.jpeg.client_data = &writer;
+  if (!write_steps(writer, image, quality)) {
+    throw Error(std::string("cannot make a JPEG: ") + writer.message);
+  }
+  return {writer.bytes, writer.bytes + writer.size};
+}
 
 ImageSize jpeg_size(std::span<const std::uint8_t> bytes, std::string_view name,
                     const ImageLimits& limits) {

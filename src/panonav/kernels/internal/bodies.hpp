@@ -31,8 +31,9 @@ template <Instructions set>
 struct FeatureMatchBody {
   static void nearest_descriptors(const uint64_t* a, size_t a_count, const uint64_t* b,
                                   size_t b_count, uint16_t* nearest_of_a, uint16_t* nearest_of_b);
-  static void count_explained(const BearingLane* lanes, size_t lane_count, const float* directions,
-                              size_t direction_count, float square_tolerance, int32_t* counts);
+  static void count_explained(const MatchedBearings& matched, const ViewTurn& turn,
+                              const MotionAxes& axes, const BearingTolerance& tolerance,
+                              int32_t* counts);
 };
 
 template <Instructions set>

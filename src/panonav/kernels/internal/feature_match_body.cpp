@@ -31,38 +31,66 @@ void FeatureMatchBody<set>::nearest_descriptors(const uint64_t* a, size_t a_coun
 }
 
 template <Instructions set>
-void FeatureMatchBody<set>::count_explained(const BearingLane* lanes, size_t lane_count,
-                                            const float* directions, size_t direction_count,
-                                            float square_tolerance, int32_t* counts) {
-  for (size_t d = 0; d < direction_count; ++d) {
-    const float cosine = directions[2 * d];
-    const float sine = directions[2 * d + 1];
-    int32_t total[BearingLane::size] = {};
-    for (size_t l = 0; l < lane_count; ++l) {
-      const BearingLane& lane = lanes[l];
-      for (int i = 0; i < BearingLane::size; ++i) {
+void FeatureMatchBody<set>::count_explained(const MatchedBearings& matched, const ViewTurn& turn,
+                                            const MotionAxes& axes,
+                                            const BearingTolerance& tolerance, int32_t* counts) {
+  const float square_tolerance = tolerance.sine * tolerance.sine;
+  int32_t along[motion_axes] = {};
+  int32_t against[motion_axes] = {};
+  for (size_t first = 0; first < matched.count; first += max_descriptors) {
+    const size_t left = matched.count - first;
+    const size_t count = left < max_descriptors ? left : max_descriptors;
+    // In a frame between those of both views. Azimuths are mirrored where the query's lies
+    // clockwise of the reference's, so that the angle from the direction of motion to either must
+    // have a sine of at least `min_sine`; more than 1 where nothing can explain the match.
+    float query_sine[max_descriptors], query_cosine[max_descriptors];
+    float reference_sine[max_descriptors], reference_cosine[max_descriptors];
+    float min_sine[max_descriptors];
+    for (size_t i = 0; i < count; ++i) {
+      const size_t at = first + i;
+      const float within = matched.cosine[at] * turn.cosine - matched.sine[at] * turn.sine;
+      // Parallax, counter-clockwise from the reference's bearing to the query's.
+      const float parallax = matched.sine[at] * turn.cosine + matched.cosine[at] * turn.sine;
+      const float size = parallax < 0.0F ? -parallax : parallax;
+      const float sign = parallax < 0.0F ? -1.0F : 1.0F;
+      query_sine[i] = sign * (matched.query_sine[at] * turn.half_cosine +
+                              matched.query_cosine[at] * turn.half_sine);
+      query_cosine[i] = sign * (matched.query_cosine[at] * turn.half_cosine -
+                                matched.query_sine[at] * turn.half_sine);
+      reference_sine[i] = sign * (matched.reference_sine[at] * turn.half_cosine -
+                                  matched.reference_cosine[at] * turn.half_sine);
+      reference_cosine[i] = sign * (matched.reference_cosine[at] * turn.half_cosine +
+                                    matched.reference_sine[at] * turn.half_sine);
+      const float least = (size * tolerance.cosine - tolerance.sine) / tolerance.max_ratio;
+      const float needed = size <= tolerance.sine ? -2.0F : least;
+      min_sine[i] = within > 0.0F ? needed : 2.0F;
+    }
+    for (size_t i = 0; i < count; ++i) {
+      const float query_tangent = matched.query_tangent[first + i];
+      const float reference_tangent = matched.reference_tangent[first + i];
+      const float query_square = query_tangent * query_tangent;
+      const float reference_square = reference_tangent * reference_tangent;
+      for (size_t d = 0; d < motion_axes; ++d) {
         // Of the angles between the direction of motion and both bearings.
-        const float of_query = lane.query_sine[i] * cosine - lane.query_cosine[i] * sine;
+        const float of_query = query_sine[i] * axes.cosine[d] - query_cosine[i] * axes.sine[d];
         const float of_reference =
-            lane.reference_sine[i] * cosine - lane.reference_cosine[i] * sine;
-        const float off =
-            lane.query_tangent[i] * of_reference - lane.reference_tangent[i] * of_query;
+            reference_sine[i] * axes.cosine[d] - reference_cosine[i] * axes.sine[d];
+        const float off = query_tangent * of_reference - reference_tangent * of_query;
         const float by_reference =
-            (lane.reference_tangent[i] * lane.reference_tangent[i] + of_reference * of_reference) *
-            (1.0F + lane.query_tangent[i] * lane.query_tangent[i]);
-        const float by_query =
-            (lane.query_tangent[i] * lane.query_tangent[i] + of_query * of_query) *
-            (1.0F + lane.reference_tangent[i] * lane.reference_tangent[i]);
+            (reference_square + of_reference * of_reference) * (1.0F + query_square);
+        const float by_query = (query_square + of_query * of_query) * (1.0F + reference_square);
         const float scale = by_reference > by_query ? by_reference : by_query;
         const float smaller = of_query < of_reference ? of_query : of_reference;
+        const float larger = of_query < of_reference ? of_reference : of_query;
         const int32_t in_plane = off * off <= square_tolerance * scale ? 1 : 0;
-        const int32_t far_enough = smaller >= lane.min_sine[i] ? 1 : 0;
-        total[i] += in_plane & far_enough;
+        along[d] += in_plane & (smaller >= min_sine[i] ? 1 : 0);
+        against[d] += in_plane & (-larger >= min_sine[i] ? 1 : 0);
       }
     }
-    int32_t sum = 0;
-    for (int i = 0; i < BearingLane::size; ++i) sum += total[i];
-    counts[d] = sum;
+  }
+  for (size_t d = 0; d < motion_axes; ++d) {
+    counts[d] = along[d];
+    counts[d + motion_axes] = against[d];
   }
 }
 

@@ -164,8 +164,9 @@ void learn_probabilities(std::size_t nodes, std::vector<Link>& links) {
 class Grower {
  public:
   Grower(std::size_t nodes, std::span<const LatticeSpring> springs, double unit,
-         const LatticeStart& start)
-      : poses_(start.poses.empty() ? std::vector<Pose2>(nodes) : start.poses),
+         const LatticeStart& start, const LatticeWatch& watch)
+      : watch_(watch),
+        poses_(start.poses.empty() ? std::vector<Pose2>(nodes) : start.poses),
         component_(nodes),
         members_(nodes),
         links_of_(nodes),
@@ -475,6 +476,7 @@ class Grower {
       touched.clear();
       for (const auto& [other, links] : between_[p]) touched.push_back(other);
     }
+    if (watch_) watch_(poses_, component_);
     for (const std::size_t other : touched) consider(p, other);
   }
 
@@ -639,6 +641,7 @@ class Grower {
     return result;
   }
 
+  const LatticeWatch& watch_;
   std::vector<Link> links_;
   std::vector<Pose2> poses_;  // each in the frame of its component
   std::vector<std::size_t> component_;
@@ -670,8 +673,8 @@ bool fits(const LatticeSpring& spring, double unit, const Pose2& a, const Pose2&
 }
 
 GrownLayout grow_components(std::size_t nodes, std::span<const LatticeSpring> springs, double unit,
-                            const LatticeStart& start) {
-  return Grower(nodes, springs, unit, start).grow();
+                            const LatticeStart& start, const LatticeWatch& watch) {
+  return Grower(nodes, springs, unit, start, watch).grow();
 }
 
 }  // namespace panonav

@@ -134,8 +134,8 @@ void check(std::span<const SpringTerm> springs, std::span<const Pose2> poses,
 class Solver {
  public:
   Solver(std::span<const SpringTerm> springs, std::span<Pose2> poses,
-         std::span<const unsigned char> moving)
-      : springs_(springs), poses_(poses), unknown_(poses.size(), -1) {
+         std::span<const unsigned char> moving, const std::function<void()>& moved)
+      : moved_(moved), springs_(springs), poses_(poses), unknown_(poses.size(), -1) {
     for (std::size_t i = 0; i < poses.size(); ++i) {
       if (moving.empty() || moving[i] != 0) {
         unknown_[i] = unknowns_;
@@ -256,6 +256,7 @@ class Solver {
           damping *= 10.0;
         }
       }
+      if (better && moved_) moved_();
       if (!better || before - after <= enough * before) break;
     }
   }
@@ -308,6 +309,7 @@ class Solver {
     return true;
   }
 
+  const std::function<void()>& moved_;
   std::span<const SpringTerm> springs_;
   std::span<Pose2> poses_;
   std::vector<int> unknown_;  // first unknown of each pose, -1: it stays
@@ -321,9 +323,10 @@ class Solver {
 }  // namespace
 
 LatticeSolution solve_lattice(std::span<const SpringTerm> springs, std::span<Pose2> poses,
-                              std::span<const unsigned char> moving) {
+                              std::span<const unsigned char> moving,
+                              const std::function<void()>& moved) {
   check(springs, poses, moving);
-  return Solver(springs, poses, moving).solve();
+  return Solver(springs, poses, moving, moved).solve();
 }
 
 }  // namespace panonav

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -54,9 +55,10 @@ struct LatticeSolution {
 /// depends little on the start. Direction and turn are rejected together, lengths each by itself:
 /// far views tell direction well and distance badly. `moving`: one entry per pose, 0 keeps the
 /// pose; empty: all move. A component without a fixed pose stays about where it was. Throws
-/// ContractError on indices or numbers out of range. The same input gives the same bits. Cost per
-/// iteration: one sparse factorisation.
+/// ContractError on indices or numbers out of range. `moved`: called after each step that moved the
+/// poses. The same input gives the same bits. Cost per iteration: one sparse factorisation.
 LatticeSolution solve_lattice(std::span<const SpringTerm> springs, std::span<Pose2> poses,
-                              std::span<const unsigned char> moving = {});
+                              std::span<const unsigned char> moving = {},
+                              const std::function<void()>& moved = {});
 
 }  // namespace panonav

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <string>
+
+#include "demo/homing.hpp"
+#include "demo/maps.hpp"
+#include "demo/navigation.hpp"
+#include "demo/route.hpp"
+#include "demo/track.hpp"
+#include "reports/report_page.hpp"
+
+namespace panonav::command {
+
+/// What the first screen of the page is made of.
+struct DemoStory {
+  ReportPicture mirror;        ///< what the camera sees, in colour
+  UnfoldingMap areas;          ///< how the memory answers one question
+  std::string position_error;  ///< "1.4 cm"
+  std::string found_again;     ///< "4 pictures"
+  UnfoldingMap gathering;      ///< particles of the robot that is tracked
+  std::string arrived;         ///< "12 of 12"
+  UnfoldingMap missions;
+};
+
+/// Four pictures that tell what the program does, how well, and how to use it.
+void tell_story(DemoStory story, ReportPage& page);
+
+}  // namespace panonav::command

@@ -1,0 +1,41 @@
+#include "reports/navigate_report.hpp"
+
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "panonav/core/text.hpp"
+#include "viewer/report_page.hpp"
+
+namespace panonav::command {
+
+void write_navigate_report(const std::filesystem::path& folder, const MissionReport& mission,
+                           const RunPage& played) {
+  const MissionRun& run = mission.run;
+  ReportPage page("The way to " + mission.goal,
+                  "A simulated robot was sent to a remembered view. It sees pictures alone: it "
+                  "knows neither where it is nor where its references were taken.");
+  std::vector<std::pair<std::string, std::string>> figures{
+      {std::string(name_of(run.end)), mission.reason},
+      {std::to_string(run.decisions.size()), "steps, a picture and a decision each"}};
+  if (std::isfinite(run.end_distance_m)) {
+    figures.emplace_back(fixed(100.0 * run.end_distance_m, 0) + " cm",
+                         "from where the goal's view was taken");
+  }
+  figures.emplace_back(fixed(run.travelled_m, 1) + " m",
+                       std::isfinite(run.shortest_m)
+                           ? "driven; the shortest way is " + fixed(run.shortest_m, 1) + " m"
+                           : "driven");
+  page.figures(figures);
+  page.section("The mission, decision by decision");
+  page.text(
+      "Grey dots are the remembered views, with the direction in which each of them sends the "
+      "robot; the thick line is the way planned, the ring its goal. The robot is drawn where it "
+      "truly is. The list tells what it decided; a click on a decision goes there.");
+  page.run(played);
+  page.section("The whole mission");
+  page.plots({{mission.plot, "The way planned and the way driven, with what stands around"}});
+  page.write(folder, "index.html", "panonav navigate");
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,150 @@
+#include "bindings.hpp"
+#include "panonav/camera/calibrate_dual_fisheye.hpp"
+#include "panonav/camera/find_mirror.hpp"
+#include "panonav/camera/mirror_camera.hpp"
+#include "panonav/camera/mirror_overlay.hpp"
+#include "panonav/core/error.hpp"
+
+namespace panonav::python {
+
+namespace {
+
+/// Arrays of pixels, held as long as they are looked at.
+class Pictures {
+ public:
+  explicit Pictures(const py::iterable& pictures) {
+    for (const py::handle& picture : pictures) arrays_.emplace_back(picture, "picture");
+    for (const PictureArray& array : arrays_) views_.push_back(array.view());
+  }
+  [[nodiscard]] std::span<const ImageView> views() const noexcept { return views_; }
+
+ private:
+  std::vector<PictureArray> arrays_;
+  std::vector<ImageView> views_;
+};
+
+std::pair<double, double> pixel(const PixelPoint& point) {
+  return {point.u_px, point.v_px};
+}
+
+CameraModel mirror_model(const std::string& name, const py::dict& parameters,
+                         std::optional<double> rim_elevation_rad, double rim_radius_px) {
+  CameraModel model = camera_model_from(name, parameters);
+  if (!rim_elevation_rad) return model;
+  if (const auto* hyperboloid = std::get_if<HyperboloidalModel>(&model)) {
+    return with_elevation_at(*hyperboloid, rim_radius_px, *rim_elevation_rad);
+  }
+  if (const auto* unified = std::get_if<UnifiedModel>(&model)) {
+    return with_elevation_at(*unified, rim_radius_px, *rim_elevation_rad);
+  }
+  throw ContractError("rim_elevation_rad", *rim_elevation_rad,
+                      "None for the model '" + name + "', whose parameters say it");
+}
+
+void bind_mirrors(py::module_& m) {
+  Record<FoundCircle>(m, "FoundCircle", "A circle found in an image.")
+      .field(
+          "centre", [](const FoundCircle& c) { return pixel(c.centre); }, "(u, v)")
+      .field("radius_px", &FoundCircle::radius_px, "")
+      .field("quality", &FoundCircle::quality, "Part of the circumference with an edge, 0 to 1.")
+      .field("residual_px", &FoundCircle::residual_px, "Of the edge points, across the circle.");
+  Record<MirrorCircle>(m, "MirrorCircle", "Where a mirror lies in the pictures of its camera.")
+      .field(
+          "image_size",
+          [](const MirrorCircle& c) { return std::pair(c.image_size.width, c.image_size.height); },
+          "(width, height)")
+      .field(
+          "centre", [](const MirrorCircle& c) { return pixel(c.centre); }, "(u, v) of the rim.")
+      .field("rim_radius_px", &MirrorCircle::rim_radius_px, "Where the mirrored scene ends.")
+      .field("inner_radius_px", &MirrorCircle::inner_radius_px,
+             "What the camera's own reflection covers, or None.")
+      .field("quality", &MirrorCircle::quality, "Of the rim, 0 to 1.")
+      .field("residual_px", &MirrorCircle::residual_px, "Of the rim.")
+      .field("rim_per_image", &MirrorCircle::rim_per_image,
+             "As each image alone shows it; None where it does not.");
+  m.def(
+      "find_mirror",
+      [](const py::iterable& pictures, const py::kwargs& keywords) {
+        MirrorSearchOptions options;
+        Keywords(keywords).options(options).finish();
+        const Pictures all(pictures);
+        const py::gil_scoped_release free;
+        return find_mirror(all.views(), options);
+      },
+      py::arg("pictures"),
+      with_options("Finds the mirror in raw pictures of one camera, a list of uint8 arrays; more "
+                   "are better. None where no rim stands out.",
+                   {options_of<MirrorSearchOptions>()})
+          .c_str());
+  m.def(
+      "camera_from_mirror",
+      [](const MirrorCircle& mirror, const std::string& model, const py::dict& parameters,
+         std::optional<double> rim_elevation_rad, std::optional<double> inner_radius_px,
+         const std::string& direction, double forward_angle_rad) {
+        return camera_from_mirror(
+            mirror,
+            {.model = mirror_model(model, parameters, rim_elevation_rad, mirror.rim_radius_px),
+             .inner_radius_px = inner_radius_px,
+             .direction = direction_of(direction),
+             .forward_angle_rad = forward_angle_rad});
+      },
+      py::arg("mirror"), py::arg("model") = "equiangular", py::arg("parameters") = py::dict(),
+      py::kw_only(), py::arg("rim_elevation_rad") = py::none(),
+      py::arg("inner_radius_px") = py::none(), py::arg("direction") = "clockwise",
+      py::arg("forward_angle_rad") = 0.0,
+      "The camera of a mirror that `find_mirror` found, by what no picture shows: the mirror's "
+      "shape, and where forward lies. `rim_elevation_rad` gives the focal length of hyperboloidal "
+      "and unified mirrors. `direction`: how a turn to the left runs, 'clockwise' where the camera "
+      "looks up into the mirror.");
+  m.def(
+      "draw_mirror",
+      [](const py::object& picture, const MirrorCircle& mirror,
+         std::optional<double> forward_angle_rad) {
+        const PictureArray pixels(picture, "picture");
+        return array_of(draw_mirror(pixels.view(), mirror, forward_angle_rad));
+      },
+      py::arg("picture"), py::arg("mirror"), py::arg("forward_angle_rad") = py::none(),
+      "A colour copy for a person to check: rim, inner radius, centre and forward direction.");
+}
+
+}  // namespace
+
+void bind_calibration(py::module_& m) {
+  bind_mirrors(m);
+  Record<DualFisheyeCalibration>(m, "DualFisheyeCalibration", "Two lenses, as they were found.")
+      .field("camera", &DualFisheyeCalibration::camera, "")
+      .field("matches", &DualFisheyeCalibration::matches, "Points found twice, no outliers.")
+      .field("inlier_share", &DualFisheyeCalibration::inlier_share,
+             "Of the textured places looked at; some 0.1 by chance.")
+      .field("residual_rad", &DualFisheyeCalibration::residual_rad,
+             "Standard deviation of a match.")
+      .field("azimuth_deviation_rad", &DualFisheyeCalibration::azimuth_deviation_rad,
+             "Largest standard deviation of an azimuth on the horizon.")
+      .field("turns_rad", &DualFisheyeCalibration::turns_rad, "Of each picture against the first.");
+  m.def(
+      "calibrate_dual_fisheye",
+      [](const py::iterable& pictures, double left_roll_rad, double right_roll_rad,
+         double left_azimuth_rad, std::optional<double> field_of_view_rad,
+         std::optional<double> turn_rad, const std::string& direction, int threads) {
+        const DualFisheyeKnowledge known{left_roll_rad,    right_roll_rad,
+                                         left_azimuth_rad, field_of_view_rad,
+                                         turn_rad,         direction_of(direction)};
+        const Pictures all(pictures);
+        const py::gil_scoped_release free;
+        InterruptibleExecutor executor(threads);
+        auto answer = calibrate_dual_fisheye(all.views(), known, executor);
+        if (const auto* refusal = std::get_if<DualFisheyeRefusal>(&answer)) {
+          throw Error("the pictures do not determine the lenses: " + refusal->reason);
+        }
+        return std::get<DualFisheyeCalibration>(std::move(answer));
+      },
+      py::arg("pictures"), py::kw_only(), py::arg("left_roll_rad") = 0.0,
+      py::arg("right_roll_rad") = 0.0, py::arg("left_azimuth_rad") = 0.0,
+      py::arg("field_of_view_rad") = py::none(), py::arg("turn_rad") = py::none(),
+      py::arg("direction") = "clockwise", py::arg("threads") = 0,
+      "Finds the two lenses of a 360 degree camera in pictures of one place, between which it was "
+      "turned about its vertical axis. Rolls: how what is above lies in each circle, to about 3 "
+      "degrees. None: found. Raises Error with the reason where the pictures do not determine it.");
+}
+
+}  // namespace panonav::python

@@ -1,0 +1,142 @@
+#include "memories.hpp"
+#include "panonav/pipeline/robot_navigator.hpp"
+
+namespace panonav::python {
+
+namespace {
+
+RobotNavigatorOptions navigator_options(const std::optional<std::string>& edges,
+                                        const std::optional<std::string>& route,
+                                        const py::kwargs& keywords) {
+  RobotNavigatorOptions options{.route = route};
+  if (edges) {
+    options.edges = graph_origin(*edges);
+    if (!options.edges) {
+      throw ContractError("edges", "'" + *edges + "'", "map, lattice, links, arrangement");
+    }
+  }
+  Keywords taken(keywords);
+  taken.options(options.navigator).options(options.planner).options(options.base);
+  if (route) taken.options(options.known_route, "route");
+  taken.finish();
+  return options;
+}
+
+}  // namespace
+
+void bind_navigation(py::module_& m) {
+  Record<Velocity>(m, "Velocity", "Speeds of a robot in its own frame.")
+      .field("forward_m_s", &Velocity::forward_m_s, "")
+      .field("left_m_s", &Velocity::left_m_s, "0 for a differential drive.")
+      .field("turn_rad_s", &Velocity::turn_rad_s, "Counter-clockwise.");
+  Record<NavigationDecision>(m, "NavigationDecision", "One decision with its reasons.")
+      .field("step", &NavigationDecision::step, "Counts from 1.")
+      .field(
+          "state", [](const NavigationDecision& d) { return name_of(d.state); },
+          "'moving', 'arrived', 'blocked', 'lost' or 'unreachable'.")
+      .field("direction_rad", &NavigationDecision::direction_rad, "In the current robot frame.")
+      .field("advance_m", &NavigationDecision::advance_m, "How far; 0 unless moving.")
+      .field("homing", &NavigationDecision::homing,
+             "The last stretch, by the home vector to the goal itself.")
+      .field("on_route", &NavigationDecision::on_route, "A leg along a recorded route.")
+      .field("nearest", &NavigationDecision::nearest, "The view where the robot is, or None.")
+      .field("probability", &NavigationDecision::probability, "That it is there.")
+      .field("next", &NavigationDecision::next, "The view ahead, or None.")
+      .field("area", &NavigationDecision::area, "That is loaded.")
+      .field("difference", &NavigationDecision::difference,
+             "Of what is seen from `nearest`, homing: from the goal.")
+      .field("way", &NavigationDecision::way, "That is left along the edges, in their unit.")
+      .field("components", &NavigationDecision::components, "Compared.")
+      .field("bytes_read", &NavigationDecision::bytes_read, "")
+      .field(
+          "events",
+          [](const NavigationDecision& d) {
+            std::vector<std::string_view> names;
+            for (const NavigationEvent event : d.events) names.push_back(name_of(event));
+            return names;
+          },
+          "What made it differ from going on, such as 'kidnapped' or 'closed'.");
+  Record<NavigationStep>(m, "NavigationStep", "What a robot is to do after an observation.")
+      .field("decision", &NavigationStep::decision, "The last one.")
+      .field("velocity", &NavigationStep::velocity, "For the next period of the base.")
+      .field("decided", &NavigationStep::decided,
+             "By this observation; else the step decided before goes on.");
+  using SharedNavigator = Shared<RobotNavigator>;
+  const auto view_name = [](SharedNavigator& navigator, std::uint32_t view) {
+    return navigator.change([&](RobotNavigator& n) { return n.info(ViewId{view}).name; });
+  };
+  py::class_<SharedNavigator>(m, "RobotNavigator",
+                              "Sends a robot to a remembered view by what it sees: a picture in, a "
+                              "velocity out.")
+      .def(py::init([](const std::filesystem::path& memory, const std::string& goal,
+                       const std::optional<PictureSource>& source,
+                       const std::optional<std::string>& edges,
+                       const std::optional<std::string>& route, int threads,
+                       const py::kwargs& keywords) {
+             const auto options = navigator_options(edges, route, keywords);
+             const py::gil_scoped_release free;
+             InterruptibleExecutor executor(threads);
+             return std::make_unique<SharedNavigator>(memory, goal, options, source,
+                                                      &static_cast<Executor&>(executor));
+           }),
+           py::arg("memory"), py::arg("goal"), py::arg("source") = py::none(), py::kw_only(),
+           py::arg("edges") = py::none(), py::arg("route") = py::none(), py::arg("threads") = 0,
+           with_options("`goal`: name or id of a view of the memory file. `edges`: 'map', "
+                        "'lattice', 'links' or 'arrangement' (made now); None: the first that "
+                        "the memory has. `route`: a recorded route to go along where the way "
+                        "leads along it; only then there are options route_*.",
+                        {options_of<NavigatorOptions>(), options_of<PlannerOptions>(),
+                         options_of<BaseOptions>(), options_of<KnownRouteOptions>("route")})
+               .c_str())
+      .def(
+          "step",
+          [](SharedNavigator& navigator, const py::object& observation, bool obstacle,
+             std::optional<std::uint32_t> estimate) {
+            const Observation seen = observation_from(observation);
+            return navigator.change([&](RobotNavigator& n) {
+              RobotReport report{.obstacle = obstacle};
+              if (estimate) report.estimate = ViewId{*estimate};
+              return n.step(seen, report);
+            });
+          },
+          py::arg("observation"), py::arg("obstacle") = false, py::arg("estimate") = py::none(),
+          "To be called once in each period of the base (period_s). `obstacle`: something stopped "
+          "the robot. `estimate`: the view where another estimate has it, where that is certain. "
+          "The observation's odometry says when a step is done; without, time does.")
+      .def(
+          "set_goal",
+          [](SharedNavigator& navigator, const std::string& goal) {
+            navigator.change([&](RobotNavigator& n) {
+              n.set_goal(goal);
+              return 0;
+            });
+          },
+          py::arg("goal"), "Another goal; where the robot is stays known.")
+      .def("name_of", view_name, py::arg("view"), "Of a view of the memory.")
+      .def_property_readonly(
+          "goal",
+          [](SharedNavigator& navigator) {
+            return navigator.change([](RobotNavigator& n) { return n.info(n.goal()).name; });
+          },
+          "Name of the goal's view.")
+      .def_property_readonly(
+          "edges_from",
+          [](const SharedNavigator& navigator) {
+            return navigator.read([](const RobotNavigator& n) { return name_of(n.origin()); });
+          },
+          "'map', 'lattice', 'links' or 'arrangement'.")
+      .def_property_readonly(
+          "edges",
+          [](const SharedNavigator& navigator) {
+            return navigator.read([](const RobotNavigator& n) {
+              std::vector<std::pair<ViewId, ViewId>> edges;
+              for (const NavigationEdge& edge : n.graph().edges()) {
+                edges.emplace_back(edge.a, edge.b);
+              }
+              return edges;
+            });
+          },
+          "Pairs of views.");
+}
+
+}  // namespace panonav::python

@@ -1,0 +1,342 @@
+#ifdef PANONAV_PYTHON_SIMULATES
+#include "panonav/core/error.hpp"
+#include "panonav/motion/simulated_base.hpp"
+#include "panonav/simulation/scenes.hpp"
+#include "panonav/simulation/simulated_world.hpp"
+#include "recordings.hpp"
+
+namespace panonav::python {
+
+namespace {
+
+using World = std::shared_ptr<const SimulatedWorld>;
+
+/// The options of a world as keyword arguments; its recording is taken by the caller.
+World make_world(const std::string& scene, SimulatedWorldOptions wanted, Keywords& taken,
+                 int threads) {
+  taken.options(wanted.simulation)
+      .options(wanted.frame)
+      .options(wanted.sensor)
+      .options(wanted.free_space)
+      .options(wanted.odometry, "odometry")
+      .finish();
+  std::vector<std::string> given;
+  for (const char* name : {"scene_seed", "moved_objects", "moved_seed", "camera_height_m",
+                           "robot_radius_m", "robot_height_m", "step_height_m", "cell_m"}) {
+    if (taken.given(name)) given.emplace_back(name);
+  }
+  const py::gil_scoped_release free;
+  InterruptibleExecutor executor(threads);
+  return std::make_shared<const SimulatedWorld>(
+      scene, std::move(wanted),
+      [&](const std::string&, const std::string& name) {
+        const auto found = std::ranges::find(given, name);
+        return found == given.end() ? std::nullopt : std::optional(*found);
+      },
+      executor);
+}
+
+SimulatedWorldOptions recording_options(Keywords& taken) {
+  SimulatedWorldOptions wanted;
+  taken.options(wanted.recording);
+  if (!taken.given("heading")) {
+    wanted.recording.heading = usual_heading(wanted.recording.path);
+  }
+  return wanted;
+}
+
+std::optional<Trajectory> trajectory_from(const py::object& rows) {
+  if (rows.is_none()) return std::nullopt;
+  auto trajectory = trajectory_of(number_rows(rows, "trajectory", 4));
+  require(!trajectory.empty(), "poses of trajectory", 0, ">= 1");
+  return trajectory;
+}
+
+Dataset record(const SimulatedWorld& world, const std::filesystem::path& folder,
+               const std::optional<Trajectory>& trajectory, int threads) {
+  std::error_code ignored;
+  if (std::filesystem::exists(folder, ignored) && !std::filesystem::is_empty(folder, ignored)) {
+    throw FileError(folder.string(), "is there already and not empty; allowed: a new folder");
+  }
+  InterruptibleExecutor executor(threads);
+  const auto poses = trajectory ? world.plan_along(trajectory->poses()) : world.plan();
+  const bool with_path = trajectory || world.options().recording.path != RecordingPath::random;
+  return record_dataset(world, folder, poses, with_path, executor);
+}
+
+py::array_t<double> point_rows(std::span<const Point2> points) {
+  py::array_t<double> rows({static_cast<py::ssize_t>(points.size()), py::ssize_t{2}});
+  auto row = rows.mutable_unchecked<2>();
+  for (py::ssize_t i = 0; i < rows.shape(0); ++i) {
+    row(i, 0) = points[static_cast<std::size_t>(i)].x_m;
+    row(i, 1) = points[static_cast<std::size_t>(i)].y_m;
+  }
+  return rows;
+}
+
+/// Seen somewhere in the world.
+Image picture_at(const SimulatedWorld& world, const Pose2& pose, std::uint64_t seed) {
+  Executor executor(1);
+  return world.take_picture(pose, seed, executor);
+}
+
+void bind_worlds(py::module_& m) {
+  const auto of_world = {options_of<SimulationOptions>(), options_of<FrameOptions>(),
+                         options_of<SensorOptions>(), options_of<FreeSpaceOptions>(),
+                         options_of<OdometryNoise>("odometry")};
+  std::vector<ListedOptions> of_recording{options_of<RecordingOptions>()};
+  of_recording.insert(of_recording.end(), of_world);
+  py::class_<SimulatedWorld, std::shared_ptr<SimulatedWorld>>(
+      m, "SimulatedWorld",
+      "A scene with a robot in it, whose pictures are ray-traced. Several threads may use one at a "
+      "time.")
+      .def(py::init([](const std::string& scene, const std::optional<Camera>& mirror, int threads,
+                       const py::kwargs& keywords) {
+             Keywords taken(keywords);
+             SimulatedWorldOptions wanted;
+             wanted.mirror = mirror;
+             return std::const_pointer_cast<SimulatedWorld>(
+                 make_world(scene, std::move(wanted), taken, threads));
+           }),
+           py::arg("scene"), py::kw_only(), py::arg("mirror") = py::none(), py::arg("threads") = 0,
+           with_options("`scene`: one of `scenes`, or the path of a Gazebo world or a mesh file. "
+                        "`mirror`: the camera, where kind is 'mirror'. The robot and its camera's "
+                        "height are those that the scene is made for, unless they are given.",
+                        of_world)
+               .c_str())
+      .def_property_readonly("name", [](const SimulatedWorld& w) { return w.scene().name; })
+      .def_property_readonly(
+          "warnings", [](const SimulatedWorld& w) { return w.scene().warnings; },
+          "What of a file could not be shown.")
+      .def_property_readonly("source", &SimulatedWorld::source, "How its pictures lie.")
+      .def_property_readonly(
+          "camera_height_m",
+          [](const SimulatedWorld& w) { return w.options().frame.camera_height_m; })
+      .def_property_readonly(
+          "robot_radius_m",
+          [](const SimulatedWorld& w) { return w.options().free_space.robot_radius_m; })
+      .def_property_readonly("free_area_m2",
+                             [](const SimulatedWorld& w) { return w.free_space().area_m2(); })
+      .def_property_readonly(
+          "low", [](const SimulatedWorld& w) { return w.free_space().low(); },
+          "Lower corner of the floor: (x_m, y_m).")
+      .def_property_readonly(
+          "high", [](const SimulatedWorld& w) { return w.free_space().high(); },
+          "Upper corner of the floor: (x_m, y_m).")
+      .def_property_readonly(
+          "tour", [](const SimulatedWorld& w) { return point_rows(w.scene().tour); },
+          "A round trip, (n, 2) of x_m, y_m; may be empty.")
+      .def(
+          "floor_plan", [](const SimulatedWorld& w) { return array_of(w.free_space().picture()); },
+          "uint8 of (rows, columns), y upwards from `low` to `high`: free 255, obstacles 0, grey "
+          "too near to one.")
+      .def(
+          "is_free",
+          [](const SimulatedWorld& w, const Point2& place) {
+            return w.free_space().is_free(place);
+          },
+          py::arg("place"), "Whether the robot can stand at (x_m, y_m).")
+      .def(
+          "clearance_m",
+          [](const SimulatedWorld& w, const Point2& place) {
+            return w.free_space().clearance_m(place);
+          },
+          py::arg("place"), "Distance from (x_m, y_m) to the nearest obstacle, never too long.")
+      .def(
+          "random_pose",
+          [](const SimulatedWorld& w, std::uint64_t seed) {
+            Random random(seed, 0);
+            return w.free_space().random_pose(random);
+          },
+          py::arg("seed"), "A free place, any heading.")
+      .def(
+          "shortest_path",
+          [](const SimulatedWorld& w, const Point2& from,
+             const Point2& to) -> std::optional<py::array_t<double>> {
+            const auto path = [&] {
+              const py::gil_scoped_release free;
+              return w.free_space().shortest_path(from, to);
+            }();
+            if (!path) return std::nullopt;
+            return point_rows(*path);
+          },
+          py::arg("start"), py::arg("end"),
+          "Way points of a short free path, (n, 2) of x_m, y_m; None where there is none.")
+      .def(
+          "take_picture",
+          [](const SimulatedWorld& w, const Pose2& pose, std::uint64_t seed) {
+            const Image picture = [&] {
+              const py::gil_scoped_release free;
+              return picture_at(w, pose, seed);
+            }();
+            return array_of(picture);
+          },
+          py::arg("pose"), py::arg("seed") = 0,
+          "What the camera sees there, uint8. The same seed gives the same noise; give each "
+          "picture its own.")
+      .def(
+          "plan",
+          [](const SimulatedWorld& w, const py::kwargs& keywords) {
+            Keywords taken(keywords);
+            const auto wanted = recording_options(taken);
+            taken.finish();
+            std::vector<Pose2> poses;
+            for (const auto& one :
+                 w.with(wanted.recording, w.options().simulation.scene.seed).plan()) {
+              poses.push_back(one.pose);
+            }
+            return pose_rows(poses);
+          },
+          with_options("Where a recording with these options takes its pictures: (n, 3) of x_m, "
+                       "y_m, heading_rad.",
+                       {options_of<RecordingOptions>()})
+              .c_str())
+      .def(
+          "record",
+          [](const SimulatedWorld& w, const std::filesystem::path& folder,
+             const py::object& trajectory, std::optional<int> seed, int threads,
+             const py::kwargs& keywords) {
+            Keywords taken(keywords);
+            const auto wanted = recording_options(taken);
+            taken.finish();
+            const auto along = trajectory_from(trajectory);
+            const py::gil_scoped_release free;
+            return record(
+                w.with(wanted.recording, seed.value_or(w.options().simulation.scene.seed)), folder,
+                along, threads);
+          },
+          py::arg("folder"), py::kw_only(), py::arg("trajectory") = py::none(),
+          py::arg("seed") = py::none(), py::arg("threads") = 0,
+          with_options("Writes a data set, as `panonav simulate` does, and returns it. "
+                       "`trajectory`: the robot goes along (n, 4) of stamp_s, x_m, y_m, "
+                       "heading_rad instead. `seed`: of poses, noise and odometry, in place of "
+                       "the world's.",
+                       {options_of<RecordingOptions>()})
+              .c_str())
+      .def("__repr__", [](const SimulatedWorld& w) {
+        return "SimulatedWorld('" + w.scene().name + "', " + to_text(w.free_space().area_m2()) +
+               " m2 free)";
+      });
+  m.def(
+      "simulate",
+      [](const std::string& scene, const std::filesystem::path& folder,
+         const std::optional<Camera>& mirror, const py::object& trajectory, int threads,
+         const py::kwargs& keywords) {
+        Keywords taken(keywords);
+        auto wanted = recording_options(taken);
+        wanted.mirror = mirror;
+        const auto along = trajectory_from(trajectory);
+        const World world = make_world(scene, std::move(wanted), taken, threads);
+        const py::gil_scoped_release free;
+        return record(*world, folder, along, threads);
+      },
+      py::arg("scene"), py::arg("folder"), py::kw_only(), py::arg("mirror") = py::none(),
+      py::arg("trajectory") = py::none(), py::arg("threads") = 0,
+      with_options("Renders a data set of a simulated robot, as `panonav simulate` does: "
+                   "SimulatedWorld(scene).record(folder).",
+                   of_recording)
+          .c_str());
+  py::tuple names(scene_names().size());
+  for (std::size_t i = 0; i < scene_names().size(); ++i) names[i] = std::string(scene_names()[i]);
+  m.attr("scenes") = names;
+}
+
+/// A base, and what its camera has seen so far.
+struct Robot {
+  World world;
+  SimulatedBase base;
+  std::uint64_t seed;
+  std::uint64_t pictures = 0;
+  double time_s = 0.0;
+};
+using SharedRobot = Shared<Robot>;
+
+Pose2 free_start(const SimulatedWorld& world, const std::optional<Pose2>& start,
+                 std::uint64_t seed) {
+  Random random(seed, 0);
+  if (!start) return world.free_space().random_pose(random);
+  if (world.free_space().is_free(start->position())) return *start;
+  throw ContractError("start", to_text(start->x_m) + ", " + to_text(start->y_m), "a free place");
+}
+
+void bind_robots(py::module_& m) {
+  py::class_<SharedRobot>(m, "SimulatedRobot",
+                          "A robot in a simulated world: it drives as it is told until something "
+                          "is in its way, and sees.")
+      .def(py::init([](const std::shared_ptr<SimulatedWorld>& world,
+                       const std::optional<Pose2>& start, std::uint64_t seed) {
+             return std::make_unique<SharedRobot>(
+                 Robot{world,
+                       {free_start(*world, start, seed),
+                        [world](Point2 from, Point2 to) {
+                          return world->free_space().is_free_between(from, to);
+                        },
+                        world->options().odometry, seed},
+                       seed});
+           }),
+           py::arg("world"), py::arg("start") = py::none(), py::arg("seed") = 1,
+           "`start`: a free pose; None: any. `seed`: of its start, its odometry and the noise of "
+           "its pictures.")
+      .def(
+          "drive",
+          [](SharedRobot& robot, double forward_m_s, double turn_rad_s, double seconds,
+             double left_m_s) {
+            return robot.change([&](Robot& r) {
+              const auto step = r.base.drive({forward_m_s, left_m_s, turn_rad_s}, seconds);
+              r.time_s += seconds;
+              return !step.stopped;
+            });
+          },
+          py::arg("forward_m_s"), py::arg("turn_rad_s") = 0.0, py::arg("seconds") = 0.1,
+          py::kw_only(), py::arg("left_m_s") = 0.0,
+          "Drives so for a while. False where something was in its way: it then turned only.")
+      .def(
+          "observe",
+          [](SharedRobot& robot) {
+            return robot.change([](Robot& r) {
+              Observation seen(
+                  picture_at(*r.world, r.base.pose(), Random(r.seed, ++r.pictures).next()));
+              const Pose2& pose = r.base.pose();
+              seen.stamp_s = r.time_s;
+              seen.odometry = r.base.odometry();
+              seen.pose = ReferencePose{pose.x_m, pose.y_m, pose.heading_rad};
+              return seen;
+            });
+          },
+          "What it sees now, with stamp, odometry and, for the record, its true pose, which no "
+          "estimate reads.")
+      .def(
+          "carry_to",
+          [](SharedRobot& robot, const Pose2& pose) {
+            robot.change([&](Robot& r) {
+              r.base.carry_to(free_start(*r.world, pose, 0));
+              return 0;
+            });
+          },
+          py::arg("pose"), "Somebody carries it there; its odometry does not know.")
+      .def_property_readonly(
+          "pose",
+          [](const SharedRobot& robot) {
+            return robot.read([](const Robot& r) { return r.base.pose(); });
+          },
+          "Where it truly is.")
+      .def_property_readonly(
+          "odometry",
+          [](const SharedRobot& robot) {
+            return robot.read([](const Robot& r) { return r.base.odometry(); });
+          },
+          "Where its odometry says that it is, in a frame of its own.")
+      .def_property_readonly("time_s", [](const SharedRobot& robot) {
+        return robot.read([](const Robot& r) { return r.time_s; });
+      });
+}
+
+}  // namespace
+
+void bind_simulation(py::module_& m) {
+  bind_worlds(m);
+  bind_robots(m);
+}
+
+}  // namespace panonav::python
+#endif

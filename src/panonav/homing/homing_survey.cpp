@@ -1,0 +1,248 @@
+#include "panonav/homing/homing_survey.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <mutex>
+#include <unordered_map>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav {
+
+namespace {
+
+// Rounding of coordinates must not decide whether a step of exactly the limit counts.
+constexpr double rounding_m = 1e-9;
+
+// Finds the place nearest to a point, if one is within a fixed reach.
+class PlaceFinder {
+ public:
+  PlaceFinder(std::span<const Pose2> places, double reach_m) : places_(places), reach_m_(reach_m) {
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      cells_[key(cell(places[i].x_m), cell(places[i].y_m))].push_back(
+          static_cast<std::uint32_t>(i));
+    }
+  }
+
+  // `otherwise` when nothing is in reach; of equally near ones the first.
+  [[nodiscard]] std::uint32_t nearest(Point2 point, std::uint32_t otherwise) const {
+    std::uint32_t best = otherwise;
+    double best_square = (reach_m_ + rounding_m) * (reach_m_ + rounding_m);
+    bool found = false;
+    const std::int64_t x = cell(point.x_m);
+    const std::int64_t y = cell(point.y_m);
+    for (std::int64_t dy = -1; dy <= 1; ++dy) {
+      for (std::int64_t dx = -1; dx <= 1; ++dx) {
+        const auto at = cells_.find(key(x + dx, y + dy));
+        if (at == cells_.end()) continue;
+        for (const std::uint32_t i : at->second) {
+          const double ex = places_[i].x_m - point.x_m;
+          const double ey = places_[i].y_m - point.y_m;
+          const double square = ex * ex + ey * ey;
+          if (square > best_square || (found && square == best_square && i >= best)) continue;
+          best = i;
+          best_square = square;
+          found = true;
+        }
+      }
+    }
+    return best;
+  }
+
+ private:
+  [[nodiscard]] std::int64_t cell(double value_m) const {
+    return static_cast<std::int64_t>(std::floor(value_m / (reach_m_ + rounding_m)));
+  }
+  [[nodiscard]] static std::uint64_t key(std::int64_t x, std::int64_t y) {
+    return (static_cast<std::uint64_t>(x) << 32U) ^ (static_cast<std::uint64_t>(y) & 0xFFFFFFFFU);
+  }
+  std::span<const Pose2> places_;
+  double reach_m_;
+  std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cells_;
+};
+
+void check_poses(std::span<const Pose2> poses, const char* what) {
+  require(!poses.empty(), what, 0, ">= 1");
+  constexpr double farthest_m = 1e6;  // so that cells can be counted
+  for (const Pose2& pose : poses) {
+    for (const double value : {pose.x_m, pose.y_m, pose.heading_rad}) {
+      require(std::abs(value) <= farthest_m, what, value, "-1e6 .. 1e6");
+    }
+  }
+}
+
+}  // namespace
+
+void visit_options(HomingSurveyOptions& options, OptionVisitor& visitor) {
+  using T = HomingSurveyOptions;
+  constexpr OptionTable table{
+      option<&T::typical_distance_m>("distance of things: what a home vector of length 1 is worth",
+                                     1e-3, 1e3),
+      option<&T::max_step_m>("longest way between two views", 1e-3, 1e3).formerly("longest_step_m"),
+      option<&T::obstacle_m>("distance from all places beyond which a step stops the run", 1e-3,
+                             1e3),
+      option<&T::max_steps>("steps after which a run stops", 1, 1e6).formerly("most_steps"),
+  };
+  table.visit(options, visitor);
+}
+
+HomingSurvey survey_homing(std::span<const Pose2> goals, std::span<const Pose2> places,
+                           const HomingRule& rule, const HomingSurveyOptions& options,
+                           Executor& executor, const SurveyProgress& progress) {
+  validate(options);
+  check_poses(goals, "goals");
+  check_poses(places, "places");
+  HomingSurvey survey{{goals.begin(), goals.end()}, {places.begin(), places.end()}, {}, {}};
+  survey.next.resize(goals.size() * places.size());
+  survey.homeward.resize(goals.size() * places.size());
+  const PlaceFinder finder(places, options.obstacle_m);
+  std::mutex mutex;
+  std::size_t done = 0;
+  executor.for_chunks(goals.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
+    for (std::size_t g = begin; g < end; ++g) {
+      for (std::size_t p = 0; p < places.size(); ++p) {
+        const Pose2& here = places[p];
+        const HomeVector vector = rule(g, p);
+        const double length = vector.length();
+        const double cosine = std::cos(here.heading_rad);
+        const double sine = std::sin(here.heading_rad);
+        const double x = cosine * vector.xi - sine * vector.eta;
+        const double y = sine * vector.xi + cosine * vector.eta;
+        const double home_x = goals[g].x_m - here.x_m;
+        const double home_y = goals[g].y_m - here.y_m;
+        const double home_m = std::hypot(home_x, home_y);
+        const std::size_t pair = g * places.size() + p;
+        survey.homeward[pair] =
+            home_m > rounding_m
+                ? static_cast<float>(length > 0.0 ? (x * home_x + y * home_y) / (length * home_m)
+                                                  : 0.0)
+                : std::numeric_limits<float>::quiet_NaN();
+        auto next = static_cast<std::uint32_t>(p);
+        if (length > 0.0) {
+          const double step_m = std::min(options.max_step_m, options.typical_distance_m * length);
+          next = finder.nearest({here.x_m + step_m * x / length, here.y_m + step_m * y / length},
+                                next);
+        }
+        survey.next[pair] = next;
+      }
+    }
+    if (!progress) return;
+    const std::lock_guard lock(mutex);
+    done += end - begin;
+    progress(static_cast<double>(done) / static_cast<double>(goals.size()));
+  });
+  return survey;
+}
+
+HomingSurvey survey_homing(std::span<const PlacedHomingView> goals,
+                           std::span<const PlacedHomingView> places,
+                           const FourierHomingOptions& homing, const HomingSurveyOptions& options,
+                           Executor& executor, const SurveyProgress& progress) {
+  std::vector<Pose2> goal_poses;
+  std::vector<Pose2> place_poses;
+  for (const auto& goal : goals) goal_poses.push_back(goal.pose);
+  for (const auto& place : places) place_poses.push_back(place.pose);
+  return survey_homing(
+      goal_poses, place_poses,
+      [&](std::size_t goal, std::size_t place) {
+        return home_vector(goals[goal].view, places[place].view, homing);
+      },
+      options, executor, progress);
+}
+
+std::vector<HomewardBin> homeward_by_distance(const HomingSurvey& survey, double bin_m) {
+  require(bin_m > 0.0, "bin_m", bin_m, "> 0");
+  std::vector<HomewardBin> bins;
+  for (std::size_t g = 0; g < survey.goals.size(); ++g) {
+    const auto homeward = survey.homeward_of(g);
+    for (std::size_t p = 0; p < homeward.size(); ++p) {
+      if (std::isnan(homeward[p])) continue;
+      const double away_m = distance(survey.goals[g].position(), survey.places[p].position());
+      const auto bin = static_cast<std::size_t>(std::floor(away_m / bin_m + 0.5));
+      if (bin >= bins.size()) bins.resize(bin + 1);
+      ++bins[bin].pairs;
+      bins[bin].component += static_cast<double>(homeward[p]);
+    }
+  }
+  for (std::size_t i = 0; i < bins.size(); ++i) {
+    bins[i].distance_m = static_cast<double>(i) * bin_m;
+    bins[i].component = bins[i].pairs > 0 ? bins[i].component / static_cast<double>(bins[i].pairs)
+                                          : std::numeric_limits<double>::quiet_NaN();
+  }
+  return bins;
+}
+
+double mean_homeward(const HomingSurvey& survey, double max_m) {
+  double sum = 0.0;
+  std::size_t pairs = 0;
+  for (std::size_t g = 0; g < survey.goals.size(); ++g) {
+    const auto homeward = survey.homeward_of(g);
+    for (std::size_t p = 0; p < homeward.size(); ++p) {
+      if (std::isnan(homeward[p])) continue;
+      const double away_m = distance(survey.goals[g].position(), survey.places[p].position());
+      if (away_m > max_m + rounding_m) continue;
+      ++pairs;
+      sum += static_cast<double>(homeward[p]);
+    }
+  }
+  return pairs > 0 ? sum / static_cast<double>(pairs) : std::numeric_limits<double>::quiet_NaN();
+}
+
+std::vector<std::uint32_t> final_places(std::span<const HomingSurvey* const> stages,
+                                        std::size_t goal, const HomingSurveyOptions& options) {
+  require(!stages.empty(), "stages", 0, ">= 1");
+  const std::size_t places = stages[0]->places.size();
+  for (const HomingSurvey* const stage : stages) {
+    require(stage->places.size() == places && stage->goals.size() == stages[0]->goals.size(),
+            "places of a stage", static_cast<double>(stage->places.size()),
+            "as in the first stage");
+  }
+  require(goal < stages[0]->goals.size(), "goal", static_cast<double>(goal), "one of the survey's");
+  std::vector<std::uint32_t> at(places);
+  for (std::size_t p = 0; p < places; ++p) {
+    auto place = static_cast<std::uint32_t>(p);
+    for (const HomingSurvey* const stage : stages) {
+      const auto next = stage->next_of(goal);
+      for (int step = 0; step < options.max_steps; ++step) {
+        const std::uint32_t to = next[place];
+        if (to == place) break;
+        place = to;
+      }
+    }
+    at[p] = place;
+  }
+  return at;
+}
+
+std::vector<float> final_distances(std::span<const HomingSurvey* const> stages,
+                                   const HomingSurveyOptions& options, Executor& executor) {
+  require(!stages.empty(), "stages", 0, ">= 1");
+  const HomingSurvey& first = *stages[0];
+  std::vector<float> distances(first.goals.size() * first.places.size());
+  executor.for_chunks(first.goals.size(), 16, [&](std::size_t begin, std::size_t end, std::size_t) {
+    for (std::size_t g = begin; g < end; ++g) {
+      const auto ends = final_places(stages, g, options);
+      for (std::size_t p = 0; p < ends.size(); ++p) {
+        distances[g * ends.size() + p] = static_cast<float>(
+            distance(first.goals[g].position(), first.places[ends[p]].position()));
+      }
+    }
+  });
+  return distances;
+}
+
+std::vector<double> mean_catchment_areas(std::span<const float> distances, std::size_t goals,
+                                         std::span<const double> accepted_m) {
+  require(goals >= 1, "goals", static_cast<double>(goals), ">= 1");
+  std::vector<double> areas;
+  for (const double accepted : accepted_m) {
+    const auto inside = std::ranges::count_if(distances, [&](float away_m) {
+      return static_cast<double>(away_m) <= accepted + 1e-6;  // distances are single precision
+    });
+    areas.push_back(static_cast<double>(inside) / static_cast<double>(goals));
+  }
+  return areas;
+}
+
+}  // namespace panonav

@@ -1,0 +1,301 @@
+#include "panonav/mapping/session_alignment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <map>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr double match_position_deviation_m = 0.1;
+constexpr double match_heading_deviation_rad = 0.05;
+// What is known of a map's shape: the error of the motion between two nodes, for each metre.
+constexpr double edge_deviation = 0.02;
+constexpr double edge_turn_deviation = 0.01;
+constexpr double shape_position_deviation_m = 0.005;
+constexpr double shape_heading_deviation_rad = 0.003;
+
+double translation_m(const Pose2& motion) {
+  return std::hypot(motion.x_m, motion.y_m);
+}
+
+std::vector<PassedNode> passed_nodes(const TopologicalMap& map, std::size_t component) {
+  std::vector<PassedNode> nodes;
+  double way_m = 0.0;
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+    if (i > 0) way_m += distance(map.nodes[i - 1].pose.position(), map.nodes[i].pose.position());
+    nodes.push_back({map.nodes[i].view, way_m, component});
+  }
+  return nodes;
+}
+
+std::vector<LoopClosure> find_matches(const VisualMemory& memory, const TopologicalMap& first,
+                                      const TopologicalMap& second,
+                                      const LoopClosureOptions& closure, double scale_m) {
+  // The views of the second session come one by one, as those of a robot that drives.
+  VisualMemory seen(memory.shape(), memory.full_scale(), memory.elevations());
+  std::vector<PassedNode> nodes = passed_nodes(first, 0);
+  const std::vector<PassedNode> others = passed_nodes(second, 1);
+  std::vector<Pose2> poses;
+  const auto see = [&](ViewId view) { return seen.append(memory.packed(view), memory.info(view)); };
+  for (std::size_t i = 0; i < first.nodes.size(); ++i) {
+    nodes[i].view = see(first.nodes[i].view);
+    poses.push_back(first.nodes[i].pose);
+  }
+  LoopClosureFinder finder(seen, closure, {}, ClosureScope::other_components);
+  std::vector<LoopClosure> matches;
+  std::vector<std::size_t> number;  // in the second map, of the nodes behind those of the first
+  for (std::size_t i = 0; i < second.nodes.size(); ++i) {
+    const ViewId view = second.nodes[i].view;
+    const auto same = std::ranges::lower_bound(first.nodes, view, {}, &MapNode::view);
+    if (same != first.nodes.end() && same->view == view) {
+      matches.push_back({static_cast<std::size_t>(same - first.nodes.begin()), i, {}, 0.0});
+      continue;
+    }
+    nodes.push_back(others[i]);
+    nodes.back().view = see(view);
+    poses.push_back(second.nodes[i].pose);
+    number.push_back(i);
+    for (LoopClosure found :
+         finder.find(nodes, poses, OdometryView(memory.signature(view)), scale_m)) {
+      if (found.earlier >= first.nodes.size()) continue;
+      found.later = number[found.later - first.nodes.size()];
+      matches.push_back(found);
+    }
+  }
+  return matches;
+}
+
+/// What the matches of two sessions say of how these lie to each other.
+class Matches {
+ public:
+  Matches(const TopologicalMap& first, const TopologicalMap& second,
+          const SessionAlignmentOptions& options, const LoopClosureOptions& closure, double scale_m,
+          std::vector<LoopClosure> matches)
+      : first_(&first),
+        second_(&second),
+        options_(options),
+        spacing_m_(closure.spacing_m),
+        tolerance_m_(closure.max_length * scale_m),
+        tolerance_rad_(2.0 * closure.heading_tolerance_rad),
+        way_(passed_nodes(second, 0)),
+        matches_(std::move(matches)) {
+    for (const LoopClosure& match : matches_) {
+      frames_.push_back(first.nodes[match.earlier].pose * match.earlier_from_later *
+                        inverse(second.nodes[match.later].pose));
+    }
+  }
+
+  using Set = std::vector<std::size_t>;  // numbers of matches, ascending
+  struct Hypothesis {
+    int places = 0;
+    Set matches;
+  };
+
+  [[nodiscard]] Set all() const {
+    Set numbers(matches_.size());
+    for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = i;
+    return numbers;
+  }
+  [[nodiscard]] const LoopClosure& operator[](std::size_t i) const { return matches_[i]; }
+
+  /// The match that leads to the same frame as most places, with those that do.
+  [[nodiscard]] Hypothesis best_among(const Set& among) const {
+    Hypothesis best;
+    for (const std::size_t i : among) {
+      Set agreeing;
+      for (const std::size_t j : among) {
+        if (agree(i, j) && agree(j, i)) agreeing.push_back(j);
+      }
+      const int places = count_places(agreeing);
+      if (places > best.places) best = {places, std::move(agreeing)};
+    }
+    return best;
+  }
+
+  /// Where the maps lie upon each other, views must match. Maps drift, so that the frame is that of
+  /// the nearest match along the way.
+  void confirm(const Set& set, SessionAlignment& alignment) const {
+    std::optional<double> last_m;
+    for (std::size_t i = 0; i < way_.size(); ++i) {
+      const double here_m = way_[i].way_m;
+      if (last_m && here_m - *last_m < spacing_m_) continue;
+      const auto off_m = [&](std::size_t match) {
+        return std::abs(way_[matches_[match].later].way_m - here_m);
+      };
+      const std::size_t nearest = *std::ranges::min_element(set, {}, off_m);
+      const Point2 place = (frames_[nearest] * second_->nodes[i].pose).position();
+      const bool beside = std::ranges::any_of(first_->nodes, [&](const MapNode& node) {
+        return distance(node.pose.position(), place) < 0.5 * tolerance_m_;
+      });
+      if (!beside) continue;
+      last_m = here_m;
+      ++alignment.expected_places;
+      if (off_m(nearest) <= 2.0 * spacing_m_) ++alignment.confirmed_places;
+    }
+  }
+
+  /// Of the match whose frame puts the places of all others nearest to where they put them.
+  [[nodiscard]] Pose2 middle_frame(const Set& set) const {
+    const auto total_gap_m = [&](std::size_t i) {
+      double sum = 0.0;
+      for (const std::size_t j : set) sum += gap_m(i, j);
+      return sum;
+    };
+    return frames_[*std::ranges::min_element(set, {}, total_gap_m)];
+  }
+
+ private:
+  /// Between the places where both put the second's node of match j.
+  [[nodiscard]] double gap_m(std::size_t i, std::size_t j) const {
+    const Pose2& there = second_->nodes[matches_[j].later].pose;
+    return distance((frames_[i] * there).position(), (frames_[j] * there).position());
+  }
+  [[nodiscard]] bool agree(std::size_t i, std::size_t j) const {
+    const double apart_m = distance(first_->nodes[matches_[i].earlier].pose.position(),
+                                    first_->nodes[matches_[j].earlier].pose.position());
+    return gap_m(i, j) < tolerance_m_ + options_.max_drift * apart_m &&
+           std::abs(angle_difference(frames_[i].heading_rad, frames_[j].heading_rad)) <
+               tolerance_rad_;
+  }
+  /// Matches nearer to each other than `spacing_m` along the way count once.
+  [[nodiscard]] int count_places(const Set& set) const {
+    int count = 0;
+    double last_m = 0.0;
+    for (const std::size_t i : set) {
+      const double here_m = way_[matches_[i].later].way_m;
+      if (count > 0 && here_m - last_m < spacing_m_) continue;
+      ++count;
+      last_m = here_m;
+    }
+    return count;
+  }
+
+  const TopologicalMap* first_;
+  const TopologicalMap* second_;
+  SessionAlignmentOptions options_;
+  double spacing_m_, tolerance_m_, tolerance_rad_;
+  std::vector<PassedNode> way_;
+  std::vector<LoopClosure> matches_;
+  std::vector<Pose2> frames_;
+};
+
+}  // namespace
+
+void visit_options(SessionAlignmentOptions& options, OptionVisitor& visitor) {
+  using T = SessionAlignmentOptions;
+  constexpr OptionTable table{
+      option<&T::min_places>("places in common that must agree before two sessions are joined", 1,
+                             1000000),
+      option<&T::min_confirmed>(
+          "share of the places where both maps lie upon each other that must match", 0, 1),
+      option<&T::distinctness>("factor by which fewer places may agree on any other alignment", 1,
+                               1e6),
+      option<&T::max_drift>("drift of both maps for each metre between two places", 0, 100),
+  };
+  table.visit(options, visitor);
+}
+
+std::optional<double> view_scale_m(const VisualMemory& memory, const TopologicalMap& map) {
+  constexpr std::size_t max_edges = 200;
+  const auto pose_of = [&](ViewId view) {
+    return std::ranges::lower_bound(map.nodes, view, {}, &MapNode::view)->pose;
+  };
+  std::vector<KnownLength> lengths;
+  for (std::size_t i = 0; i < std::min(max_edges, map.edges.size()); ++i) {
+    const MapEdge& edge = map.edges[i];
+    const auto step =
+        visual_step(OdometryView(memory.signature(edge.a)), OdometryView(memory.signature(edge.b)));
+    if (!step) continue;
+    lengths.push_back(
+        {step->length_in_views, translation_m(inverse(pose_of(edge.a)) * pose_of(edge.b))});
+  }
+  return length_scale_m(lengths);
+}
+
+std::optional<SessionAlignment> align_sessions(const VisualMemory& memory,
+                                               const TopologicalMap& first,
+                                               const TopologicalMap& second,
+                                               const SessionAlignmentOptions& options) {
+  validate(options);
+  validate(first);
+  validate(second);
+  const LoopClosureOptions closure;
+  const double scale_m =
+      std::max(view_scale_m(memory, first).value_or(VisualOdometryOptions{}.scale_m),
+               view_scale_m(memory, second).value_or(0.0));
+  const Matches matches(first, second, options, closure, scale_m,
+                        find_matches(memory, first, second, closure, scale_m));
+  const Matches::Hypothesis best = matches.best_among(matches.all());
+  if (best.places < options.min_places) return std::nullopt;
+  Matches::Set others;
+  std::ranges::set_difference(matches.all(), best.matches, std::back_inserter(others));
+  SessionAlignment alignment;
+  alignment.places = best.places;
+  alignment.other_places = matches.best_among(others).places;
+  alignment.refuted = others.size();
+  if (alignment.other_places * options.distinctness > best.places) return std::nullopt;
+  matches.confirm(best.matches, alignment);
+  if (alignment.confirmed_places < options.min_confirmed * alignment.expected_places) {
+    return std::nullopt;
+  }
+  for (const std::size_t i : best.matches) alignment.matches.push_back(matches[i]);
+  alignment.first_from_second = matches.middle_frame(best.matches);
+  return alignment;
+}
+
+TopologicalMap join_sessions(const TopologicalMap& first, const TopologicalMap& second,
+                             const SessionAlignment& alignment, const PoseGraphOptions& graph) {
+  std::map<ViewId, Pose2> poses;
+  for (const MapNode& node : first.nodes) poses.emplace(node.view, node.pose);
+  for (const MapNode& node : second.nodes) {
+    poses.emplace(node.view, alignment.first_from_second * node.pose);
+  }
+  TopologicalMap joined;
+  for (const auto& [view, pose] : poses) joined.nodes.push_back({view, pose, 0});
+  const auto number = [&](ViewId view) {
+    return static_cast<std::size_t>(
+        std::ranges::lower_bound(joined.nodes, view, {}, &MapNode::view) - joined.nodes.begin());
+  };
+  std::vector<PoseEdge> edges;
+  const auto add_edges = [&](const TopologicalMap& map) {
+    const auto pose_of = [&](ViewId view) {
+      return std::ranges::lower_bound(map.nodes, view, {}, &MapNode::view)->pose;
+    };
+    for (const MapEdge& edge : map.edges) {
+      const Pose2 motion = inverse(pose_of(edge.a)) * pose_of(edge.b);
+      edges.push_back({number(edge.a), number(edge.b), motion,
+                       edge_deviation * translation_m(motion) + shape_position_deviation_m,
+                       edge_turn_deviation * translation_m(motion) + shape_heading_deviation_rad});
+      joined.edges.push_back(edge);
+    }
+  };
+  add_edges(first);
+  add_edges(second);
+  for (const LoopClosure& match : alignment.matches) {
+    const ViewId a = first.nodes[match.earlier].view;
+    const ViewId b = second.nodes[match.later].view;
+    if (a == b) continue;
+    edges.push_back({number(a), number(b), match.earlier_from_later, match_position_deviation_m,
+                     match_heading_deviation_rad, true});
+    joined.edges.push_back({a, b, match.earlier_from_later, LinkKind::closure, 1.0});
+  }
+  std::vector<Pose2> found;
+  for (const MapNode& node : joined.nodes) found.push_back(node.pose);
+  const PoseGraphReport report = optimise_pose_graph(found, edges, graph);
+  for (std::size_t i = 0; i < found.size(); ++i) joined.nodes[i].pose = found[i];
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    if (edges[i].doubtful) joined.edges[i].weight = report.edge_weights[i];
+  }
+  const std::vector<std::size_t> components = connected_components(found.size(), edges);
+  for (std::size_t i = 0; i < found.size(); ++i) joined.nodes[i].component = components[i];
+  return joined;
+}
+
+}  // namespace panonav

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "panonav/core/options.hpp"
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/mapping/loop_closure.hpp"
+#include "panonav/mapping/topological_map.hpp"
+
+namespace panonav {
+
+/// When two sessions are taken to have places in common.
+struct SessionAlignmentOptions {
+  /// Places of the second session, at least half a metre apart along its way, that must lead to one
+  /// and the same frame of the first.
+  int min_places = 10;
+  /// Where the maps come to lie upon each other views must match: of such places at least this
+  /// share. Shelves that are built alike match here and there, and not on a whole way.
+  double min_confirmed = 0.7;
+  /// Any other frame must explain fewer places by this factor.
+  double distinctness = 2.0;
+  /// Drift of both maps, in metres for each metre between two places.
+  double max_drift = 0.1;
+};
+void visit_options(SessionAlignmentOptions& options, OptionVisitor& visitor);
+
+/// How the maps of two sessions lie to each other.
+struct SessionAlignment {
+  Pose2 first_from_second;
+  /// Places that lead to this frame: `earlier` is a node of the first session, `later` one of the
+  /// second, by their numbers there.
+  std::vector<LoopClosure> matches;
+  int places = 0;        ///< of the matches, at least half a metre apart
+  int other_places = 0;  ///< the same of the next best frame
+  /// Places of the second session that come to lie beside a view of the first, at least half a
+  /// metre apart, and how many of them are matched there.
+  int expected_places = 0;
+  int confirmed_places = 0;
+  std::size_t refuted = 0;  ///< matches that lead elsewhere
+};
+
+/// Metres for each unit of length that the views of the map's edges give; empty where none of the
+/// first 200 can be read. Cost: 0.3 ms an edge.
+[[nodiscard]] std::optional<double> view_scale_m(const VisualMemory& memory,
+                                                 const TopologicalMap& map);
+
+/// Finds the places that two sessions have in common, by appearance alone: for each view of the
+/// second in turn, `LoopClosureFinder` looks for closures among those of the first. Each closure
+/// tells how the second map lies in the frame of the first; the largest set of closures that agree
+/// counts. Empty where they are too few, or others nearly as many. All nodes of a map are in one
+/// frame. `memory` holds the views of both, as far as they have different ids; a view that is in
+/// both is a place in common by itself. Throws OptionError, ContractError on a map that `validate`
+/// refuses or whose views are not in the memory. Cost: that of `LoopClosureFinder::find` for each
+/// node of the second.
+[[nodiscard]] std::optional<SessionAlignment> align_sessions(
+    const VisualMemory& memory, const TopologicalMap& first, const TopologicalMap& second,
+    const SessionAlignmentOptions& options = {});
+
+/// Both maps in the frame of the first, joined by the matches, and optimised as a pose graph: the
+/// maps give way where the matches demand it. The nodes of the first keep their frame on the whole;
+/// the first of them stays where it is.
+[[nodiscard]] TopologicalMap join_sessions(const TopologicalMap& first,
+                                           const TopologicalMap& second,
+                                           const SessionAlignment& alignment,
+                                           const PoseGraphOptions& graph = {});
+
+}  // namespace panonav

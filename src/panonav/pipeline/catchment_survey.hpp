@@ -1,0 +1,86 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "panonav/core/executor.hpp"
+#include "panonav/homing/homing_survey.hpp"
+#include "panonav/io/dataset.hpp"
+#include "panonav/pipeline/homing_guide.hpp"
+
+namespace panonav {
+
+/// The views of a recording, in its order.
+struct RecordedViews {
+  std::vector<std::string> files;
+  std::vector<std::optional<ReferencePose>> poses;
+  std::vector<double> turned_rad;  ///< by which the robot was turned before the view was taken
+  std::vector<HomingView> views;
+};
+
+/// Hears on the caller's thread of the work that goes on: its name, how many of its steps were done
+/// since the last call (at first none), and how many there are.
+using WorkProgress =
+    std::function<void(const std::string& work, std::size_t steps, std::size_t total)>;
+
+/// Reads all pictures on all threads. With a seed the robot turns by a random number of whole
+/// columns before each. Throws FileError, also when the pictures differ in rows.
+[[nodiscard]] RecordedViews read_views(const Dataset& recording, const HomingViewOptions& wanted,
+                                       const std::optional<std::uint64_t>& turn_seed,
+                                       Executor& executor, const WorkProgress& progress = {});
+
+/// What is asked of two recordings.
+struct CatchmentSettings {
+  FourierHomingOptions homing;
+  /// Highest frequency of each stage of a run, which goes on with the next where one stops [S06
+  /// section 5]; empty: one stage, as `homing` says. Averages are always those of `homing`.
+  std::vector<int> stages;
+  HomingSurveyOptions run;
+  bool typical_distance_given = false;  ///< else learnt from the pairs
+  bool longest_step_given = false;      ///< else twice the spacing, as [S06 section 4.4]
+  bool obstacle_given = false;          ///< else 0.8 of the spacing
+  std::optional<double> bin_m;          ///< else the spacing
+  std::optional<double> up_to_m;        ///< pairs farther apart do not count in averages
+};
+
+/// Pairs of a range of distances.
+struct CatchmentBin {
+  HomewardBin homeward;
+  /// Circular standard deviation of the error of the heading; NaN without pairs.
+  double orientation_error_rad = 0.0;
+};
+
+/// What all home vectors between two recordings come to.
+struct CatchmentResult {
+  double spacing_m = 0.0;           ///< of the places
+  double typical_distance_m = 0.0;  ///< metres that a home vector of length 1 is worth
+  HomingSurveyOptions run;
+  HomingSurvey survey;
+  std::size_t pairs = 0;  ///< at different places, up to the distance asked for
+  double component = 0.0;
+  double orientation_error_rad = 0.0;
+  std::vector<CatchmentBin> bins;  ///< of all distances
+  std::vector<float> final_m;      ///< where runs end: goal after goal, one per place
+  std::vector<double> accepted_m;
+  std::vector<double> areas;  ///< mean number of places from which runs end so near
+};
+
+/// All pairs: views of `goals` as homes, views of `places` as current ones, which the recording
+/// `name` holds. Throws ContractError as `survey_homing` and where a view has no position or no
+/// heading, FileError where fewer than two places differ. Cost: goals x places home vectors for
+/// each stage, and 20 bytes for each.
+[[nodiscard]] CatchmentResult survey_catchment(const RecordedViews& goals,
+                                               const RecordedViews& places,
+                                               const CatchmentSettings& settings,
+                                               const std::string& name, Executor& executor,
+                                               const WorkProgress& progress = {});
+
+/// Number of places from which runs to this goal end within `accepted_m`.
+[[nodiscard]] std::size_t catchment_of(const CatchmentResult& result, std::size_t goal,
+                                       double accepted_m);
+
+}  // namespace panonav

@@ -1,0 +1,316 @@
+#include "panonav/pipeline/memory_merge.hpp"
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <set>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/temporary_file.hpp"
+#include "panonav/pipeline/known_views.hpp"
+#include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/mapper.hpp"
+
+namespace panonav {
+
+namespace {
+
+using NewIds = std::map<ViewId, ViewId>;  // in the new memory, by that in the old
+
+std::optional<Pose2> whole_pose(const ReferenceInfo& info) {
+  if (!info.pose || !info.pose->heading_rad) return std::nullopt;
+  return Pose2{info.pose->x_m, info.pose->y_m, *info.pose->heading_rad};
+}
+
+/// All that the file knows of how its views lie to each other. The largest connected component is
+/// number 0.
+TopologicalMap map_of(const MemoryFile& file, const VisualMemory& views) {
+  TopologicalMap map = file.map(map_name).value_or(TopologicalMap{});
+  if (map.nodes.empty()) {
+    for (const ViewId view : views.views()) {
+      const auto pose = whole_pose(views.info(view));
+      if (!pose) continue;
+      if (!map.nodes.empty()) {
+        const MapNode& before = map.nodes.back();
+        map.edges.push_back({before.view, view, inverse(before.pose) * *pose});
+      }
+      map.nodes.push_back({view, *pose, 0});
+    }
+    return map;
+  }
+  const std::size_t largest = largest_component(map);
+  for (MapNode& node : map.nodes) {
+    if (node.component == largest) {
+      node.component = 0;
+    } else if (node.component < largest) {
+      ++node.component;
+    }
+  }
+  // Poses that were given, as by a recording, are better than those that the map estimated.
+  std::size_t nodes = 0;
+  std::size_t positions = 0;
+  std::size_t poses = 0;
+  for (const MapNode& node : map.nodes) {
+    if (node.component != 0) continue;
+    ++nodes;
+    positions += views.info(node.view).pose.has_value() ? 1 : 0;
+    poses += whole_pose(views.info(node.view)).has_value() ? 1 : 0;
+  }
+  if (poses < nodes && positions > 0) {
+    throw FileError(file.path().string(),
+                    "has positions in another frame than its map: of " + std::to_string(nodes) +
+                        " views of the map " + std::to_string(positions) + " have a position and " +
+                        std::to_string(poses) + " a heading; a merge needs both for all or none");
+  }
+  if (poses == nodes) {
+    for (MapNode& node : map.nodes) {
+      if (node.component == 0) node.pose = *whole_pose(views.info(node.view));
+    }
+  }
+  return map;
+}
+
+TopologicalMap part_of(const TopologicalMap& map, bool largest) {
+  TopologicalMap part;
+  for (const MapNode& node : map.nodes) {
+    if ((node.component == 0) == largest) part.nodes.push_back(node);
+  }
+  const auto is_in = [&](ViewId view) {
+    return std::ranges::binary_search(part.nodes, view, {}, &MapNode::view);
+  };
+  for (const MapEdge& edge : map.edges) {
+    if (is_in(edge.a) && is_in(edge.b)) part.edges.push_back(edge);
+  }
+  return part;
+}
+
+TopologicalMap renamed(const TopologicalMap& map, const NewIds& ids) {
+  TopologicalMap result;
+  for (MapNode node : map.nodes) {
+    node.view = ids.at(node.view);
+    result.nodes.push_back(node);
+  }
+  std::ranges::sort(result.nodes, {}, &MapNode::view);
+  for (MapEdge edge : map.edges) {
+    edge.a = ids.at(edge.a);
+    edge.b = ids.at(edge.b);
+    result.edges.push_back(edge);
+  }
+  return result;
+}
+
+/// Appends a map whose nodes are in frames of their own. A node that is there already joins
+/// nothing: it stays where it is.
+void add_apart(TopologicalMap& map, const TopologicalMap& more) {
+  std::size_t next = 0;
+  for (const MapNode& node : map.nodes) next = std::max(next, node.component + 1);
+  const std::vector<MapNode> there = map.nodes;
+  const auto is_there = [&](ViewId view) {
+    return std::ranges::binary_search(there, view, {}, &MapNode::view);
+  };
+  for (MapNode node : more.nodes) {
+    if (is_there(node.view)) continue;
+    node.component += next;
+    map.nodes.push_back(node);
+  }
+  for (const MapEdge& edge : more.edges) {
+    if (!is_there(edge.a) && !is_there(edge.b)) map.edges.push_back(edge);
+  }
+  std::ranges::sort(map.nodes, {}, &MapNode::view);
+  renumber_components(map);
+}
+
+void require_comparable(const MemoryFile& first, const MemoryFile& second) {
+  const auto require_same = [&](const char* what, bool same) {
+    if (same) return;
+    throw ContractError(
+        std::string(what) + " of " + second.path().string(), "another",
+        "that of " + first.path().string() + ", as views made in another way cannot be compared");
+  };
+  const MemoryHeader& a = first.header();
+  const MemoryHeader& b = second.header();
+  require_same("rows and components", a.shape == b.shape);
+  require_same("elevations of the rows", a.elevations == b.elevations);
+  require_same("number of columns", a.panorama_columns == b.panorama_columns);
+  require_same("preprocessing", a.preprocessing == b.preprocessing);
+}
+
+std::vector<std::uint8_t> value_or_empty(std::optional<std::vector<std::uint8_t>> bytes) {
+  return bytes ? std::move(*bytes) : std::vector<std::uint8_t>{};
+}
+
+/// A name that is not taken: as it is, or after the file that it comes from.
+template <class IsTaken>
+std::string free_name(const std::string& name, const MemoryFile& from, const IsTaken& is_taken) {
+  if (!is_taken(name)) return name;
+  const std::string base = from.path().stem().string() + "/" + name;
+  std::string wanted = base;
+  for (int i = 2; is_taken(wanted); ++i) wanted = base + " (" + std::to_string(i) + ")";
+  return wanted;
+}
+
+class Merge {
+ public:
+  Merge(const MemoryFile& first, const MemoryFile& second, const MemoryMergeOptions& options)
+      : files_{&first, &second}, views_{first.load(), second.load()}, options_(options) {}
+
+  MergedMemory write(MemoryFile& file, const std::function<void()>& advance) {
+    for (std::size_t i = 0; i < 2; ++i) add_views(file, i, advance);
+    const VisualMemory all = file.load();
+    TopologicalMap map = joined_map(all);
+    add_links(file);
+    if (!map.nodes.empty()) file.save_map(map_name, map);
+    set_poses(file, map);
+    for (std::size_t i = 0; i < 2; ++i) add_routes(file, i);
+    result_.views = all.size();
+    result_.connected_components = number_of_components(map);
+    return result_;
+  }
+
+ private:
+  void add_views(MemoryFile& file, std::size_t from, const std::function<void()>& advance) {
+    constexpr std::size_t batch = 256;
+    std::vector<NewView> waiting;
+    std::vector<ViewId> ids;
+    const auto append = [&] {
+      const std::vector<ViewId> appended = file.append(waiting);
+      for (std::size_t i = 0; i < appended.size(); ++i) ids_[from].emplace(ids[i], appended[i]);
+      waiting.clear();
+      ids.clear();
+    };
+    const VisualMemory& views = views_[from];
+    for (const ViewId view : views.views()) {
+      if (advance) advance();
+      ReferenceInfo info = views.info(view);
+      const PackedSignature signature = pack(views.signature(view), file.header().full_scale);
+      if (from == 1) {
+        const auto known = views_[0].find(info.name);
+        if (known && is_same_picture(views_[0].packed(*known), signature)) {
+          ids_[1].emplace(view, ids_[0].at(*known));
+          ++result_.shared;
+          continue;
+        }
+        const std::string name = free_name(info.name, *files_[1], [&](const std::string& wanted) {
+          return views_[0].find(wanted) || (wanted != info.name && views.find(wanted));
+        });
+        if (name != info.name) ++result_.renamed;
+        info.name = name;
+      }
+      waiting.push_back({std::move(info), signature, value_or_empty(files_[from]->thumbnail(view)),
+                         value_or_empty(files_[from]->features(view))});
+      ids.push_back(view);
+      if (waiting.size() == batch) append();
+    }
+    append();
+  }
+
+  TopologicalMap joined_map(const VisualMemory& all) {
+    const std::array own{map_of(*files_[0], views_[0]), map_of(*files_[1], views_[1])};
+    const std::array maps{renamed(own[0], ids_[0]), renamed(own[1], ids_[1])};
+    const std::array largest{part_of(maps[0], true), part_of(maps[1], true)};
+    result_.alignment = align_sessions(all, largest[0], largest[1], options_.alignment);
+    TopologicalMap map = largest[0];
+    if (result_.alignment) {
+      map = join_sessions(largest[0], largest[1], *result_.alignment, options_.graph);
+    } else {
+      add_apart(map, largest[1]);
+    }
+    for (const TopologicalMap& one : maps) add_apart(map, part_of(one, false));
+    return map;
+  }
+
+  void add_links(MemoryFile& file) const {
+    std::vector<Link> links;
+    for (std::size_t i = 0; i < 2; ++i) {
+      for (const Link& link : views_[i].links()) {
+        links.push_back({ids_[i].at(link.a), ids_[i].at(link.b), link.kind});
+      }
+    }
+    file.link(links);
+  }
+
+  /// The first keeps its frame.
+  void set_poses(MemoryFile& file, const TopologicalMap& map) {
+    std::set<ViewId> of_first;
+    for (const auto& both : ids_[0]) of_first.insert(both.second);
+    for (const auto& [old, view] : ids_[1]) {
+      const auto& pose = views_[1].info(old).pose;
+      if (!pose || of_first.contains(view)) continue;
+      if (!result_.alignment) {
+        file.set_pose(view, std::nullopt);
+        ++result_.without_position;
+        continue;
+      }
+      const Pose2& moved = result_.alignment->first_from_second;
+      const Pose2 whole = moved * Pose2{pose->x_m, pose->y_m, pose->heading_rad.value_or(0.0)};
+      ReferencePose there{whole.x_m, whole.y_m, std::nullopt};
+      if (pose->heading_rad) there.heading_rad = whole.heading_rad;
+      file.set_pose(view, there);
+    }
+    if (!result_.alignment) return;
+    // What the pose graph moved.
+    const std::size_t joined = map.nodes.front().component;
+    for (const MapNode& node : map.nodes) {
+      if (node.component != joined) continue;
+      file.set_pose(node.view, ReferencePose{node.pose.x_m, node.pose.y_m, node.pose.heading_rad});
+    }
+  }
+
+  void add_routes(MemoryFile& file, std::size_t from) {
+    for (const std::string& name : files_[from]->route_names()) {
+      RoutePanorama route = files_[from]->route(name).value();
+      if (from == 1 && result_.alignment) {
+        RoutePanorama moved(route.columns());
+        for (std::size_t i = 0; i < route.size(); ++i) {
+          moved.append(result_.alignment->first_from_second * route.poses()[i], route.line(i));
+        }
+        route = std::move(moved);
+      }
+      const auto taken = file.route_names();
+      const std::string wanted = free_name(name, *files_[from], [&](const std::string& other) {
+        return std::ranges::find(taken, other) != taken.end();
+      });
+      if (wanted != name) ++result_.renamed;
+      file.append_route(wanted, route);
+    }
+  }
+
+  std::array<const MemoryFile*, 2> files_;
+  std::array<VisualMemory, 2> views_;
+  MemoryMergeOptions options_;
+  std::array<NewIds, 2> ids_;
+  MergedMemory result_;
+};
+
+}  // namespace
+
+MergedMemory merge_memories(const std::filesystem::path& first, const std::filesystem::path& second,
+                            const std::filesystem::path& memory, const MemoryMergeOptions& options,
+                            const std::function<void()>& advance) {
+  const MemoryFile a = MemoryFile::open(first, Access::read_only);
+  const MemoryFile b = MemoryFile::open(second, Access::read_only);
+  require_comparable(a, b);
+  if (std::filesystem::exists(memory)) {
+    throw FileError(memory.string(), "is there already; a merged memory is a new file");
+  }
+  TemporaryFile unfinished(memory);
+  std::filesystem::remove(unfinished.path());  // a memory file is made where nothing is
+  MergedMemory result;
+  {
+    MemoryFile file = MemoryFile::create(unfinished.path(), a.header());
+    Merge merge(a, b, options);
+    file.change([&] { result = merge.write(file, advance); });
+    keep_models(file);
+  }
+  std::error_code error;
+  std::filesystem::rename(unfinished.path(), memory, error);
+  if (error) throw FileError(memory.string(), "cannot be written: " + error.message());
+  unfinished.keep();
+  return result;
+}
+
+}  // namespace panonav

@@ -1,0 +1,400 @@
+#include "viewer/http_server.hpp"
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cctype>
+#include <cerrno>
+#include <charconv>
+#include <chrono>
+#include <csignal>
+#include <cstdint>
+#include <cstring>
+#include <exception>
+#include <list>
+#include <string_view>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::size_t max_head = 8192;
+constexpr std::size_t max_body = 1024;
+constexpr std::size_t max_connections = 64;
+constexpr int send_buffer = 256 * 1024;
+constexpr auto patience = std::chrono::seconds(5);
+constexpr auto idle_patience = std::chrono::seconds(30);  // between two requests
+
+/// A file descriptor that is closed with its owner.
+class Handle {
+ public:
+  explicit Handle(int number = -1) : number_(number) {}
+  ~Handle() {
+    if (number_ >= 0) close(number_);
+  }
+  Handle(Handle&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
+  Handle& operator=(Handle&&) = delete;
+  [[nodiscard]] int number() const noexcept { return number_; }
+
+ private:
+  int number_;
+};
+
+std::string lower(std::string_view text) {
+  std::string small(text);
+  for (char& c : small) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return small;
+}
+
+std::string_view trimmed(std::string_view text) {
+  const std::size_t from = text.find_first_not_of(" \t");
+  if (from == std::string_view::npos) return {};
+  return text.substr(from, text.find_last_not_of(" \t") - from + 1);
+}
+
+std::string_view reason_of(int status) {
+  switch (status) {
+    case 200:
+      return "OK";
+    case 204:
+      return "No Content";
+    case 400:
+      return "Bad Request";
+    case 404:
+      return "Not Found";
+    case 405:
+      return "Method Not Allowed";
+    case 413:
+      return "Content Too Large";
+    case 431:
+      return "Request Header Fields Too Large";
+    case 501:
+      return "Not Implemented";
+    case 503:
+      return "Service Unavailable";
+    default:
+      return "Internal Server Error";
+  }
+}
+
+/// The head of a request, up to the empty line that ends it.
+struct Head {
+  HttpRequest request;
+  std::size_t body_size = 0;
+  bool keep = true;  ///< the connection
+};
+
+/// `status` says what is wrong where there is nothing to give.
+std::optional<Head> read_head(std::string_view text, int& status) {
+  status = 400;
+  const auto next_line = [&text] {
+    const std::size_t end = text.find("\r\n");
+    const std::string_view line = text.substr(0, end);
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 2);
+    return line;
+  };
+  const std::string_view line = next_line();
+  const std::size_t first = line.find(' ');
+  const std::size_t last = line.rfind(' ');
+  if (first == std::string_view::npos || last <= first + 1) return std::nullopt;
+  const std::string_view version = line.substr(last + 1);
+  if (version != "HTTP/1.1" && version != "HTTP/1.0") return std::nullopt;
+  Head head;
+  head.request.method = line.substr(0, first);
+  const std::string_view target = line.substr(first + 1, last - first - 1);
+  head.request.path = target.substr(0, target.find('?'));
+  head.keep = version == "HTTP/1.1";
+  bool sized = false;
+  while (!text.empty()) {
+    const std::string_view field = next_line();
+    const std::size_t colon = field.find(':');
+    if (colon == 0 || colon == std::string_view::npos) return std::nullopt;
+    const std::string name = lower(field.substr(0, colon));
+    const std::string_view value = trimmed(field.substr(colon + 1));
+    if (name == "host" || name == "origin") {
+      std::string& kept = name == "host" ? head.request.host : head.request.origin;
+      if (!kept.empty() || value.empty()) return std::nullopt;
+      kept = value;
+    } else if (name == "content-length") {
+      const auto [end, error] =
+          std::from_chars(value.data(), value.data() + value.size(), head.body_size);
+      if (std::exchange(sized, true)) return std::nullopt;
+      if (error == std::errc::result_out_of_range || head.body_size > max_body) status = 413;
+      if (error != std::errc() || end != value.data() + value.size() || status == 413) {
+        return std::nullopt;
+      }
+    } else if (name == "transfer-encoding") {
+      status = 501;
+      return std::nullopt;
+    } else if (name == "connection" && lower(value) == "close") {
+      head.keep = false;
+    }
+  }
+  if (head.request.host.empty()) return std::nullopt;
+  return head;
+}
+
+struct Connection {
+  explicit Connection(Handle handle) : socket(std::move(handle)) {}
+
+  Handle socket;
+  std::string in;  ///< not answered yet
+  std::string out;
+  std::size_t sent = 0;  ///< of `out`
+  std::function<std::optional<std::string>()> more;
+  bool trusted = false;  ///< got an answer below 400
+  bool closing = false;  ///< once all is sent
+  bool gone = false;
+  Clock::time_point since = Clock::now();  ///< the last byte that went out, or request that began
+
+  [[nodiscard]] bool pending() const { return sent < out.size(); }
+};
+
+}  // namespace
+
+struct HttpServer::Implementation {
+  Implementation(const HttpServerOptions& options, Handler answer_to)
+      : headers(options.headers),
+        handler(std::move(answer_to)),
+        listener(socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0)),
+        wake(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
+    require(options.port >= 0 && options.port <= 65535, "port", options.port, "0 .. 65535");
+    sockaddr_in place{};
+    place.sin_family = AF_INET;
+    place.sin_port = htons(static_cast<std::uint16_t>(options.port));
+    const int yes = 1;
+    // A port whose last connections are not forgotten yet may be taken again.
+    setsockopt(listener.number(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
+    socklen_t size = sizeof(place);
+    auto* const address = reinterpret_cast<sockaddr*>(&place);
+    if (wake.number() < 0 || inet_pton(AF_INET, options.address.c_str(), &place.sin_addr) != 1 ||
+        bind(listener.number(), address, size) != 0 || listen(listener.number(), SOMAXCONN) != 0 ||
+        getsockname(listener.number(), address, &size) != 0) {
+      throw Error("cannot listen at " + options.address + ", port " + std::to_string(options.port) +
+                  "; allowed: an IPv4 address of this machine, and a port that is free (0 finds " +
+                  "one)");
+    }
+    port = ntohs(place.sin_port);
+    // Signals are for the threads that expect them.
+    sigset_t all;
+    sigset_t before;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before);
+    thread = std::thread([this] { serve(); });
+    pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  }
+
+  ~Implementation() {
+    ended = true;
+    poke();
+    thread.join();
+  }
+
+  void poke() const {
+    const std::uint64_t one = 1;
+    [[maybe_unused]] const auto written = write(wake.number(), &one, sizeof(one));
+  }
+
+  void serve() {
+    std::vector<pollfd> waiting;
+    Clock::time_point accept_from{};
+    while (!ended) {
+      const bool accepting = Clock::now() >= accept_from;
+      waiting.clear();
+      waiting.push_back({wake.number(), POLLIN, 0});
+      waiting.push_back({accepting ? listener.number() : -1, POLLIN, 0});
+      for (const Connection& connection : connections) {
+        const int events = POLLIN | (connection.pending() ? POLLOUT : 0);
+        waiting.push_back({connection.socket.number(), static_cast<short>(events), 0});
+      }
+      poll(waiting.data(), waiting.size(), accepting ? 500 : 50);
+      std::uint64_t pokes = 0;
+      [[maybe_unused]] const auto read_some = read(wake.number(), &pokes, sizeof(pokes));
+      std::size_t i = 2;
+      for (Connection& connection : connections) {
+        const short events = waiting[i++].revents;
+        if ((events & POLLIN) != 0) receive(connection);
+        if ((events & (POLLERR | POLLNVAL)) != 0) connection.gone = true;
+        answer_requests(connection);
+        send_pending(connection);
+        const bool idle = !connection.pending() && connection.in.empty();
+        const auto allowed = idle && connection.trusted ? idle_patience : patience;
+        if (!(idle && connection.more) && Clock::now() - connection.since > allowed) {
+          connection.gone = true;
+        }
+      }
+      std::erase_if(connections, [](const Connection& one) { return one.gone; });
+      if (waiting[1].revents != 0 && !accept_waiting()) {
+        accept_from = Clock::now() + std::chrono::milliseconds(50);
+      }
+    }
+    connections.clear();
+  }
+
+  /// False where the system has no more descriptors.
+  bool accept_waiting() {
+    for (std::size_t i = 0; i < max_connections; ++i) {
+      Handle socket(accept4(listener.number(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+      if (socket.number() < 0) return errno != EMFILE && errno != ENFILE && errno != ENOMEM;
+      if (connections.size() >= max_connections) {
+        const auto stranger = std::ranges::find(connections, false, &Connection::trusted);
+        if (stranger == connections.end()) continue;
+        connections.erase(stranger);
+      }
+      const int yes = 1;
+      setsockopt(socket.number(), IPPROTO_TCP, TCP_NODELAY, &yes, sizeof(yes));
+      // What waits in the system for a slow reader is old when it arrives.
+      setsockopt(socket.number(), SOL_SOCKET, SO_SNDBUF, &send_buffer, sizeof(send_buffer));
+      connections.emplace_back(std::move(socket));
+    }
+    return true;
+  }
+
+  static void receive(Connection& connection) {
+    std::array<char, 4096> bytes;
+    while (!connection.gone) {
+      const ssize_t count = recv(connection.socket.number(), bytes.data(), bytes.size(), 0);
+      if (count < 0) {
+        connection.gone = errno != EAGAIN && errno != EINTR;
+        return;
+      }
+      if (count == 0) {
+        connection.gone = true;
+        return;
+      }
+      if (connection.more || connection.closing) continue;  // nothing is to be said any more
+      if (connection.in.empty()) connection.since = Clock::now();
+      connection.in.append(bytes.data(), static_cast<std::size_t>(count));
+      // What is behind is read when this is answered.
+      if (connection.in.size() > max_head + max_body) return;
+    }
+  }
+
+  void answer_requests(Connection& connection) {
+    while (!connection.gone && !connection.closing && !connection.more && !connection.pending()) {
+      const std::size_t end = connection.in.find("\r\n\r\n");
+      if (std::min(end, connection.in.size()) > max_head) {
+        refuse(connection, 431);
+        return;
+      }
+      if (end == std::string::npos) return;
+      int status = 0;
+      auto head = read_head(std::string_view(connection.in).substr(0, end), status);
+      if (!head) {
+        refuse(connection, status);
+        return;
+      }
+      if (connection.in.size() < end + 4 + head->body_size) return;
+      head->request.body = connection.in.substr(end + 4, head->body_size);
+      connection.in.erase(0, end + 4 + head->body_size);
+      connection.closing = !head->keep;
+      HttpAnswer answer;
+      try {
+        answer = handler(head->request);
+      } catch (const std::exception&) {
+        answer = {.status = 500};
+      }
+      put(connection, std::move(answer));
+      send_pending(connection);
+    }
+  }
+
+  void refuse(Connection& connection, int status) const {
+    connection.closing = true;
+    put(connection, {.status = status});
+  }
+
+  void put(Connection& connection, HttpAnswer answer) const {
+    connection.since = Clock::now();
+    if (answer.status < 400) {
+      connection.trusted = true;
+    } else {
+      connection.closing = true;
+    }
+    if (answer.content.empty() && answer.status >= 400) {
+      answer.content = std::string(reason_of(answer.status)) + ".\n";
+    }
+    connection.more = std::move(answer.more);
+    connection.out = "HTTP/1.1 " + std::to_string(answer.status) + " " +
+                     std::string(reason_of(answer.status)) + "\r\n" + headers;
+    if (answer.status != 204) connection.out += "Content-Type: " + answer.type + "\r\n";
+    if (!connection.more && answer.status != 204) {
+      connection.out += "Content-Length: " + std::to_string(answer.content.size()) + "\r\n";
+    }
+    if (connection.more || connection.closing) connection.out += "Connection: close\r\n";
+    connection.out += "\r\n" + answer.content;
+    connection.sent = 0;
+  }
+
+  static void send_pending(Connection& connection) {
+    while (!connection.gone) {
+      if (!connection.pending()) {
+        connection.out.clear();
+        connection.sent = 0;
+        if (connection.more) {
+          auto text = connection.more();
+          if (text) {
+            connection.out = std::move(*text);
+            connection.since = Clock::now();
+          } else {
+            connection.more = nullptr;
+            connection.closing = true;
+          }
+        }
+        if (!connection.pending()) {
+          if (connection.closing) connection.gone = true;
+          return;
+        }
+      }
+      const ssize_t count =
+          send(connection.socket.number(), connection.out.data() + connection.sent,
+               connection.out.size() - connection.sent, MSG_NOSIGNAL);
+      if (count < 0) {
+        connection.gone = errno != EAGAIN && errno != EINTR;
+        return;
+      }
+      connection.sent += static_cast<std::size_t>(count);
+      connection.since = Clock::now();
+    }
+  }
+
+  const std::string headers;
+  const Handler handler;
+  const Handle listener;
+  const Handle wake;
+  int port = 0;
+  std::list<Connection> connections;  // of the thread; the oldest first
+  std::atomic<bool> ended = false;
+  std::thread thread;
+};
+
+HttpServer::HttpServer(const HttpServerOptions& options, Handler handler)
+    : implementation_(std::make_unique<Implementation>(options, std::move(handler))) {}
+
+HttpServer::~HttpServer() = default;
+
+int HttpServer::port() const {
+  return implementation_->port;
+}
+
+void HttpServer::poke() {
+  implementation_->poke();
+}
+
+}  // namespace panonav

@@ -1,0 +1,86 @@
+import { degrees } from 'panonav/draw';
+
+// What is known of a place on the map: the remembered view that is nearest to it, which shows what would be seen there,
+// with its picture, pose and neighbours, and what may be told to the run: a goal, or where the robot is.
+class Card extends HTMLElement {
+  attach(run, choose) {
+    this.run = run;
+    this.choose = choose;  // another reference
+    this.innerHTML = `
+<button type="button" class="close" aria-label="Close">&times;</button>
+<div aria-live="polite"><h2></h2><p class="where"></p><img alt=""></div>
+<p class="near"></p>
+<form><label>Heading <input type="number" min="-360" max="360" step="any" placeholder="any"> degrees</label>
+<button type="submit"></button> <output></output></form>`;
+    this.hidden = true;
+    this.querySelector('.close').addEventListener('click', () => this.choose(undefined));
+    this.querySelector('img').addEventListener('error', event => { event.target.hidden = true; });
+    this.addEventListener('keydown', event => {
+      event.stopPropagation();  // arrows and digits are the form's
+      if (event.key === 'Escape') this.choose(undefined);
+    });
+    this.querySelector('form').addEventListener('submit', event => {
+      event.preventDefault();
+      this.tell();
+    });
+  }
+
+  // `at`: where somebody has clicked; otherwise where the view was taken.
+  show(reference, at) {
+    this.hidden = reference === undefined;
+    if (this.hidden) return;
+    const { references, names, headings } = this.run.staying, place = [references[2 * reference], references[2 * reference + 1]];
+    const heading = headings?.[reference], away = at ? Math.hypot(at[0] - place[0], at[1] - place[1]) : 0;
+    const metres = ([x, y]) => `x ${x.toFixed(2)} m, y ${y.toFixed(2)} m`;
+    this.at = at ?? place;
+    this.querySelector('h2').textContent = (at ? `What would be seen here: ${away.toFixed(2)} m away, ` : '') +
+      (names?.[reference] ?? `remembered view ${reference}`);
+    this.querySelector('.where').textContent = metres(place) +
+      (typeof heading === 'number' ? `, heading ${degrees(heading).toFixed(0)}°` : '');
+    const image = this.querySelector('img');
+    image.hidden = !this.run.views;
+    if (this.run.views) {
+      image.src = this.run.views + reference;
+      image.alt = `What ${names?.[reference] ?? 'the view'} shows`;
+    }
+    this.showNeighbours(reference);
+    const form = this.querySelector('form'), { takes } = this.run;
+    form.hidden = !takes || this.run.ended;
+    form.querySelector('label').hidden = takes !== 'pose';
+    form.querySelector('input').value = typeof heading === 'number' ? degrees(heading).toFixed(0) : '';
+    form.querySelector('button').textContent = takes === 'pose' ? 'The robot is here' : 'Send the robot to this view';
+    form.querySelector('output').textContent = '';
+    this.place = place;
+  }
+  // By edges; where there are none the four nearest views.
+  showNeighbours(reference) {
+    const { references, edges = [], names } = this.run.staying, [x, y] = [references[2 * reference], references[2 * reference + 1]];
+    const number = new Map();
+    for (let i = 0; i < references.length; i += 2) number.set(`${references[i]} ${references[i + 1]}`, i / 2);
+    let near = new Set();
+    for (let i = 0; i < edges.length; i += 5) {
+      const [a, b] = [`${edges[i]} ${edges[i + 1]}`, `${edges[i + 2]} ${edges[i + 3]}`];
+      if (a === `${x} ${y}`) near.add(number.get(b));
+      if (b === `${x} ${y}`) near.add(number.get(a));
+    }
+    const connected = near.size > 0;
+    if (!connected) {
+      const away = i => Math.hypot(references[2 * i] - x, references[2 * i + 1] - y);
+      near = new Set([...number.values()].filter(i => i !== reference).sort((i, j) => away(i) - away(j)).slice(0, 4));
+    }
+    this.querySelector('.near').replaceChildren(connected ? 'Connected with ' : 'Next to ', ...[...near].filter(i => i !== undefined).slice(0, 8).map(i => {
+      const button = document.createElement('button');
+      button.type = 'button';
+      button.textContent = names?.[i] ?? i;
+      button.addEventListener('click', () => this.choose(i));
+      return button;
+    }));
+  }
+  async tell() {
+    const { takes } = this.run, typed = this.querySelector('input').value;
+    const wanted = takes === 'pose' ? [...this.at, typed === '' ? null : Number(typed) % 360 * Math.PI / 180] : this.place;
+    const answer = await fetch('control', { method: 'POST', body: JSON.stringify({ [takes]: wanted }) }).catch(() => undefined);
+    this.querySelector('output').textContent = answer?.ok ? 'The robot knows.' : 'The run does not take this.';
+  }
+}
+customElements.define('pn-card', Card);

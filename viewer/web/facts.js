@@ -1,0 +1,82 @@
+import { degrees } from 'panonav/draw';
+import { isTruth } from 'panonav/store';
+
+// What is known at the moment, as text: also what a screen reader reads. Below, how long each stage took, and what
+// happened so far: changes of state and decisions, each a button that goes there.
+class Facts extends HTMLElement {
+  attach(run) {
+    this.run = run;
+    this.innerHTML = '<table><caption class="unseen">The moment in figures</caption><tbody></tbody></table>' +
+      '<div hidden><h2>Milliseconds a stage</h2><table class="stages"><caption class="unseen">Milliseconds a stage</caption>' +
+      '<thead class="unseen"><tr><th>stage</th><th>share</th><th>now</th><th>median</th></tr></thead><tbody></tbody></table></div>' +
+      '<h2>What happened</h2><ol></ol>';
+    run.addEventListener('moment', () => this.show());
+    run.addEventListener('grown', () => this.list());
+  }
+  list() {
+    const { moments } = this.run, happened = [];
+    moments.forEach((moment, i) => {
+      const { event } = moment.values ?? {}, changed = moment.state && moment.state !== moments[i - 1]?.state;
+      if (event || changed) happened.push([i, moment.t, [changed && moment.state, event].filter(Boolean).join(': ')]);
+    });
+    const newest = happened.slice(-50).reverse(), said = JSON.stringify(newest.map(([, ...rest]) => rest));
+    if (said === this.said) return;
+    this.said = said;
+    this.querySelector('ol').replaceChildren(...newest.map(([, t, text]) => {
+      const item = document.createElement('li'), button = document.createElement('button');
+      button.type = 'button';
+      button.textContent = `${(t - moments[0].t).toFixed(1)} s  ${text}`;
+      button.addEventListener('click', () => this.run.seek(t));
+      item.append(button);
+      return item;
+    }));
+  }
+  show() {
+    const moment = this.run.moment;
+    if (!moment || this.hidden) return;
+    const rows = [];
+    const pose = ([x, y, heading]) => `${x.toFixed(2)} m, ${y.toFixed(2)} m` +
+      (heading === null ? '' : `, ${degrees(heading).toFixed(1)}°`);
+    const estimated = moment.pose && !isTruth(moment);
+    if (estimated) rows.push(['estimate', pose(moment.pose)]);
+    if (moment.truth) rows.push(['ground truth', pose(moment.truth)]);
+    if (estimated && moment.truth) {
+      rows.push(['error', `${Math.hypot(moment.pose[0] - moment.truth[0], moment.pose[1] - moment.truth[1]).toFixed(3)} m`]);
+    }
+    if (moment.odometry) rows.push(['odometry', pose(moment.odometry)]);
+    if (moment.tilt) rows.push(['roll, pitch', moment.tilt.map(value => `${degrees(value).toFixed(1)}°`).join(', ')]);
+    for (const [name, value] of Object.entries(moment.values ?? {})) rows.push([name.replaceAll('_', ' '), value]);
+    this.showStages(moment);
+    const body = this.querySelector('tbody');
+    body.replaceChildren(...rows.map(([name, value]) => {
+      const row = document.createElement('tr'), head = document.createElement('th'), cell = document.createElement('td');
+      head.scope = 'row';
+      head.textContent = name;
+      cell.textContent = value;
+      row.append(head, cell);
+      return row;
+    }));
+  }
+  // Of the moment, and their medians over the last 50 that are known.
+  showStages({ stages }) {
+    const table = this.querySelector('.stages');
+    table.parentElement.hidden = !stages;
+    if (!stages) return;
+    const last = this.run.moments.slice(Math.max(0, this.run.index - 49), this.run.index + 1);
+    const rows = Object.entries(stages).map(([name, ms]) => {
+      const all = last.map(moment => moment.stages?.[name]).filter(value => value !== undefined).sort((a, b) => a - b);
+      return [name, ms, all[Math.floor(all.length / 2)]];
+    });
+    const longest = Math.max(...rows.map(([, , median]) => median), 1e-6);
+    table.tBodies[0].replaceChildren(...rows.map(([name, ms, median]) => {
+      const row = document.createElement('tr');
+      row.innerHTML = '<th scope="row"></th><td class="bar" aria-hidden="true"><i></i></td><td></td><td></td>';
+      row.cells[0].textContent = name;
+      row.querySelector('i').style.width = `${100 * median / longest}%`;
+      row.cells[2].textContent = ms.toFixed(2);
+      row.cells[3].textContent = `median ${median.toFixed(2)}`;
+      return row;
+    }));
+  }
+}
+customElements.define('pn-facts', Facts);

@@ -1,0 +1,183 @@
+import { Run, follow, stateClass } from 'panonav/store';
+import { inSight, moves, watch } from 'panonav/sight';
+import 'panonav/map';
+import 'panonav/pictures';
+import 'panonav/facts';
+import 'panonav/timeline';
+import 'panonav/route';
+import 'panonav/chart';
+import 'panonav/plan';
+
+const skeleton = `
+<div class="head controls"><output class="state" role="status" aria-live="polite">waiting for the first picture</output>
+<span class="clock"></span><nav class="panels" aria-label="Panels"></nav></div>
+<div class="shown"></div>
+<div class="foot controls"><button class="play" type="button" aria-keyshortcuts="Space">Pause</button>
+<button class="back" type="button" aria-label="One picture back" aria-keyshortcuts="ArrowLeft">&#9664;</button>
+<button class="forth" type="button" aria-label="One picture on" aria-keyshortcuts="ArrowRight">&#9654;</button>
+<input class="slider" type="range" min="0" max="0" value="0" aria-label="Picture of the run">
+<label>Speed <select class="speed"><option>0.5</option><option selected>1</option><option>2</option><option>5</option><option>20</option></select></label>
+<span class="hint">Space: pause. Arrows: one picture. Home, End: first, last. Digits: panels. Plus, minus, 0: zoom of the map; on it, arrows and Enter: views.</span></div>`;
+const panels = { map: 'Map', pictures: 'Pictures', facts: 'Facts', route: 'Route', timeline: 'Timeline' };
+
+// Which panels have something to show.
+function usable({ live, moments = [], staying = {}, route }) {
+  if (live) return ['map', 'pictures', 'facts', 'timeline'];
+  const has = {
+    map: staying.references || staying.plan || staying.edges || moments.some(({ pose, truth, particles }) => pose || truth || particles),
+    pictures: moments.some(({ data }) => data && Object.keys(data).length),
+    facts: true,
+    route,
+    timeline: moments.length > 1 && moments.some(({ state, probability }) => state || probability !== undefined),
+  };
+  return Object.keys(panels).filter(name => has[name]);
+}
+
+// A run with its panels and controls. In a script element within stands { live: address of events, replay: whether the
+// run obeys } or, of a run that is over, { moments, staying, route }.
+class RunPlayer extends HTMLElement {
+  connectedCallback() {
+    if (this.run) return;
+    const data = this.querySelector('script'), given = JSON.parse(data.textContent), run = this.run = new Run();
+    data.remove();
+    this.given = run.given = given;
+    this.live = Boolean(given.live);
+    run.takes = given.takes;
+    run.views = this.live ? 'view/' : undefined;  // where pictures of references are
+    const title = this.getAttribute('data-title');
+    this.insertAdjacentHTML('beforeend', skeleton);
+    if (title) this.querySelector('.head').prepend(Object.assign(document.createElement('h1'), { textContent: title }));
+    const address = this.live ? (moment, which) => `picture/${moment.n}/${which}` : (moment, which) => moment.data?.[which];
+    usable(given).forEach((name, i) => this.addPanel(name, i, address));
+    // The names that links and scripts find the only run of a page by.
+    if (document.querySelector('pn-run') === this) {
+      for (const name of ['state', 'clock', 'panels', 'play', 'slider', 'speed']) this.find(name).id = name;
+    }
+    this.find('play').addEventListener('click', () => { this.held = this.playing; this.play(!this.playing); });
+    this.find('back').addEventListener('click', () => this.step(-1));
+    this.find('forth').addEventListener('click', () => this.step(1));
+    this.find('slider').addEventListener('input', () => { this.hold(); run.show(Number(this.find('slider').value)); });
+    this.find('speed').closest('label').hidden = this.live && !given.replay;
+    this.find('speed').addEventListener('change', () => this.control({ speed: this.speed }));
+    for (const event of ['moment', 'grown']) run.addEventListener(event, () => this.tell());
+    run.addEventListener('sought', () => this.hold());
+    if (!this.classList.contains('whole')) {  // the page scrolls when the pointer is above the map
+      this.addEventListener('wheel', event => { if (!event.ctrlKey) event.stopPropagation(); }, { capture: true });
+    }
+    if (this.live) {
+      this.playing = this.connected = true;
+      follow(run, given.live, now => { this.connected = now; this.tell(); });
+    } else {
+      run.over = true;
+      run.moments = given.moments;
+      let told = {};
+      for (const moment of run.moments) moment.told = told = moment.told ? { ...told, ...moment.told } : told;
+      run.addEventListener('moment', () => Object.assign(run.staying, run.moment.told));
+      run.stay(given.staying);
+      run.say('grown');
+      run.show(0);
+      this.play(false);
+      if (run.last > 0) watch(this);
+      else this.find('foot').hidden = true;
+    }
+  }
+  find(name) { return this.querySelector(`.${name}`); }
+  get speed() { return Number(this.find('speed').value); }
+  addPanel(name, i, address) {
+    const panel = document.createElement(`pn-${name}`), button = document.createElement('button'), shown = this.find('shown');
+    shown.append(panel);
+    shown.classList.add(`has-${name}`);
+    panel.attach(this.run, address);
+    button.type = 'button';
+    button.textContent = panels[name];
+    button.setAttribute('aria-pressed', 'true');
+    button.setAttribute('aria-keyshortcuts', String(i + 1));
+    button.addEventListener('click', () => {
+      panel.hidden = !panel.hidden;
+      button.setAttribute('aria-pressed', String(!panel.hidden));
+      shown.classList.toggle(`has-${name}`, !panel.hidden);
+      this.run.say('moment');
+    });
+    this.find('panels').append(button);
+  }
+
+  seen(whether) {
+    if (whether && !this.held && moves() && this.run.index < this.run.last) this.play(true);
+    else if (!whether) this.play(false);
+  }
+  hold() {
+    if (this.live && this.held) return;
+    this.held = true;
+    this.play(false);
+  }
+  play(wanted) {
+    const { run } = this;
+    this.playing = wanted;
+    this.find('play').textContent = wanted ? 'Pause' : 'Play';
+    clearTimeout(this.timer);
+    if (this.live) {
+      this.held = !wanted;
+      run.following = wanted;
+      this.control({ play: wanted });
+      if (wanted) run.show(run.last);
+      this.tell();
+    } else if (wanted) {
+      if (run.index >= run.last) run.show(0);
+      this.advance();
+    }
+  }
+  advance() {
+    const { run } = this;
+    if (run.index >= run.last) { this.play(false); return; }
+    const wait = (run.moments[run.index + 1].t - run.moment.t) / this.speed;
+    this.timer = setTimeout(() => { run.show(run.index + 1); this.advance(); }, 1000 * Math.max(1 / 60, Math.min(2, wait)));
+  }
+  control(wanted) {
+    if (this.given.replay && !this.run.ended) fetch('control', { method: 'POST', body: JSON.stringify(wanted) }).catch(() => {});
+  }
+  step(by) {
+    const { run } = this;
+    this.hold();
+    if (by === 1 && run.index === run.last) {  // beyond what has come
+      run.following = true;
+      this.control({ step: 1 });
+    }
+    run.show(run.index + by);
+  }
+  act(key, target) {
+    const { run } = this, map = this.querySelector('pn-map');
+    return {
+      ArrowLeft: () => this.step(-1), ArrowRight: () => this.step(1), Home: () => this.step(-run.moments.length), End: () => this.step(run.moments.length),
+      '+': map && (() => map.zoomBy(1.3)), '-': map && (() => map.zoomBy(1 / 1.3)), '0': map && (() => map.reset()),
+      ' ': target.matches('button, summary') ? undefined : () => this.find('play').click(),
+    }[key] ?? (/^[1-9]$/.test(key) ? () => this.find('panels').children[key - 1]?.click() : undefined);
+  }
+  tell() {
+    const { run, given } = this, { moment } = run, state = this.find('state'), slider = this.find('slider');
+    slider.max = Math.max(0, run.last);
+    slider.value = Math.max(0, run.index);
+    if (!moment) return;
+    state.classList.remove('good', 'doubt', 'bad');
+    state.classList.add(stateClass(moment));
+    state.hidden = !this.live && !moment.state;
+    const text = (moment.state || 'no state') + (moment.probability === undefined ? ''
+      : `, ${moment.state === 'unknown place' ? 'known with ' : ''}${(100 * moment.probability).toFixed(0)} %`);
+    if (state.textContent !== text) state.textContent = text;
+    // A run without stamps counts its pictures.
+    this.counted ??= !this.live && run.moments.every(({ t }, i) => t === i);
+    this.find('clock').textContent = (this.counted ? '' : `${(moment.t - run.moments[0].t).toFixed(1)} s, `) +
+      (!this.live ? `picture ${run.index + 1} of ${run.moments.length}` : run.ended ? 'the run has ended'
+        : !this.connected ? 'connection lost, trying again' : !this.playing ? 'held' : given.replay ? 'replay' : 'live');
+  }
+}
+customElements.define('pn-run', RunPlayer);
+
+// Keys are for the run that is looked at.
+document.addEventListener('keydown', event => {
+  if (event.ctrlKey || event.altKey || event.metaKey || event.target.matches('select, input') || event.shiftKey && event.key !== '+') return;
+  const seen = inSight(), player = seen?.localName === 'pn-run' ? seen : document.querySelector('pn-run.whole');
+  const act = player?.act(event.key, event.target);
+  if (!act) return;
+  event.preventDefault();
+  act();
+});

@@ -1,0 +1,93 @@
+// The run as the page knows it. Panels read it and listen:
+//   'moment'   another moment is shown
+//   'staying'  references, edges, plan, directions or goal are new
+//   'grown'    moments were added
+//   'sought'   somebody goes to a moment: the run is held
+const maxMoments = 5000;  // of a live run, without their pictures
+
+export class Run extends EventTarget {
+  constructor() {
+    super();
+    this.moments = [];
+    this.staying = {};
+    this.index = -1;
+    this.following = true;  // the newest moment is shown
+    this.ended = false;
+  }
+
+  get moment() { return this.moments[this.index]; }
+  get last() { return this.moments.length - 1; }
+  say(name) { this.dispatchEvent(new Event(name)); }
+
+  // What a viewer that comes late has missed: [[t, x, y, heading, probability, sure, state, true x, true y], ...].
+  takePast(past) {
+    this.moments = past.map(([t, x, y, heading, probability, sure, state, trueX, trueY]) =>
+      ({ t, pose: x === null ? undefined : [x, y, heading], truth: trueX === null ? undefined : [trueX, trueY, null], probability: probability ?? undefined, sure, state, past: true }));
+    this.index = this.last;
+    this.say('grown');
+    if (this.moment) this.say('moment');
+  }
+  add(moment) {
+    const newest = this.moments[this.last];
+    if (newest?.past && newest.t === moment.t) this.moments.pop();
+    this.moments.push(moment);
+    if (this.moments.length > maxMoments) {
+      const gone = this.moments.length - maxMoments;
+      this.moments.splice(0, gone);
+      this.index -= gone;
+    }
+    this.say('grown');
+    if (this.following || this.index < 0) this.show(this.last);
+  }
+  stay(staying) {
+    Object.assign(this.staying, staying);
+    this.say('staying');
+  }
+  show(index) {
+    this.index = Math.max(0, Math.min(this.last, index));
+    this.say('moment');
+  }
+  // A moment by its time.
+  seek(t) {
+    let low = 0, high = this.last;
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (this.moments[middle].t < t) low = middle + 1; else high = middle;
+    }
+    this.say('sought');
+    this.show(low);
+  }
+}
+
+// Server-sent events; the browser connects again by itself, and the server then tells everything.
+export function follow(run, address, connected) {
+  const events = new EventSource(address);
+  events.addEventListener('open', () => connected(true));
+  events.addEventListener('error', () => { if (!run.ended) connected(false); });
+  events.addEventListener('past', event => run.takePast(JSON.parse(event.data)));
+  events.addEventListener('staying', event => run.stay(JSON.parse(event.data)));
+  events.addEventListener('moment', event => run.add(JSON.parse(event.data)));
+  events.addEventListener('ended', () => { run.ended = true; events.close(); run.say('moment'); });
+}
+
+// A simulated robot that estimates no pose gives the true one instead.
+export function isTruth({ pose, truth }) {
+  return Boolean(pose && truth && pose.every((value, i) => value === truth[i]));
+}
+
+// The points of `name` for a line that stops where a robot was carried: faster than three times what nine of ten steps
+// are.
+export function steady(moments, name) {
+  const speeds = moments.map((moment, i) => {
+    const before = moments[i - 1], [from, to] = [before?.[name], moment[name]];
+    return from && to ? Math.hypot(to[0] - from[0], to[1] - from[1]) / Math.max(1e-3, moment.t - before.t) : 0;
+  });
+  const moving = speeds.filter(speed => speed > 0).sort((a, b) => a - b);
+  const limit = 3 * moving[Math.floor(0.9 * (moving.length - 1))];
+  return moments.flatMap((moment, i) => speeds[i] > limit ? [undefined, moment[name]] : [moment[name]]);
+}
+
+export function stateClass(moment) {
+  if (moment.sure) return 'good';
+  return moment.state === 'ambiguous' || moment.state === 'between places' ? 'doubt' : 'bad';
+}
