@@ -4,6 +4,7 @@
 #include <bit>
 #include <cstdint>
 #include <set>
+#include <utility>
 
 #include "panonav/core/error.hpp"
 #include "panonav/storage/checksum.hpp"
@@ -66,14 +67,14 @@ std::int64_t map_checksum(std::string_view name, std::span<const std::uint8_t> n
   return static_cast<std::int64_t>(checksum(record.bytes()));
 }
 
-[[noreturn]] void fail_map(const Database& database, std::string_view name,
+[[noreturn]] void fail_map(const MemoryTables& tables, std::string_view name,
                            const std::string& what) {
-  database.fail_damaged("map " + std::string(name) + ": " + what);
+  tables.fail_damaged("map " + std::string(name) + ": " + what);
 }
 
 }  // namespace
 
-void write_map(Database& database, std::string_view name, const TopologicalMap& map) {
+void write_map(MemoryTables& tables, std::string_view name, const TopologicalMap& map) {
   if (name.empty()) throw ContractError("name of a map", "empty", "at least one character");
   validate(map);
   std::vector<std::uint8_t> nodes;
@@ -90,25 +91,17 @@ void write_map(Database& database, std::string_view name, const TopologicalMap& 
     append_pose(edges, edge.a_from_b);
     append_real(edges, edge.weight);
   }
-  Statement insert(database,
-                   "INSERT INTO maps(name, nodes, edges, checksum) VALUES(?, ?, ?, ?) ON "
-                   "CONFLICT(name) DO UPDATE SET nodes = excluded.nodes, edges = excluded.edges, "
-                   "checksum = excluded.checksum");
-  insert.bind(1, name)
-      .bind(2, std::span<const std::uint8_t>(nodes))
-      .bind(3, std::span<const std::uint8_t>(edges))
-      .bind(4, map_checksum(name, nodes, edges));
-  if (insert.run() != 0) fail_map(database, name, "cannot be replaced");
+  const std::int64_t row_checksum = map_checksum(name, nodes, edges);
+  tables.write_map(name, {std::move(nodes), std::move(edges), row_checksum});
 }
 
-std::optional<TopologicalMap> read_map(Database& database, std::string_view name) {
-  Statement row(database, "SELECT nodes, edges, checksum FROM maps WHERE name = ?");
-  if (!row.bind(1, name).step()) return std::nullopt;
-  const auto nodes = row.blob(0);
-  const auto edges = row.blob(1);
+std::optional<TopologicalMap> read_map(MemoryTables& tables, std::string_view name) {
+  const auto row = tables.map(name);
+  if (!row) return std::nullopt;
+  const auto& [nodes, edges, row_checksum] = *row;
   if (nodes.size() % node_bytes != 0 || edges.size() % edge_bytes != 0 ||
-      row.integer(2) != map_checksum(name, nodes, edges)) {
-    fail_map(database, name, "does not match its checksum");
+      row_checksum != map_checksum(name, nodes, edges)) {
+    fail_map(tables, name, "does not match its checksum");
   }
   TopologicalMap map;
   Reader node_reader(nodes);
@@ -126,7 +119,7 @@ std::optional<TopologicalMap> read_map(Database& database, std::string_view name
     edge.b.value = edge_reader.number();
     const std::uint32_t kind = edge_reader.number();
     if (kind > static_cast<std::uint32_t>(LinkKind::closure)) {
-      fail_map(database, name, "an edge of kind " + std::to_string(kind) + "; allowed: 0 .. 2");
+      fail_map(tables, name, "an edge of kind " + std::to_string(kind) + "; allowed: 0 .. 2");
     }
     edge.kind = static_cast<LinkKind>(kind);
     edge.a_from_b = edge_reader.pose();
@@ -136,29 +129,21 @@ std::optional<TopologicalMap> read_map(Database& database, std::string_view name
   try {
     validate(map);
   } catch (const ContractError& error) {
-    fail_map(database, name, error.what());
+    fail_map(tables, name, error.what());
   }
   return map;
 }
 
-bool erase_map(Database& database, std::string_view name) {
-  const bool there = read_map(database, name).has_value();
-  Statement erase(database, "DELETE FROM maps WHERE name = ?");
-  static_cast<void>(erase.bind(1, name).run());
+bool erase_map(MemoryTables& tables, std::string_view name) {
+  const bool there = read_map(tables, name).has_value();
+  tables.erase_map(name);
   return there;
 }
 
-std::vector<std::string> map_names(Database& database) {
-  std::vector<std::string> names;
-  Statement rows(database, "SELECT name FROM maps ORDER BY name");
-  while (rows.step()) names.emplace_back(rows.text(0));
-  return names;
-}
-
-void forget_in_maps(Database& database, std::span<const ViewId> views) {
+void forget_in_maps(MemoryTables& tables, std::span<const ViewId> views) {
   const std::set<ViewId> forgotten(views.begin(), views.end());
-  for (const std::string& name : map_names(database)) {
-    auto map = read_map(database, name);
+  for (const std::string& name : tables.map_names()) {
+    auto map = read_map(tables, name);
     if (!map) continue;
     const auto nodes = std::erase_if(
         map->nodes, [&](const MapNode& node) { return forgotten.contains(node.view); });
@@ -167,20 +152,20 @@ void forget_in_maps(Database& database, std::span<const ViewId> views) {
       return forgotten.contains(edge.a) || forgotten.contains(edge.b);
     });
     renumber_components(*map);
-    write_map(database, name, *map);
+    write_map(tables, name, *map);
   }
 }
 
-void verify_maps(Database& database, const std::function<bool(ViewId)>& known,
+void verify_maps(MemoryTables& tables, const std::function<bool(ViewId)>& known,
                  const std::function<void(const std::function<void()>&)>& check) {
   std::vector<std::string> names;
-  check([&] { names = map_names(database); });
+  check([&] { names = tables.map_names(); });
   for (const std::string& name : names) {
     check([&] {
-      const auto map = read_map(database, name);
+      const auto map = read_map(tables, name);
       for (const MapNode& node : map.value().nodes) {
         if (!known(node.view)) {
-          fail_map(database, name,
+          fail_map(tables, name,
                    "view " + std::to_string(node.view.value) + " is not in the memory");
         }
       }

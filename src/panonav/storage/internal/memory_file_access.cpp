@@ -10,7 +10,9 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/temporary_file.hpp"
+#include "panonav/storage/internal/database.hpp"
 #include "panonav/storage/internal/memory_schema.hpp"
+#include "panonav/storage/internal/sqlite_tables.hpp"
 #include "panonav/storage/internal/write_ahead_log.hpp"
 #include "panonav/storage/memory_header.hpp"
 
@@ -51,6 +53,77 @@ void remove_beside(const fs::path& path) {
   for (const char* suffix : {"-journal", "-wal", "-shm"}) {
     ::unlink(with_suffix(path, suffix).c_str());
   }
+}
+
+Database open_memory_database(const fs::path& path, Access access) {
+  require_memory_file(path);
+  const std::string name = path.string();
+  // SQLite lays its log beside the file that a link points at.
+  std::error_code ignored;
+  const fs::path file = fs::weakly_canonical(path, ignored);
+  const bool may_write = writable(file) && writable(folder_of(file));
+  if (access == Access::read_write) {
+    if (!may_write) {
+      throw FileError(name, "cannot be changed: no permission to write the file and its folder");
+    }
+    require_own_log(file);
+    Database database(file, DatabaseMode::change);
+    database.execute("PRAGMA synchronous=FULL");
+    return database;
+  }
+  const fs::path log = with_suffix(file, "-wal");
+  const auto empty = [&](const fs::path& part) {
+    return !fs::exists(part, ignored) || fs::file_size(part, ignored) == 0;
+  };
+  // Nobody has the file open for writing and nobody left changes behind.
+  const auto at_rest = [&] { return empty(log) && empty(with_suffix(file, "-shm")); };
+  // A reader without permission cannot make the log that SQLite wants to find.
+  if (!may_write && at_rest()) {
+    return {file, DatabaseMode::immutable};
+  }
+  require_own_log(file);
+  try {
+    // Opened for writing, where that is possible, so that SQLite can clear its log away in the end;
+    // no statement may write.
+    Database database(file, may_write ? DatabaseMode::change : DatabaseMode::read);
+    database.execute("PRAGMA query_only=ON");
+    // The first look at the file: now SQLite makes or finds its log.
+    static_cast<void>(database.integer("PRAGMA schema_version"));
+    return database;
+  } catch (const FileError&) {
+    // No room for a log on a full disk, or a file system that cannot share one. A file that is
+    // damaged is found to be so again.
+    if (at_rest()) return {file, DatabaseMode::immutable};
+    if (may_write || empty(log)) throw;
+    throw FileError(name,
+                    "has changes in " + log.string() +
+                        " that can be read only with permission to write the folder; open the "
+                        "file once with that permission");
+  }
+}
+
+// Gives a checked file of an older version or in another journal mode what changes need.
+void prepare_for_changes(Database& database) {
+  const auto require_alone = [&](bool alone) {
+    if (!alone) {
+      throw FileError(database.path().string(),
+                      "is being used by another program; its first change by this version needs "
+                      "it alone");
+    }
+  };
+  const bool older = format_version(database) < memory_format_version;
+  if (older) {
+    Transaction transaction(database, Transaction::Kind::writing);
+    upgrade_schema(database);
+    transaction.commit();
+  }
+  {
+    Statement mode(database, "PRAGMA journal_mode=WAL");
+    require_alone(mode.step() && mode.text(0) == "wal");
+  }
+  // The marks must be in the file itself before its log holds anything else.
+  if (older) require_alone(database.integer("PRAGMA wal_checkpoint(TRUNCATE)") == 0);
+  database.watch_name();
 }
 
 }  // namespace
@@ -106,74 +179,22 @@ void make_memory_file(const fs::path& path, const MemoryHeader& header) {
   sync_folder(folder);
 }
 
-Database open_memory_database(const fs::path& path, Access access) {
-  require_memory_file(path);
-  const std::string name = path.string();
-  // SQLite lays its log beside the file that a link points at.
-  std::error_code ignored;
-  const fs::path file = fs::weakly_canonical(path, ignored);
-  const bool may_write = writable(file) && writable(folder_of(file));
-  if (access == Access::read_write) {
-    if (!may_write) {
-      throw FileError(name, "cannot be changed: no permission to write the file and its folder");
-    }
-    require_own_log(file);
-    Database database(file, DatabaseMode::change);
-    database.execute("PRAGMA synchronous=FULL");
-    return database;
-  }
-  const fs::path log = with_suffix(file, "-wal");
-  const auto empty = [&](const fs::path& part) {
-    return !fs::exists(part, ignored) || fs::file_size(part, ignored) == 0;
-  };
-  // Nobody has the file open for writing and nobody left changes behind.
-  const auto at_rest = [&] { return empty(log) && empty(with_suffix(file, "-shm")); };
-  // A reader without permission cannot make the log that SQLite wants to find.
-  if (!may_write && at_rest()) {
-    return {file, DatabaseMode::immutable};
-  }
-  require_own_log(file);
+OpenedMemory open_memory_tables(const fs::path& path, Access access) {
+  Database database = open_memory_database(path, access);
+  std::optional<MemoryHeader> header;
   try {
-    // Opened for writing, where that is possible, so that SQLite can clear its log away in the end;
-    // no statement may write.
-    Database database(file, may_write ? DatabaseMode::change : DatabaseMode::read);
-    database.execute("PRAGMA query_only=ON");
-    // The first look at the file: now SQLite makes or finds its log.
-    static_cast<void>(database.integer("PRAGMA schema_version"));
-    return database;
+    const Transaction reading(database, Transaction::Kind::reading);
+    require_schema(database);
+    header = header_from(read_settings(database));
   } catch (const FileError&) {
-    // No room for a log on a full disk, or a file system that cannot share one. A file that is
-    // damaged is found to be so again.
-    if (at_rest()) return {file, DatabaseMode::immutable};
-    if (may_write || empty(log)) throw;
-    throw FileError(name,
-                    "has changes in " + log.string() +
-                        " that can be read only with permission to write the folder; open the "
-                        "file once with that permission");
+    database.leave_log_on_close();
+    throw;
+  } catch (const Error& error) {
+    database.leave_log_on_close();
+    database.fail_damaged(error.what());
   }
-}
-
-void prepare_for_changes(Database& database) {
-  const auto require_alone = [&](bool alone) {
-    if (!alone) {
-      throw FileError(database.path().string(),
-                      "is being used by another program; its first change by this version needs "
-                      "it alone");
-    }
-  };
-  const bool older = format_version(database) < memory_format_version;
-  if (older) {
-    Transaction transaction(database, Transaction::Kind::writing);
-    upgrade_schema(database);
-    transaction.commit();
-  }
-  {
-    Statement mode(database, "PRAGMA journal_mode=WAL");
-    require_alone(mode.step() && mode.text(0) == "wal");
-  }
-  // The marks must be in the file itself before its log holds anything else.
-  if (older) require_alone(database.integer("PRAGMA wal_checkpoint(TRUNCATE)") == 0);
-  database.watch_name();
+  if (access == Access::read_write) prepare_for_changes(database);
+  return {std::make_unique<SqliteTables>(path, std::move(database)), std::move(*header)};
 }
 
 }  // namespace panonav

@@ -1,8 +1,9 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 
-#include "panonav/storage/internal/database.hpp"
+#include "panonav/storage/internal/memory_tables.hpp"
 #include "panonav/storage/memory_file.hpp"
 
 namespace panonav {
@@ -11,12 +12,15 @@ namespace panonav {
 /// there.
 void make_memory_file(const std::filesystem::path& path, const MemoryHeader& header);
 
-/// Opens an existing file after a look at its first bytes. With read_only nothing that is asked of
-/// the connection can change the file.
-[[nodiscard]] Database open_memory_database(const std::filesystem::path& path, Access access);
+struct OpenedMemory {
+  std::unique_ptr<MemoryTables> tables;
+  MemoryHeader header;
+};
 
-/// Gives a checked file of an older version or in another journal mode what changes need. Throws
-/// FileError when another program is using it just then.
-void prepare_for_changes(Database& database);
+/// Opens an existing file after a look at its first bytes, and checks its schema and header. With
+/// read_only nothing that is asked of it can change the file. A file of an older version or in
+/// another journal mode is given what changes need. Throws FileError: missing, no memory file,
+/// damaged, newer, no permission, or another program is using it just then.
+[[nodiscard]] OpenedMemory open_memory_tables(const std::filesystem::path& path, Access access);
 
 }  // namespace panonav

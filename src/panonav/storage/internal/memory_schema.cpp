@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
-#include "panonav/storage/checksum.hpp"
+#include "panonav/storage/internal/memory_rows.hpp"
 #include "panonav/storage/internal/write_ahead_log.hpp"
 
 namespace panonav {
@@ -96,24 +96,6 @@ std::string hexadecimal(std::uint32_t value) {
   std::string text = "0x";
   for (int shift = 28; shift >= 0; shift -= 4) text += digits[(value >> shift) & 15U];
   return text;
-}
-
-std::int64_t setting_checksum(std::string_view key, const SettingValue& value) {
-  RecordBytes record;
-  record.add(key);
-  std::visit(
-      [&](const auto& v) {
-        using Value = std::remove_cvref_t<decltype(v)>;
-        if constexpr (std::is_same_v<Value, std::string>) {
-          record.add(std::string_view(v));
-        } else if constexpr (std::is_same_v<Value, std::vector<std::uint8_t>>) {
-          record.add(std::span<const std::uint8_t>(v));
-        } else {
-          record.add(v);
-        }
-      },
-      value);
-  return static_cast<std::int64_t>(checksum(record.bytes()));
 }
 
 SettingValue value_in(const Statement& row, int column) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 #include <span>
+#include <utility>
 
 #include "panonav/core/error.hpp"
 #include "panonav/storage/checksum.hpp"
@@ -16,23 +17,22 @@ namespace {
 // the last block is written anew with every append.
 constexpr std::int64_t lines_of_block = 256;
 
-struct RouteRow {
-  int columns = 0;
-  std::int64_t lines = 0;
+std::int64_t row_checksum(std::string_view name, const RouteRow& row) {
+  RecordBytes record;
+  record.add(name);
+  record.add(row.columns);
+  record.add(row.lines);
+  return static_cast<std::int64_t>(checksum(record.bytes()));
+}
 
-  [[nodiscard]] std::int64_t checksum_of(std::string_view name) const {
-    RecordBytes record;
-    record.add(name);
-    record.add(std::int64_t{columns});
-    record.add(lines);
-    return static_cast<std::int64_t>(checksum(record.bytes()));
-  }
-  [[nodiscard]] std::int64_t blocks() const { return (lines - 1) / lines_of_block + 1; }
-  // Lines of block `number`: all are full but the last.
-  [[nodiscard]] std::int64_t lines_of(std::int64_t number) const {
-    return std::min(lines_of_block, lines - number * lines_of_block);
-  }
-};
+std::int64_t blocks_of(const RouteRow& row) {
+  return (row.lines - 1) / lines_of_block + 1;
+}
+
+// Lines of block `number`: all are full but the last.
+std::int64_t lines_of(const RouteRow& row, std::int64_t number) {
+  return std::min(lines_of_block, row.lines - number * lines_of_block);
+}
 
 std::int64_t block_checksum(std::string_view name, std::int64_t number,
                             std::span<const std::uint8_t> lines) {
@@ -42,95 +42,77 @@ std::int64_t block_checksum(std::string_view name, std::int64_t number,
   return static_cast<std::int64_t>(checksum(lines, checksum(record.bytes())));
 }
 
-[[noreturn]] void fail_route(const Database& database, std::string_view name,
+[[noreturn]] void fail_route(const MemoryTables& tables, std::string_view name,
                              const std::string& what) {
-  database.fail_damaged("route " + std::string(name) + ": " + what);
+  tables.fail_damaged("route " + std::string(name) + ": " + what);
 }
 
-std::optional<RouteRow> read_row(Database& database, std::string_view name) {
-  Statement row(database, "SELECT columns, lines, checksum FROM routes WHERE name = ?");
-  if (!row.bind(1, name).step()) return std::nullopt;
+std::optional<RouteRow> read_row(MemoryTables& tables, std::string_view name) {
+  const auto row = tables.route(name);
+  if (!row) return std::nullopt;
   constexpr std::int64_t max_columns = 16384;
-  const std::int64_t columns = row.integer(0);
-  if (columns < 16 || columns > max_columns) {
-    fail_route(database, name, "columns are " + std::to_string(columns) + "; allowed: 16 to 16384");
+  if (row->columns < 16 || row->columns > max_columns) {
+    fail_route(tables, name,
+               "columns are " + std::to_string(row->columns) + "; allowed: 16 to 16384");
   }
-  const RouteRow route{static_cast<int>(columns), row.integer(1)};
-  if (route.lines < 1 || row.integer(2) != route.checksum_of(name)) {
-    fail_route(database, name, "does not match its checksum");
+  if (row->lines < 1 || row->checksum != row_checksum(name, *row)) {
+    fail_route(tables, name, "does not match its checksum");
   }
   // Its last block must be there: a count that the file has no room for is found at once.
-  Statement last(database, "SELECT 1 FROM route_blocks WHERE route = ? AND number = ?");
-  if (!last.bind(1, name).bind(2, route.blocks() - 1).step()) {
-    fail_route(database, name,
-               "its last block of " + std::to_string(route.blocks()) + " is missing");
+  if (!tables.block(name, blocks_of(*row) - 1)) {
+    fail_route(tables, name,
+               "its last block of " + std::to_string(blocks_of(*row)) + " is missing");
   }
-  return route;
+  return row;
 }
 
 // Replaces the block of that number.
-void write_block(Database& database, std::string_view name, std::int64_t number,
+void write_block(MemoryTables& tables, std::string_view name, std::int64_t number,
                  std::span<const std::uint8_t> lines) {
-  Statement insert(database,
-                   "INSERT INTO route_blocks(route, number, lines, checksum) VALUES(?, ?, ?, ?) ON "
-                   "CONFLICT(route, number) DO UPDATE SET lines = excluded.lines, checksum = "
-                   "excluded.checksum");
-  insert.bind(1, name).bind(2, number).bind(3, lines).bind(4, block_checksum(name, number, lines));
-  if (insert.run() != 0) fail_route(database, name, "a block cannot be written");
+  tables.write_block(name, number, lines, block_checksum(name, number, lines));
 }
 
-void write_row(Database& database, std::string_view name, const RouteRow& row) {
-  Statement head(database,
-                 "INSERT INTO routes(name, columns, lines, checksum) VALUES(?, ?, ?, ?) ON "
-                 "CONFLICT(name) DO UPDATE SET lines = excluded.lines, checksum = "
-                 "excluded.checksum");
-  head.bind(1, name)
-      .bind(2, std::int64_t{row.columns})
-      .bind(3, row.lines)
-      .bind(4, row.checksum_of(name));
-  if (head.run() != 0) fail_route(database, name, "cannot be written");
+void write_row(MemoryTables& tables, std::string_view name, RouteRow row) {
+  row.checksum = row_checksum(name, row);
+  tables.write_route(name, row);
 }
 
-// Passes the packed lines of block `number` to `use`, checked.
-template <class Use>
-void with_block(Database& database, std::string_view name, std::int64_t number, const Use& use) {
+// The packed lines of block `number`, checked.
+std::vector<std::uint8_t> block_of(MemoryTables& tables, std::string_view name,
+                                   std::int64_t number) {
   const std::string block = "block " + std::to_string(number);
-  Statement rows(database,
-                 "SELECT lines, checksum FROM route_blocks WHERE route = ? AND number = ?");
-  if (!rows.bind(1, name).bind(2, number).step()) {
-    fail_route(database, name, block + " is missing");
+  auto stored = tables.block(name, number);
+  if (!stored) fail_route(tables, name, block + " is missing");
+  if (stored->checksum != block_checksum(name, number, stored->bytes)) {
+    fail_route(tables, name, block + " does not match its checksum");
   }
-  const auto bytes = rows.blob(0);
-  if (rows.integer(1) != block_checksum(name, number, bytes)) {
-    fail_route(database, name, block + " does not match its checksum");
-  }
-  use(bytes);
+  return std::move(stored->bytes);
 }
 
 // Appends the lines of block `number` to `route`.
-void read_block(Database& database, std::string_view name, const RouteRow& row, std::int64_t number,
-                RoutePanorama& route) {
-  with_block(database, name, number, [&](std::span<const std::uint8_t> bytes) {
-    if (!unpack_route_lines(bytes, static_cast<std::size_t>(row.lines_of(number)), route)) {
-      fail_route(database, name, "block " + std::to_string(number) + " cannot be unpacked");
-    }
-  });
+void read_block(MemoryTables& tables, std::string_view name, const RouteRow& row,
+                std::int64_t number, RoutePanorama& route) {
+  if (!unpack_route_lines(block_of(tables, name, number),
+                          static_cast<std::size_t>(lines_of(row, number)), route)) {
+    fail_route(tables, name, "block " + std::to_string(number) + " cannot be unpacked");
+  }
 }
 
 }  // namespace
 
-std::size_t append_to_route(Database& database, std::string_view name, const RoutePanorama& more) {
+std::size_t append_to_route(MemoryTables& tables, std::string_view name,
+                            const RoutePanorama& more) {
   if (name.empty()) throw ContractError("name of a route", "empty", "at least one character");
   if (more.empty()) throw ContractError("lines of the route", 0, "1 or more");
-  RouteRow row = read_row(database, name).value_or(RouteRow{more.columns(), 0});
+  RouteRow row = read_row(tables, name).value_or(RouteRow{more.columns(), 0, 0});
   if (row.columns != more.columns()) {
     throw ContractError("columns", more.columns(),
                         std::to_string(row.columns) + ", as in the route " + std::string(name));
   }
   // The last block is taken up again: as it is when it is full, to see the last line.
-  std::int64_t number = std::max<std::int64_t>(0, row.blocks() - 1);
-  RoutePanorama open(row.columns);
-  if (row.lines > 0) read_block(database, name, row, number, open);
+  std::int64_t number = std::max<std::int64_t>(0, blocks_of(row) - 1);
+  RoutePanorama open(static_cast<int>(row.columns));
+  if (row.lines > 0) read_block(tables, name, row, number, open);
   const std::size_t known = open.size();
   for (std::size_t i = 0; i < more.size(); ++i) {
     static_cast<void>(open.append(more.poses()[i], more.line(i)));
@@ -142,81 +124,59 @@ std::size_t append_to_route(Database& database, std::string_view name, const Rou
   for (std::size_t first = known == full ? full : 0; first < open.size(); first += full) {
     const auto bytes = pack_route_lines(open, first, std::min(full, open.size() - first));
     const std::int64_t block = number + static_cast<std::int64_t>(first / full);
-    write_block(database, name, block, bytes);
+    write_block(tables, name, block, bytes);
   }
   row.lines += static_cast<std::int64_t>(appended);
-  write_row(database, name, row);
+  write_row(tables, name, row);
   return appended;
 }
 
-std::optional<RoutePanorama> read_route(Database& database, std::string_view name) {
-  const auto row = read_row(database, name);
-  Statement count(database, "SELECT count(*) FROM route_blocks WHERE route = ?");
-  const std::int64_t blocks = count.bind(1, name).step() ? count.integer(0) : 0;
-  count.reset();
+std::optional<RoutePanorama> read_route(MemoryTables& tables, std::string_view name) {
+  const auto row = read_row(tables, name);
+  const std::int64_t blocks = tables.blocks(name);
   if (!row) {
-    if (blocks > 0) fail_route(database, name, "blocks without the route");
+    if (blocks > 0) fail_route(tables, name, "blocks without the route");
     return std::nullopt;
   }
-  if (blocks != row->blocks()) {
-    fail_route(
-        database, name,
-        "it holds " + std::to_string(blocks) + " of " + std::to_string(row->blocks()) + " blocks");
+  if (blocks != blocks_of(*row)) {
+    fail_route(tables, name,
+               "it holds " + std::to_string(blocks) + " of " + std::to_string(blocks_of(*row)) +
+                   " blocks");
   }
-  RoutePanorama route(row->columns);
+  RoutePanorama route(static_cast<int>(row->columns));
   for (std::int64_t number = 0; number < blocks; ++number) {
-    read_block(database, name, *row, number, route);
+    read_block(tables, name, *row, number, route);
   }
   return route;
 }
 
-std::size_t route_bytes(Database& database, std::string_view name) {
-  Statement sum(database,
-                "SELECT coalesce(sum(length(lines)), 0) FROM route_blocks WHERE route = ?");
-  return sum.bind(1, name).step() ? static_cast<std::size_t>(sum.integer(0)) : 0;
+void rename_route(MemoryTables& tables, std::string_view name, std::string_view new_name) {
+  const auto row = read_row(tables, name);
+  if (!row) fail_route(tables, name, "is missing");
+  for (std::int64_t number = 0; number < blocks_of(*row); ++number) {
+    write_block(tables, new_name, number, block_of(tables, name, number));
+  }
+  write_row(tables, new_name, *row);
+  erase_route(tables, name);
 }
 
-void rename_route(Database& database, std::string_view name, std::string_view new_name) {
-  const auto row = read_row(database, name);
-  if (!row) fail_route(database, name, "is missing");
-  for (std::int64_t number = 0; number < row->blocks(); ++number) {
-    with_block(database, name, number, [&](std::span<const std::uint8_t> bytes) {
-      write_block(database, new_name, number, bytes);
-    });
-  }
-  write_row(database, new_name, *row);
-  erase_route(database, name);
-}
-
-bool erase_route(Database& database, std::string_view name) {
-  const bool there = read_row(database, name).has_value();
-  for (const char* sql :
-       {"DELETE FROM route_blocks WHERE route = ?", "DELETE FROM routes WHERE name = ?"}) {
-    Statement erase(database, sql);
-    static_cast<void>(erase.bind(1, name).run());
-  }
+bool erase_route(MemoryTables& tables, std::string_view name) {
+  const bool there = read_row(tables, name).has_value();
+  tables.erase_route(name);
   return there;
 }
 
-std::vector<std::string> route_names(Database& database) {
-  std::vector<std::string> names;
-  Statement rows(database, "SELECT name FROM routes ORDER BY name");
-  while (rows.step()) names.emplace_back(rows.text(0));
-  return names;
-}
-
-void verify_routes(Database& database,
+void verify_routes(MemoryTables& tables,
                    const std::function<void(const std::function<void()>&)>& check) {
   // From both tables: a route that either has lost is found in the other.
   std::set<std::string> names;
-  for (const char* sql : {"SELECT name FROM routes", "SELECT DISTINCT route FROM route_blocks"}) {
-    check([&] {
-      Statement rows(database, sql);
-      while (rows.step()) names.emplace(rows.text(0));
-    });
-  }
+  const auto add = [&](const std::vector<std::string>& found) {
+    names.insert(found.begin(), found.end());
+  };
+  check([&] { add(tables.route_names()); });
+  check([&] { add(tables.routes_with_blocks()); });
   for (const auto& name : names) {
-    check([&] { static_cast<void>(read_route(database, name)); });
+    check([&] { static_cast<void>(read_route(tables, name)); });
   }
 }
 

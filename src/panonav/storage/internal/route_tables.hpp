@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "panonav/route/route_panorama.hpp"
-#include "panonav/storage/internal/database.hpp"
+#include "panonav/storage/internal/memory_tables.hpp"
 
 namespace panonav {
 
@@ -19,19 +19,15 @@ namespace panonav {
 /// none, and returns how many: the first ones are left out while they lie within a millimetre of
 /// the last line there. Throws ContractError on an empty name, a route without lines, and another
 /// number of columns than the route's. Cost: that of `more` and at most one block of lines.
-std::size_t append_to_route(Database& database, std::string_view name, const RoutePanorama& more);
+std::size_t append_to_route(MemoryTables& tables, std::string_view name, const RoutePanorama& more);
 /// Empty when there is no such route.
-[[nodiscard]] std::optional<RoutePanorama> read_route(Database& database, std::string_view name);
-/// Bytes of the lines and poses as they are kept; 0 when there is no such route.
-[[nodiscard]] std::size_t route_bytes(Database& database, std::string_view name);
+[[nodiscard]] std::optional<RoutePanorama> read_route(MemoryTables& tables, std::string_view name);
 /// There must be a route of the one name and none of the other.
-void rename_route(Database& database, std::string_view name, std::string_view new_name);
+void rename_route(MemoryTables& tables, std::string_view name, std::string_view new_name);
 /// Whether there was one.
-bool erase_route(Database& database, std::string_view name);
-/// All names, ascending.
-[[nodiscard]] std::vector<std::string> route_names(Database& database);
+bool erase_route(MemoryTables& tables, std::string_view name);
 /// Passes every part to `check` that may throw; `check` keeps what it threw.
-void verify_routes(Database& database,
+void verify_routes(MemoryTables& tables,
                    const std::function<void(const std::function<void()>&)>& check);
 
 }  // namespace panonav

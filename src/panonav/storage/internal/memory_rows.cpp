@@ -1,0 +1,113 @@
+#include "panonav/storage/internal/memory_rows.hpp"
+
+#include <algorithm>
+#include <string>
+#include <type_traits>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav {
+
+namespace {
+
+void add_optional(RecordBytes& record, const std::optional<double>& value) {
+  if (value) {
+    record.add(*value);
+  } else {
+    record.add_null();
+  }
+}
+
+}  // namespace
+
+void pack_signature(const PackedSignature& signature, std::vector<std::uint8_t>& bytes) {
+  bytes.assign(signature.magnitudes.begin(), signature.magnitudes.end());
+  bytes.insert(bytes.end(), signature.phases.begin(), signature.phases.end());
+}
+
+// The signature is hashed where it lies; the short fields are its seed.
+std::int64_t view_checksum(RecordBytes& scratch, ViewId id, const ReferenceInfo& info,
+                           std::span<const std::uint8_t> signature) {
+  scratch.clear();
+  scratch.add(std::int64_t{id.value});
+  scratch.add(std::string_view(info.name));
+  if (info.pose) {
+    scratch.add(info.pose->x_m);
+    scratch.add(info.pose->y_m);
+    add_optional(scratch, info.pose->heading_rad);
+  } else {
+    for (int i = 0; i < 3; ++i) scratch.add_null();
+  }
+  add_optional(scratch, info.stamp_s);
+  return static_cast<std::int64_t>(checksum(signature, checksum(scratch.bytes())));
+}
+
+std::int64_t bytes_checksum(ViewId view, std::span<const std::uint8_t> bytes) {
+  RecordBytes record;
+  record.add(std::int64_t{view.value});
+  return static_cast<std::int64_t>(checksum(bytes, checksum(record.bytes())));
+}
+
+std::int64_t link_checksum(const Link& link) {
+  RecordBytes record;
+  record.add(std::int64_t{link.a.value});
+  record.add(std::int64_t{link.b.value});
+  record.add(std::int64_t{static_cast<int>(link.kind)});
+  return static_cast<std::int64_t>(checksum(record.bytes()));
+}
+
+std::int64_t setting_checksum(std::string_view key, const SettingValue& value) {
+  RecordBytes record;
+  record.add(key);
+  std::visit(
+      [&](const auto& v) {
+        using Value = std::remove_cvref_t<decltype(v)>;
+        if constexpr (std::is_same_v<Value, std::string>) {
+          record.add(std::string_view(v));
+        } else if constexpr (std::is_same_v<Value, std::vector<std::uint8_t>>) {
+          record.add(std::span<const std::uint8_t>(v));
+        } else {
+          record.add(v);
+        }
+      },
+      value);
+  return static_cast<std::int64_t>(checksum(record.bytes()));
+}
+
+std::int64_t undo_checksum(std::string_view what, std::span<const std::uint8_t> changes) {
+  RecordBytes record;
+  record.add(what);
+  return static_cast<std::int64_t>(checksum(changes, checksum(record.bytes())));
+}
+
+void refuse_view(ViewId view) {
+  throw ContractError("view", std::to_string(view.value), "a view of the memory file");
+}
+
+void refuse_taken_name(std::string_view what, std::string_view name,
+                       const std::filesystem::path& file) {
+  throw ContractError(std::string(what) + " name",
+                      "\"" + std::string(name) + "\", which " + file.string() + " already holds",
+                      "a name that is unique");
+}
+
+void require_name(std::string_view what, std::string_view name) {
+  constexpr std::size_t max_bytes = 4096;
+  const bool control = std::ranges::any_of(
+      name, [](char c) { return static_cast<unsigned char>(c) < 0x20U || c == 0x7F; });
+  if (!name.empty() && !control && name.size() <= max_bytes) return;
+  throw ContractError(std::string(what) + " name",
+                      name.empty() ? "empty"
+                      : control    ? "a text with control characters"
+                                   : std::to_string(name.size()) + " bytes long",
+                      "1 to " + std::to_string(max_bytes) + " bytes, no control characters");
+}
+
+void require_undo_bytes(const std::filesystem::path& file, std::int64_t bytes) {
+  if (bytes <= max_undo_bytes) return;
+  throw FileError(file.string(), "would keep " + std::to_string(bytes) +
+                                     " bytes to undo this; allowed: up to " +
+                                     std::to_string(max_undo_bytes) + ", or not to keep them");
+}
+
+}  // namespace panonav

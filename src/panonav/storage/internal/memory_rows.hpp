@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "panonav/storage/checksum.hpp"
+#include "panonav/storage/memory_file.hpp"
+#include "panonav/storage/memory_header.hpp"
+
+namespace panonav {
+
+/// What every way of keeping a memory has in common: the bytes of its rows, their checksums, and
+/// what is refused.
+
+/// Magnitudes, then phases, into `bytes`.
+void pack_signature(const PackedSignature& signature, std::vector<std::uint8_t>& bytes);
+
+/// Over all fields of a view. `scratch` saves an allocation a view.
+[[nodiscard]] std::int64_t view_checksum(RecordBytes& scratch, ViewId id, const ReferenceInfo& info,
+                                         std::span<const std::uint8_t> signature);
+/// Of a thumbnail or of local features.
+[[nodiscard]] std::int64_t bytes_checksum(ViewId view, std::span<const std::uint8_t> bytes);
+[[nodiscard]] std::int64_t link_checksum(const Link& link);
+[[nodiscard]] std::int64_t setting_checksum(std::string_view key, const SettingValue& value);
+/// Of the change that can be undone.
+[[nodiscard]] std::int64_t undo_checksum(std::string_view what,
+                                         std::span<const std::uint8_t> changes);
+
+/// Throws the ContractError for a view that is not in the file.
+[[noreturn]] void refuse_view(ViewId view);
+
+/// Throws the ContractError for a name that another `what` ("view", "route") of the file has.
+[[noreturn]] void refuse_taken_name(std::string_view what, std::string_view name,
+                                    const std::filesystem::path& file);
+
+/// Throws ContractError on a new name that people could not type or read.
+void require_name(std::string_view what, std::string_view name);
+
+/// More than this is not kept for an undo: SQLite takes fields of 256 MiB.
+inline constexpr std::int64_t max_undo_bytes = 200 << 20;
+
+/// Throws FileError when that many bytes are too many.
+void require_undo_bytes(const std::filesystem::path& file, std::int64_t bytes);
+
+}  // namespace panonav

@@ -1,0 +1,159 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "panonav/storage/memory_file.hpp"
+#include "panonav/storage/memory_header.hpp"
+
+namespace panonav {
+
+/// A row of the table of views as it is stored, not checked yet. `signature` is valid until the
+/// next row is read.
+struct ViewRow {
+  ViewId id;
+  ReferenceInfo info;
+  std::span<const std::uint8_t> signature;
+  std::int64_t checksum = 0;
+};
+
+struct LinkRow {
+  ViewId a, b;
+  std::int64_t kind = 0;
+  std::int64_t checksum = 0;
+};
+
+struct MapRow {
+  std::vector<std::uint8_t> nodes, edges;
+  std::int64_t checksum = 0;
+};
+
+struct RouteRow {
+  std::int64_t columns = 0;
+  std::int64_t lines = 0;
+  std::int64_t checksum = 0;
+};
+
+/// A thumbnail, local features, or a block of lines of a route.
+struct StoredBytes {
+  std::vector<std::uint8_t> bytes;
+  std::int64_t checksum = 0;
+};
+
+/// Tables of bytes that some views have.
+enum class BesideViews { thumbnails, features };
+
+/// Where the rows of one memory are kept: an SQLite file or a PostgreSQL server. What the rows mean
+/// and what is refused is decided above (`MemoryFile`, map_tables.hpp, route_tables.hpp), once.
+/// Everything that the database refuses is thrown as a FileError of one line that names the memory.
+/// What an older file has no table for is empty.
+class MemoryTables {
+ public:
+  enum class Kind { reading, writing };
+
+  /// Rolls back unless committed. Within a writing transaction it is a part of that one, which is
+  /// taken back alone or committed with the whole.
+  class Transaction {
+   public:
+    Transaction() = default;
+    virtual ~Transaction() = default;
+    Transaction(const Transaction&) = delete;
+    Transaction& operator=(const Transaction&) = delete;
+    /// Returns once everything is on the disk.
+    virtual void commit() = 0;
+  };
+  template <class Row>
+  using Take = std::function<void(const Row&)>;
+  /// Runs a part of `verify` and keeps what it throws.
+  using Check = std::function<void(const std::function<void()>&)>;
+
+  MemoryTables() = default;
+  virtual ~MemoryTables() = default;
+  MemoryTables(const MemoryTables&) = delete;
+  MemoryTables& operator=(const MemoryTables&) = delete;
+
+  /// As it was given.
+  [[nodiscard]] virtual const std::filesystem::path& path() const noexcept = 0;
+  /// What messages of damage call the memory.
+  [[nodiscard]] virtual const std::filesystem::path& place() const noexcept = 0;
+  [[noreturn]] void fail_damaged(std::string_view what) const;
+  [[nodiscard]] virtual std::unique_ptr<Transaction> transaction(Kind kind) = 0;
+
+  /// Every checksum is checked.
+  [[nodiscard]] virtual Settings settings() = 0;
+  /// Replaces the value that the key had.
+  virtual void write_setting(const std::string& key, const SettingValue& value) = 0;
+  virtual void erase_setting(const std::string& key) = 0;
+
+  /// The largest id that was ever given to a view; 0: none.
+  [[nodiscard]] virtual std::uint32_t last_id() = 0;
+  /// Views with ids above `last_id`, ascending. Throws as `refuse_taken_name`.
+  virtual void insert(std::span<const ViewId> ids, std::span<const NewView> views) = 0;
+  /// Throws as `refuse_view` for the first that is not there.
+  virtual void require_views(std::span<const ViewId> views) = 0;
+  /// With their links, thumbnails and features.
+  virtual void remove(std::span<const ViewId> views) = 0;
+  /// Replaces all but the signature. Throws as `refuse_taken_name`.
+  virtual void write_info(ViewId view, const ReferenceInfo& info, std::int64_t checksum) = 0;
+  /// All, ascending.
+  virtual void read_views(const Take<ViewRow>& take) = 0;
+  /// These, in this order. Throws as `refuse_view`.
+  virtual void read_views(std::span<const ViewId> views, const Take<ViewRow>& take) = 0;
+  [[nodiscard]] virtual std::optional<ViewId> find(std::string_view name) = 0;
+  /// By ascending id.
+  [[nodiscard]] virtual std::vector<std::string> names() = 0;
+  /// Ascending.
+  [[nodiscard]] virtual std::vector<ViewId> views() = 0;
+  /// Ascending.
+  [[nodiscard]] virtual std::vector<ViewId> views_with(BesideViews table) = 0;
+  [[nodiscard]] virtual std::optional<StoredBytes> bytes(BesideViews table, ViewId view) = 0;
+
+  /// With a < b; a pair that is there gets the new kind.
+  virtual void write_links(std::span<const Link> links) = 0;
+  virtual void erase_link(ViewId a, ViewId b) = 0;
+  /// Ascending.
+  virtual void read_links(const Take<LinkRow>& take) = 0;
+
+  virtual void write_map(std::string_view name, const MapRow& row) = 0;
+  [[nodiscard]] virtual std::optional<MapRow> map(std::string_view name) = 0;
+  virtual void erase_map(std::string_view name) = 0;
+  /// Ascending.
+  [[nodiscard]] virtual std::vector<std::string> map_names() = 0;
+
+  virtual void write_route(std::string_view name, const RouteRow& row) = 0;
+  [[nodiscard]] virtual std::optional<RouteRow> route(std::string_view name) = 0;
+  /// With its blocks.
+  virtual void erase_route(std::string_view name) = 0;
+  /// Ascending.
+  [[nodiscard]] virtual std::vector<std::string> route_names() = 0;
+  virtual void write_block(std::string_view route, std::int64_t number,
+                           std::span<const std::uint8_t> lines, std::int64_t checksum) = 0;
+  [[nodiscard]] virtual std::optional<StoredBytes> block(std::string_view route,
+                                                         std::int64_t number) = 0;
+  [[nodiscard]] virtual std::int64_t blocks(std::string_view route) = 0;
+  /// Bytes of all its blocks.
+  [[nodiscard]] virtual std::int64_t route_bytes(std::string_view route) = 0;
+  /// Routes that have blocks.
+  [[nodiscard]] virtual std::vector<std::string> routes_with_blocks() = 0;
+
+  /// Within a writing transaction: runs `changes` and keeps what they replace or drop.
+  virtual void keep_for_undo(const std::function<void()>& changes, const std::string& what) = 0;
+  [[nodiscard]] virtual std::optional<std::string> undoable() = 0;
+  /// Within a writing transaction; there is something to undo.
+  virtual void undo() = 0;
+
+  /// Passes every part of the check of the tables themselves to `check`; nothing after it is safe
+  /// to read where that found faults. Returns the ids of all views that are found by any way.
+  [[nodiscard]] virtual std::set<ViewId> verify_structure(const Check& check) = 0;
+  [[nodiscard]] virtual MemoryFileInfo info() = 0;
+};
+
+}  // namespace panonav

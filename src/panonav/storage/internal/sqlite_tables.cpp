@@ -1,0 +1,473 @@
+#include "panonav/storage/internal/sqlite_tables.hpp"
+
+#include <sqlite3.h>
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/storage/internal/memory_rows.hpp"
+#include "panonav/storage/internal/memory_schema.hpp"
+
+namespace panonav {
+
+namespace {
+
+std::optional<double> optional_real(const Statement& row, int column) {
+  if (row.is_null(column)) return std::nullopt;
+  return row.real(column);
+}
+
+void bind_optional(Statement& statement, int parameter, const std::optional<double>& value) {
+  if (value) {
+    statement.bind(parameter, *value);
+  } else {
+    statement.bind_null(parameter);
+  }
+}
+
+// name, x_m, y_m, heading_rad, stamp_s from parameter `first` on.
+void bind_info(Statement& statement, int first, const ReferenceInfo& info) {
+  const auto& pose = info.pose;
+  statement.bind(first, std::string_view(info.name));
+  bind_optional(statement, first + 1, pose ? std::optional(pose->x_m) : std::nullopt);
+  bind_optional(statement, first + 2, pose ? std::optional(pose->y_m) : std::nullopt);
+  bind_optional(statement, first + 3, pose ? pose->heading_rad : std::nullopt);
+  bind_optional(statement, first + 4, info.stamp_s);
+}
+
+std::vector<std::uint8_t> copy_of(std::span<const std::uint8_t> bytes) {
+  return {bytes.begin(), bytes.end()};
+}
+
+class SqliteTransaction final : public MemoryTables::Transaction {
+ public:
+  SqliteTransaction(Database& database, panonav::Transaction::Kind kind)
+      : transaction_(database, kind) {}
+  void commit() override { transaction_.commit(); }
+
+ private:
+  panonav::Transaction transaction_;
+};
+
+const char* name_of(BesideViews table) {
+  return table == BesideViews::thumbnails ? "thumbnails" : "features";
+}
+
+}  // namespace
+
+SqliteTables::SqliteTables(std::filesystem::path path, Database database)
+    : path_(std::move(path)),
+      database_(std::move(database)),
+      insert_view_(database_,
+                   "INSERT INTO views(id, name, x_m, y_m, heading_rad, stamp_s, signature, "
+                   "checksum) VALUES(?, ?, ?, ?, ?, ?, ?, ?)"),
+      find_name_(database_, "SELECT id FROM views WHERE name = ?"),
+      find_view_(database_,
+                 "SELECT id, name, x_m, y_m, heading_rad, stamp_s, signature, checksum FROM views "
+                 "WHERE id = ?") {}
+
+std::unique_ptr<MemoryTables::Transaction> SqliteTables::transaction(Kind kind) {
+  return std::make_unique<SqliteTransaction>(database_, kind == Kind::writing
+                                                            ? panonav::Transaction::Kind::writing
+                                                            : panonav::Transaction::Kind::reading);
+}
+
+ViewId SqliteTables::id_in(const Statement& row, int column) const {
+  const std::int64_t id = row.integer(column);
+  if (id < 1 || id > std::int64_t{UINT32_MAX}) fail_damaged("a view id is out of range");
+  return {static_cast<std::uint32_t>(id)};
+}
+
+ViewRow SqliteTables::view_in(const Statement& row) const {
+  ViewRow view;
+  view.id = id_in(row, 0);
+  view.info.name = row.text(1);
+  const auto x_m = optional_real(row, 2);
+  const auto y_m = optional_real(row, 3);
+  if (x_m && y_m) view.info.pose = ReferencePose{*x_m, *y_m, optional_real(row, 4)};
+  view.info.stamp_s = optional_real(row, 5);
+  view.signature = row.blob(6);
+  view.checksum = row.integer(7);
+  return view;
+}
+
+bool SqliteTables::has(BesideViews table) {
+  return table == BesideViews::thumbnails || has_feature_table(database_);
+}
+
+std::vector<std::string> SqliteTables::texts(const char* sql) {
+  std::vector<std::string> texts;
+  Statement rows(database_, sql);
+  while (rows.step()) texts.emplace_back(rows.text(0));
+  return texts;
+}
+
+Settings SqliteTables::settings() {
+  return read_settings(database_);
+}
+
+void SqliteTables::write_setting(const std::string& key, const SettingValue& value) {
+  panonav::write_setting(database_, key, value);
+}
+
+void SqliteTables::erase_setting(const std::string& key) {
+  Statement erase(database_, "DELETE FROM settings WHERE key = ?");
+  static_cast<void>(erase.bind(1, std::string_view(key)).run());
+}
+
+std::uint32_t SqliteTables::last_id() {
+  // SQLite keeps it in a table without types, in which anything can stand.
+  Statement rows(database_, "SELECT name, seq FROM sqlite_sequence");
+  std::int64_t last = 0;
+  for (int count = 0; rows.step(); ++count) {
+    if (rows.text(0) != "views" || count > 0) {
+      fail_damaged("table sqlite_sequence holds more than the last view id");
+    }
+    last = rows.integer(1);
+  }
+  Statement largest(database_, "SELECT id FROM views ORDER BY id DESC LIMIT 1");
+  const std::int64_t id = largest.step() ? largest.integer(0) : 0;
+  largest.reset();
+  if (last < 0 || last >= std::int64_t{UINT32_MAX} || id > last) {
+    fail_damaged("the last view id is " + std::to_string(last) + ", the largest " +
+                 std::to_string(id) + "; allowed: 0 .. 2^32 - 2, not below the largest");
+  }
+  return static_cast<std::uint32_t>(last);
+}
+
+void SqliteTables::insert(std::span<const ViewId> ids, std::span<const NewView> views) {
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const ViewId id = ids[i];
+    const NewView& view = views[i];
+    pack_signature(view.signature, signature_);
+    insert_view_.bind(1, std::int64_t{id.value});
+    bind_info(insert_view_, 2, view.info);
+    insert_view_.bind(7, std::span<const std::uint8_t>(signature_))
+        .bind(8, view_checksum(scratch_, id, view.info, signature_));
+    const int constraint = insert_view_.run();
+    if (constraint == SQLITE_CONSTRAINT_UNIQUE) refuse_taken_name("view", view.info.name, path_);
+    if (constraint != 0) fail_damaged("the id of a new view is taken");
+    insert_beside(BesideViews::thumbnails, id, view.thumbnail);
+    insert_beside(BesideViews::features, id, view.features);
+  }
+}
+
+void SqliteTables::insert_beside(BesideViews table, ViewId view,
+                                 std::span<const std::uint8_t> bytes) {
+  if (bytes.empty()) return;
+  Statement insert(database_,
+                   table == BesideViews::thumbnails
+                       ? "INSERT INTO thumbnails(view, picture, checksum) VALUES(?, ?, ?)"
+                       : "INSERT INTO features(view, features, checksum) VALUES(?, ?, ?)");
+  insert.bind(1, std::int64_t{view.value}).bind(2, bytes).bind(3, bytes_checksum(view, bytes));
+  if (insert.run() != 0) {
+    fail_damaged("an entry of " + std::string(name_of(table)) + " without a view");
+  }
+}
+
+void SqliteTables::require_views(std::span<const ViewId> views) {
+  Statement statement(database_, "SELECT 1 FROM views WHERE id = ?");
+  for (const ViewId view : views) {
+    if (!statement.bind(1, std::int64_t{view.value}).step()) refuse_view(view);
+    statement.reset();
+  }
+}
+
+void SqliteTables::remove(std::span<const ViewId> views) {
+  std::vector<Statement> statements;
+  for (const char* sql :
+       {"DELETE FROM links WHERE a = ?1 OR b = ?1", "DELETE FROM thumbnails WHERE view = ?",
+        "DELETE FROM views WHERE id = ?"}) {
+    statements.emplace_back(database_, sql);
+  }
+  if (has(BesideViews::features)) {
+    statements.emplace_back(database_, "DELETE FROM features WHERE view = ?");
+  }
+  for (const ViewId view : views) {
+    for (Statement& statement : statements) {
+      static_cast<void>(statement.bind(1, std::int64_t{view.value}).run());
+    }
+  }
+}
+
+void SqliteTables::write_info(ViewId view, const ReferenceInfo& info, std::int64_t checksum) {
+  Statement write(database_,
+                  "UPDATE views SET name = ?, x_m = ?, y_m = ?, heading_rad = ?, stamp_s = ?, "
+                  "checksum = ? WHERE id = ?");
+  bind_info(write, 1, info);
+  write.bind(6, checksum).bind(7, std::int64_t{view.value});
+  if (write.run() != 0) refuse_taken_name("view", info.name, path_);
+}
+
+void SqliteTables::read_views(const Take<ViewRow>& take) {
+  std::int64_t taken = 0;
+  Statement rows(database_,
+                 "SELECT id, name, x_m, y_m, heading_rad, stamp_s, signature, checksum FROM views "
+                 "ORDER BY id");
+  for (; rows.step(); ++taken) take(view_in(rows));
+  // A page that lost its cells loses views without a fault of their own; the index of the names,
+  // which lies on other pages, still counts them.
+  const std::int64_t count = database_.integer(
+      "SELECT count(*) FROM views INDEXED BY sqlite_autoindex_views_1 WHERE name > ''");
+  if (count != taken) {
+    fail_damaged("it holds " + std::to_string(taken) + " of " + std::to_string(count) + " views");
+  }
+}
+
+void SqliteTables::read_views(std::span<const ViewId> views, const Take<ViewRow>& take) {
+  for (const ViewId view : views) {
+    find_view_.reset();  // what was taken last may have thrown
+    if (!find_view_.bind(1, std::int64_t{view.value}).step()) {
+      // The index of the names lies on other pages: it still knows what the table has lost.
+      Statement named(database_,
+                      "SELECT 1 FROM views INDEXED BY sqlite_autoindex_views_1 WHERE id = ?");
+      if (!named.bind(1, std::int64_t{view.value}).step()) refuse_view(view);
+      fail_damaged("view " + std::to_string(view.value) + " is missing");
+    }
+    take(view_in(find_view_));
+  }
+  find_view_.reset();
+}
+
+std::optional<ViewId> SqliteTables::find(std::string_view name) {
+  std::optional<ViewId> found;
+  if (find_name_.bind(1, name).step()) found = id_in(find_name_, 0);
+  find_name_.reset();
+  return found;
+}
+
+std::vector<std::string> SqliteTables::names() {
+  std::vector<std::string> names;
+  Statement rows(database_, "SELECT name, id FROM views ORDER BY id");
+  std::int64_t before = 0;
+  while (rows.step()) {
+    if (rows.integer(1) <= before) fail_damaged("views are out of order");
+    before = rows.integer(1);
+    names.emplace_back(rows.text(0));
+  }
+  return names;
+}
+
+std::vector<ViewId> SqliteTables::views() {
+  std::vector<ViewId> views;
+  // The index of the names holds the ids, too, on far fewer pages than the table.
+  Statement ids(database_, "SELECT id FROM views INDEXED BY sqlite_autoindex_views_1");
+  while (ids.step()) views.push_back(id_in(ids, 0));
+  std::ranges::sort(views);
+  return views;
+}
+
+std::vector<ViewId> SqliteTables::views_with(BesideViews table) {
+  std::vector<ViewId> views;
+  if (!has(table)) return views;
+  const std::string sql = "SELECT view FROM " + std::string(name_of(table)) + " ORDER BY view";
+  Statement rows(database_, sql.c_str());
+  while (rows.step()) {
+    const ViewId view = id_in(rows, 0);
+    if (!views.empty() && view <= views.back()) {
+      fail_damaged(std::string(name_of(table)) + " are out of order");
+    }
+    views.push_back(view);
+  }
+  return views;
+}
+
+std::optional<StoredBytes> SqliteTables::bytes(BesideViews table, ViewId view) {
+  if (!has(table)) return std::nullopt;
+  Statement row(database_, table == BesideViews::thumbnails
+                               ? "SELECT picture, checksum FROM thumbnails WHERE view = ?"
+                               : "SELECT features, checksum FROM features WHERE view = ?");
+  if (!row.bind(1, std::int64_t{view.value}).step()) return std::nullopt;
+  return StoredBytes{copy_of(row.blob(0)), row.integer(1)};
+}
+
+void SqliteTables::write_links(std::span<const Link> links) {
+  Statement insert(database_,
+                   "INSERT INTO links(a, b, kind, checksum) VALUES(?, ?, ?, ?) ON CONFLICT(a, b) "
+                   "DO UPDATE SET kind = excluded.kind, checksum = excluded.checksum");
+  for (const Link& link : links) {
+    insert.bind(1, std::int64_t{link.a.value})
+        .bind(2, std::int64_t{link.b.value})
+        .bind(3, std::int64_t{static_cast<int>(link.kind)})
+        .bind(4, link_checksum(link));
+    static_cast<void>(insert.run());
+  }
+}
+
+void SqliteTables::erase_link(ViewId a, ViewId b) {
+  Statement erase(database_, "DELETE FROM links WHERE a = ? AND b = ?");
+  static_cast<void>(erase.bind(1, std::int64_t{a.value}).bind(2, std::int64_t{b.value}).run());
+}
+
+void SqliteTables::read_links(const Take<LinkRow>& take) {
+  Statement check(database_, "PRAGMA quick_check(links)");
+  if (!check.step() || check.text(0) != "ok") fail_damaged("table links");
+  check.reset();
+  Statement rows(database_, "SELECT a, b, kind, checksum FROM links ORDER BY a, b");
+  while (rows.step()) take({id_in(rows, 0), id_in(rows, 1), rows.integer(2), rows.integer(3)});
+}
+
+void SqliteTables::write_map(std::string_view name, const MapRow& row) {
+  Statement insert(database_,
+                   "INSERT INTO maps(name, nodes, edges, checksum) VALUES(?, ?, ?, ?) ON "
+                   "CONFLICT(name) DO UPDATE SET nodes = excluded.nodes, edges = excluded.edges, "
+                   "checksum = excluded.checksum");
+  insert.bind(1, name)
+      .bind(2, std::span<const std::uint8_t>(row.nodes))
+      .bind(3, std::span<const std::uint8_t>(row.edges))
+      .bind(4, row.checksum);
+  if (insert.run() != 0) fail_damaged("map " + std::string(name) + ": cannot be replaced");
+}
+
+std::optional<MapRow> SqliteTables::map(std::string_view name) {
+  if (!has_map_table(database_)) return std::nullopt;
+  Statement row(database_, "SELECT nodes, edges, checksum FROM maps WHERE name = ?");
+  if (!row.bind(1, name).step()) return std::nullopt;
+  return MapRow{copy_of(row.blob(0)), copy_of(row.blob(1)), row.integer(2)};
+}
+
+void SqliteTables::erase_map(std::string_view name) {
+  Statement erase(database_, "DELETE FROM maps WHERE name = ?");
+  static_cast<void>(erase.bind(1, name).run());
+}
+
+std::vector<std::string> SqliteTables::map_names() {
+  if (!has_map_table(database_)) return {};
+  return texts("SELECT name FROM maps ORDER BY name");
+}
+
+void SqliteTables::write_route(std::string_view name, const RouteRow& row) {
+  Statement head(database_,
+                 "INSERT INTO routes(name, columns, lines, checksum) VALUES(?, ?, ?, ?) ON "
+                 "CONFLICT(name) DO UPDATE SET lines = excluded.lines, checksum = "
+                 "excluded.checksum");
+  head.bind(1, name).bind(2, row.columns).bind(3, row.lines).bind(4, row.checksum);
+  if (head.run() != 0) fail_damaged("route " + std::string(name) + ": cannot be written");
+}
+
+std::optional<RouteRow> SqliteTables::route(std::string_view name) {
+  if (!has_route_tables(database_)) return std::nullopt;
+  Statement row(database_, "SELECT columns, lines, checksum FROM routes WHERE name = ?");
+  if (!row.bind(1, name).step()) return std::nullopt;
+  return RouteRow{row.integer(0), row.integer(1), row.integer(2)};
+}
+
+void SqliteTables::erase_route(std::string_view name) {
+  for (const char* sql :
+       {"DELETE FROM route_blocks WHERE route = ?", "DELETE FROM routes WHERE name = ?"}) {
+    Statement erase(database_, sql);
+    static_cast<void>(erase.bind(1, name).run());
+  }
+}
+
+std::vector<std::string> SqliteTables::route_names() {
+  if (!has_route_tables(database_)) return {};
+  return texts("SELECT name FROM routes ORDER BY name");
+}
+
+void SqliteTables::write_block(std::string_view route, std::int64_t number,
+                               std::span<const std::uint8_t> lines, std::int64_t checksum) {
+  Statement insert(database_,
+                   "INSERT INTO route_blocks(route, number, lines, checksum) VALUES(?, ?, ?, ?) ON "
+                   "CONFLICT(route, number) DO UPDATE SET lines = excluded.lines, checksum = "
+                   "excluded.checksum");
+  insert.bind(1, route).bind(2, number).bind(3, lines).bind(4, checksum);
+  if (insert.run() != 0) {
+    fail_damaged("route " + std::string(route) + ": a block cannot be written");
+  }
+}
+
+std::optional<StoredBytes> SqliteTables::block(std::string_view route, std::int64_t number) {
+  Statement rows(database_,
+                 "SELECT lines, checksum FROM route_blocks WHERE route = ? AND number = ?");
+  if (!rows.bind(1, route).bind(2, number).step()) return std::nullopt;
+  return StoredBytes{copy_of(rows.blob(0)), rows.integer(1)};
+}
+
+std::int64_t SqliteTables::blocks(std::string_view route) {
+  if (!has_route_tables(database_)) return 0;
+  Statement count(database_, "SELECT count(*) FROM route_blocks WHERE route = ?");
+  return count.bind(1, route).step() ? count.integer(0) : 0;
+}
+
+std::int64_t SqliteTables::route_bytes(std::string_view route) {
+  if (!has_route_tables(database_)) return 0;
+  Statement sum(database_,
+                "SELECT coalesce(sum(length(lines)), 0) FROM route_blocks WHERE route = ?");
+  return sum.bind(1, route).step() ? sum.integer(0) : 0;
+}
+
+std::vector<std::string> SqliteTables::routes_with_blocks() {
+  if (!has_route_tables(database_)) return {};
+  return texts("SELECT DISTINCT route FROM route_blocks");
+}
+
+std::set<ViewId> SqliteTables::verify_structure(const Check& check) {
+  bool intact = true;
+  // The full check counts the entries of indexes, which has no end where pages refer to each other:
+  // the quick one finds such pages.
+  for (const char* sql : {"PRAGMA quick_check", "PRAGMA integrity_check"}) {
+    if (!intact) break;
+    intact = false;
+    check([&] {
+      std::vector<std::string> lines = texts(sql);
+      intact = lines == std::vector<std::string>{"ok"};
+      for (std::string& line : lines) {
+        std::ranges::replace(line, '\n', ' ');
+        if (line != "ok") check([&] { fail_damaged(line); });
+      }
+    });
+  }
+  check([&] { static_cast<void>(last_id()); });
+  // From the table and from the index of the names: a view that either has lost is found in the
+  // other.
+  std::set<ViewId> views;
+  for (const char* sql : {"SELECT id FROM views NOT INDEXED ORDER BY id",
+                          "SELECT id FROM views INDEXED BY sqlite_autoindex_views_1"}) {
+    check([&] {
+      Statement ids(database_, sql);
+      while (ids.step()) views.insert(id_in(ids, 0));
+    });
+  }
+  return views;
+}
+
+MemoryFileInfo SqliteTables::info() {
+  const auto count = [&](const char* sql) {
+    return static_cast<std::uint64_t>(database_.integer(sql));
+  };
+  MemoryFileInfo info;
+  // A condition makes SQLite step through the rows, which is bounded, instead of counting the
+  // entries of pages, which is not.
+  info.views = count("SELECT count(*) FROM views WHERE id > 0");
+  info.views_with_position = count("SELECT count(x_m) FROM views WHERE id > 0");
+  info.views_with_heading = count("SELECT count(heading_rad) FROM views WHERE id > 0");
+  info.links = count("SELECT count(*) FROM links WHERE a > 0");
+  info.thumbnails = count("SELECT count(*) FROM thumbnails WHERE view > 0");
+  if (has_feature_table(database_)) {
+    info.views_with_features = count("SELECT count(*) FROM features WHERE view > 0");
+    info.feature_bytes =
+        count("SELECT coalesce(sum(length(features)), 0) FROM features WHERE view > 0");
+  }
+  if (has_chain_tables(database_)) {
+    info.unused_chains = count("SELECT count(*) FROM (SELECT 1 FROM chains LIMIT 1000000)");
+  }
+  if (has_map_table(database_)) info.maps = count("SELECT count(*) FROM maps WHERE name > ''");
+  if (has_route_tables(database_))
+    info.routes = count("SELECT count(*) FROM routes WHERE name > ''");
+  info.format_version = static_cast<int>(database_.integer("PRAGMA user_version"));
+  for (const char* suffix : {"", "-wal"}) {
+    std::filesystem::path file = database_.path();
+    file += suffix;
+    std::error_code missing;
+    const auto size = std::filesystem::file_size(file, missing);
+    if (!missing) info.file_bytes += size;
+  }
+  return info;
+}
+
+}  // namespace panonav

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "panonav/storage/checksum.hpp"
+#include "panonav/storage/internal/database.hpp"
+#include "panonav/storage/internal/memory_tables.hpp"
+
+namespace panonav {
+
+/// The tables of an SQLite file of a checked schema (memory_schema.hpp).
+class SqliteTables final : public MemoryTables {
+ public:
+  SqliteTables(std::filesystem::path path, Database database);
+
+  [[nodiscard]] const std::filesystem::path& path() const noexcept override { return path_; }
+  [[nodiscard]] const std::filesystem::path& place() const noexcept override {
+    return database_.path();
+  }
+  [[nodiscard]] std::unique_ptr<Transaction> transaction(Kind kind) override;
+
+  [[nodiscard]] Settings settings() override;
+  void write_setting(const std::string& key, const SettingValue& value) override;
+  void erase_setting(const std::string& key) override;
+
+  [[nodiscard]] std::uint32_t last_id() override;
+  void insert(std::span<const ViewId> ids, std::span<const NewView> views) override;
+  void require_views(std::span<const ViewId> views) override;
+  void remove(std::span<const ViewId> views) override;
+  void write_info(ViewId view, const ReferenceInfo& info, std::int64_t checksum) override;
+  void read_views(const Take<ViewRow>& take) override;
+  void read_views(std::span<const ViewId> views, const Take<ViewRow>& take) override;
+  [[nodiscard]] std::optional<ViewId> find(std::string_view name) override;
+  [[nodiscard]] std::vector<std::string> names() override;
+  [[nodiscard]] std::vector<ViewId> views() override;
+  [[nodiscard]] std::vector<ViewId> views_with(BesideViews table) override;
+  [[nodiscard]] std::optional<StoredBytes> bytes(BesideViews table, ViewId view) override;
+
+  void write_links(std::span<const Link> links) override;
+  void erase_link(ViewId a, ViewId b) override;
+  void read_links(const Take<LinkRow>& take) override;
+
+  void write_map(std::string_view name, const MapRow& row) override;
+  [[nodiscard]] std::optional<MapRow> map(std::string_view name) override;
+  void erase_map(std::string_view name) override;
+  [[nodiscard]] std::vector<std::string> map_names() override;
+
+  void write_route(std::string_view name, const RouteRow& row) override;
+  [[nodiscard]] std::optional<RouteRow> route(std::string_view name) override;
+  void erase_route(std::string_view name) override;
+  [[nodiscard]] std::vector<std::string> route_names() override;
+  void write_block(std::string_view route, std::int64_t number, std::span<const std::uint8_t> lines,
+                   std::int64_t checksum) override;
+  [[nodiscard]] std::optional<StoredBytes> block(std::string_view route,
+                                                 std::int64_t number) override;
+  [[nodiscard]] std::int64_t blocks(std::string_view route) override;
+  [[nodiscard]] std::int64_t route_bytes(std::string_view route) override;
+  [[nodiscard]] std::vector<std::string> routes_with_blocks() override;
+
+  void keep_for_undo(const std::function<void()>& changes, const std::string& what) override;
+  [[nodiscard]] std::optional<std::string> undoable() override;
+  void undo() override;
+
+  [[nodiscard]] std::set<ViewId> verify_structure(const Check& check) override;
+  [[nodiscard]] MemoryFileInfo info() override;
+
+ private:
+  [[nodiscard]] ViewId id_in(const Statement& row, int column) const;
+  [[nodiscard]] ViewRow view_in(const Statement& row) const;
+  void insert_beside(BesideViews table, ViewId view, std::span<const std::uint8_t> bytes);
+  /// Whether a file of this version has the table.
+  [[nodiscard]] bool has(BesideViews table);
+  [[nodiscard]] std::vector<std::string> texts(const char* sql);
+
+  std::filesystem::path path_;
+  Database database_;
+  std::vector<std::uint8_t> signature_;  // kept, as every view needs one
+  RecordBytes scratch_;
+  Statement insert_view_;
+  Statement find_name_;
+  Statement find_view_;
+};
+
+}  // namespace panonav
