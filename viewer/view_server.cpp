@@ -1,7 +1,5 @@
 #include "viewer/view_server.hpp"
 
-#include <arpa/inet.h>
-
 #include <algorithm>
 #include <atomic>
 #include <charconv>
@@ -22,7 +20,7 @@
 
 #include "panonav/core/text.hpp"
 #include "panonav/io/image_file.hpp"
-#include "viewer/http_server.hpp"
+#include "server/http_server.hpp"
 #include "viewer/moment_json.hpp"
 #include "viewer/page.hpp"
 
@@ -123,24 +121,6 @@ std::string event(const std::string& name, const std::string& data) {
   return "event: " + name + "\ndata: " + data + "\n\n";
 }
 
-/// A name server of somebody else's cannot have led here whoever asks for a number, or for this
-/// machine. `host`: with or without a port.
-bool is_own_host(std::string_view host) {
-  const std::string name(host.substr(0, host.rfind(':')));
-  in_addr ignored{};
-  return name == "localhost" || inet_pton(AF_INET, name.c_str(), &ignored) == 1;
-}
-
-/// Takes the same time wherever they differ.
-bool same_token(std::string_view given, std::string_view token) {
-  if (given.size() != token.size()) return false;
-  unsigned differing = 0;
-  for (std::size_t i = 0; i < token.size(); ++i) {
-    differing |= static_cast<unsigned char>(given[i]) ^ static_cast<unsigned char>(token[i]);
-  }
-  return differing == 0;
-}
-
 }  // namespace
 
 struct ViewServer::Implementation {
@@ -164,7 +144,7 @@ struct ViewServer::Implementation {
   [[nodiscard]] HttpAnswer answer(const HttpRequest& request) {
     const auto only = [](int status) { return HttpAnswer{.status = status}; };
     if (!request.path.starts_with('/') ||
-        !same_token(std::string_view(request.path).substr(1, token.size()), token) ||
+        !same_secret(std::string_view(request.path).substr(1, token.size()), token) ||
         !is_own_host(request.host) ||
         !(request.origin.empty() || request.origin == "http://" + request.host)) {
       return only(404);

@@ -20,16 +20,16 @@ namespace panonav {
 using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
-/// Somebody who connects to a server of this machine. Reads wait 2 s at most.
+/// Somebody who connects to a server of this machine. Reads wait `patience_s` at most.
 class Peer {
  public:
-  explicit Peer(const std::string& url) {
+  explicit Peer(const std::string& url, int patience_s = 2) {
     const std::size_t port_at = url.find(':', 7) + 1;
     const std::size_t slash = url.find('/', port_at);
     host_ = url.substr(7, slash - 7);
     root_ = url.substr(slash);
     socket_ = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    const timeval patience{2, 0};
+    const timeval patience{patience_s, 0};
     setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
     setsockopt(socket_, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof(patience));
     const int small = 65'536;  // what a slow reader has not read stays with the server
@@ -53,7 +53,7 @@ class Peer {
     return send(socket_, text.data(), text.size(), MSG_NOSIGNAL) ==
            static_cast<ssize_t>(text.size());
   }
-  /// One more piece; false at the end, or after 2 s without one.
+  /// One more piece; false at the end, or after `patience_s` without one.
   bool hear() {
     std::array<char, 65536> bytes;
     const ssize_t count = recv(socket_, bytes.data(), bytes.size(), 0);
@@ -73,6 +73,7 @@ class Peer {
     return heard_;
   }
   [[nodiscard]] const std::string& heard() const { return heard_; }
+  void forget() { heard_.clear(); }
 
   /// A request as a browser makes it, and the whole answer.
   std::string ask(const std::string& path, const std::string& more = "",

@@ -110,6 +110,19 @@ TEST(ViewServer, RefusesWhatIsTooLargeOrNoRequest) {
   EXPECT_EQ(status_of(ask(url, "")), 200);
 }
 
+TEST(ViewServer, ReadsNoMoreRequestsThanItCanAnswer) {
+  ViewServer server;
+  Peer greedy(server.url());
+  std::string requests;
+  for (int i = 0; i < 1'000; ++i) {
+    requests += "GET " + greedy.root() + " HTTP/1.1\r\nHost: localhost\r\n\r\n";
+  }
+  std::size_t sent = 0;  // and not one answer read
+  while (sent < 50'000'000 && greedy.say(requests)) sent += requests.size();
+  EXPECT_LT(sent, 20'000'000U);
+  EXPECT_EQ(status_of(ask(server.url(), "")), 200);
+}
+
 TEST(ViewServer, TellsEachMomentInOrder) {
   ViewServer server;
   Peer peer(server.url());

@@ -11,7 +11,7 @@ std::vector<Verb> all_verbs() {
       show_verb(),      gallery_verb(),      export_verb(),       convert_verb(),   verify_verb(),
       rename_verb(),    forget_verb(),       merge_verb(),        prune_verb(),     undo_verb(),
       localise_verb(),  track_verb(),        run_verb(),          map_verb(),       arrange_verb(),
-      home_verb(),      route_record_verb(), route_follow_verb(), ros2_verb(),
+      home_verb(),      route_record_verb(), route_follow_verb(), serve_verb(),     ros2_verb(),
 #ifdef PANONAV_COMMAND_SIMULATES
       navigate_verb(),  catchment_verb(),    evaluate_verb(),     reproduce_verb(),
 #endif

@@ -35,6 +35,7 @@ namespace panonav::command {
 [[nodiscard]] Verb ros2_verb();
 [[nodiscard]] Verb route_follow_verb();
 [[nodiscard]] Verb route_record_verb();
+[[nodiscard]] Verb serve_verb();
 [[nodiscard]] Verb show_verb();
 [[nodiscard]] Verb simulate_verb();
 [[nodiscard]] Verb track_verb();

@@ -2,36 +2,16 @@
 
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "server/place_json.hpp"
 
 namespace panonav::command {
 
 ordered_json as_json(const LocalisedQuery& answer, bool areas) {
   if (!answer.error.empty()) return {{"file", answer.file}, {"error", answer.error}};
   const Place& found = answer.place;
-  auto matches = ordered_json::array();
-  for (const PlaceMatch& match : found.matches) {
-    matches.push_back({{"file", match.name},
-                       {"dissimilarity", match.dissimilarity},
-                       {"column_difference", match.column_difference},
-                       {"heading_rad", or_null(match.heading_rad)}});
-    if (match.verified_features) {
-      matches.back()["verified_features"] = *match.verified_features;
-    }
-  }
-  ordered_json json{{"file", answer.file},
-                    {"known", found.known},
-                    {"known_probability", found.known_probability},
-                    {"matches", std::move(matches)},
-                    {"position", nullptr},
-                    {"heading_rad", or_null(found.heading_rad)},
-                    {"components", found.components},
-                    {"bytes_read", found.bytes_read},
-                    {"turned_rad", answer.turned_rad}};
-  if (found.position) {
-    json["position"] = {{"x_m", found.position->x_m},
-                        {"y_m", found.position->y_m},
-                        {"radius_m", or_null(found.position->radius_m)}};
-  }
+  ordered_json json{{"file", answer.file}};
+  json.update(place_json(found));
+  json["turned_rad"] = answer.turned_rad;
   if (areas) {
     auto levels = ordered_json::array();
     for (const auto& level : found.areas) {

@@ -1,8 +1,5 @@
 #include "verbs/run_record.hpp"
 
-#include <arpa/inet.h>
-
-#include <charconv>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -10,28 +7,11 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
+#include "verbs/listening_place.hpp"
 
 namespace panonav::command {
 
 namespace {
-
-/// "8080" and "192.168.1.5:8080".
-ViewServerOptions place_of(const std::string& text) {
-  ViewServerOptions options;
-  const std::size_t colon = text.rfind(':');
-  if (colon != std::string::npos) options.address = text.substr(0, colon);
-  const char* const from = text.data() + (colon == std::string::npos ? 0 : colon + 1);
-  const char* const to = text.data() + text.size();
-  const auto [end, error] = std::from_chars(from, to, options.port);
-  in_addr ignored{};
-  if (error != std::errc() || end != to || options.port < 0 || options.port > 65535 ||
-      inet_pton(AF_INET, options.address.c_str(), &ignored) != 1) {
-    throw UsageError("--view is " + readable_line(text) +
-                     "; allowed: a port, 0 to 65535, or an IPv4 address of this machine with a " +
-                     "port, such as 192.168.1.5:8080");
-  }
-  return options;
-}
 
 /// The thumbnails of a memory that may not be there yet, for one thread.
 std::function<std::vector<std::uint8_t>(const std::string&)> thumbnails_of(std::string memory) {
@@ -77,7 +57,10 @@ RunRecord::RunRecord(const RunRecordArguments& wanted, std::span<const std::stri
     recorder_.emplace(*wanted.file, RunRecorderOptions{.wait = !live});
   }
   if (wanted.view) {
-    ViewServerOptions options = place_of(*wanted.view);
+    const ListeningPlace place = listening_place("--view", *wanted.view);
+    ViewServerOptions options;
+    options.address = place.address;
+    options.port = place.port;
     options.title = "panonav: " + (read.empty() ? std::string() : read.front());
     options.replay = !live;
     options.takes = offers.takes;

@@ -1,4 +1,4 @@
-#include "viewer/http_server.hpp"
+#include "server/http_server.hpp"
 
 #include <arpa/inet.h>
 #include <fcntl.h>
@@ -35,7 +35,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t max_head = 8192;
-constexpr std::size_t max_body = 1024;
 constexpr std::size_t max_connections = 64;
 constexpr int send_buffer = 256 * 1024;
 constexpr auto patience = std::chrono::seconds(5);
@@ -76,12 +75,18 @@ std::string_view reason_of(int status) {
       return "No Content";
     case 400:
       return "Bad Request";
+    case 401:
+      return "Unauthorized";
+    case 403:
+      return "Forbidden";
     case 404:
       return "Not Found";
     case 405:
       return "Method Not Allowed";
     case 413:
       return "Content Too Large";
+    case 422:
+      return "Unprocessable Content";
     case 431:
       return "Request Header Fields Too Large";
     case 501:
@@ -97,11 +102,12 @@ std::string_view reason_of(int status) {
 struct Head {
   HttpRequest request;
   std::size_t body_size = 0;
-  bool keep = true;  ///< the connection
+  bool keep = true;       ///< the connection
+  bool expected = false;  ///< the client waits to be told that it may send the body
 };
 
 /// `status` says what is wrong where there is nothing to give.
-std::optional<Head> read_head(std::string_view text, int& status) {
+std::optional<Head> read_head(std::string_view text, std::size_t max_body, int& status) {
   status = 400;
   const auto next_line = [&text] {
     const std::size_t end = text.find("\r\n");
@@ -127,8 +133,10 @@ std::optional<Head> read_head(std::string_view text, int& status) {
     if (colon == 0 || colon == std::string_view::npos) return std::nullopt;
     const std::string name = lower(field.substr(0, colon));
     const std::string_view value = trimmed(field.substr(colon + 1));
-    if (name == "host" || name == "origin") {
-      std::string& kept = name == "host" ? head.request.host : head.request.origin;
+    if (name == "host" || name == "origin" || name == "authorization") {
+      std::string& kept = name == "host"     ? head.request.host
+                          : name == "origin" ? head.request.origin
+                                             : head.request.authorization;
       if (!kept.empty() || value.empty()) return std::nullopt;
       kept = value;
     } else if (name == "content-length") {
@@ -144,6 +152,8 @@ std::optional<Head> read_head(std::string_view text, int& status) {
       return std::nullopt;
     } else if (name == "connection" && lower(value) == "close") {
       head.keep = false;
+    } else if (name == "expect" && lower(value) == "100-continue") {
+      head.expected = true;
     }
   }
   if (head.request.host.empty()) return std::nullopt;
@@ -154,23 +164,46 @@ struct Connection {
   explicit Connection(Handle handle) : socket(std::move(handle)) {}
 
   Handle socket;
-  std::string in;  ///< not answered yet
+  std::string in;            ///< not answered yet
+  std::optional<Head> head;  ///< of the request whose body is on its way
   std::string out;
   std::size_t sent = 0;  ///< of `out`
   std::function<std::optional<std::string>()> more;
+  std::function<std::optional<HttpAnswer>()> later;
   bool trusted = false;  ///< got an answer below 400
   bool closing = false;  ///< once all is sent
   bool gone = false;
   Clock::time_point since = Clock::now();  ///< the last byte that went out, or request that began
 
   [[nodiscard]] bool pending() const { return sent < out.size(); }
+  /// What is behind is read when this is answered.
+  [[nodiscard]] std::size_t wanted_bytes() const { return max_head + (head ? head->body_size : 0); }
+  [[nodiscard]] Clock::duration allowed() const {
+    if (!pending() && in.empty() && !head && trusted) return idle_patience;
+    return patience + std::chrono::seconds(head ? head->body_size / 100'000 : 0);
+  }
 };
 
 }  // namespace
 
+bool is_own_host(std::string_view host) {
+  const std::string name(host.substr(0, host.rfind(':')));
+  in_addr ignored{};
+  return name == "localhost" || inet_pton(AF_INET, name.c_str(), &ignored) == 1;
+}
+
+bool same_secret(std::string_view given, std::string_view secret) {
+  if (given.size() != secret.size()) return false;
+  unsigned differing = 0;
+  for (std::size_t i = 0; i < secret.size(); ++i) {
+    differing |= static_cast<unsigned char>(given[i]) ^ static_cast<unsigned char>(secret[i]);
+  }
+  return differing == 0;
+}
+
 struct HttpServer::Implementation {
-  Implementation(const HttpServerOptions& options, Handler answer_to)
-      : headers(options.headers),
+  Implementation(const HttpServerOptions& wanted, Handler answer_to)
+      : options(wanted),
         handler(std::move(answer_to)),
         listener(socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0)),
         wake(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
@@ -214,13 +247,14 @@ struct HttpServer::Implementation {
   void serve() {
     std::vector<pollfd> waiting;
     Clock::time_point accept_from{};
-    while (!ended) {
-      const bool accepting = Clock::now() >= accept_from;
+    while (!ended || has_last_answers()) {
+      const bool accepting = !ended && Clock::now() >= accept_from;
       waiting.clear();
       waiting.push_back({wake.number(), POLLIN, 0});
       waiting.push_back({accepting ? listener.number() : -1, POLLIN, 0});
       for (const Connection& connection : connections) {
-        const int events = POLLIN | (connection.pending() ? POLLOUT : 0);
+        const bool reading = connection.in.size() <= connection.wanted_bytes();
+        const int events = (reading ? POLLIN : 0) | (connection.pending() ? POLLOUT : 0);
         waiting.push_back({connection.socket.number(), static_cast<short>(events), 0});
       }
       poll(waiting.data(), waiting.size(), accepting ? 500 : 50);
@@ -230,12 +264,11 @@ struct HttpServer::Implementation {
       for (Connection& connection : connections) {
         const short events = waiting[i++].revents;
         if ((events & POLLIN) != 0) receive(connection);
-        if ((events & (POLLERR | POLLNVAL)) != 0) connection.gone = true;
+        if ((events & (POLLERR | POLLNVAL | POLLHUP)) != 0) connection.gone = true;
         answer_requests(connection);
         send_pending(connection);
-        const bool idle = !connection.pending() && connection.in.empty();
-        const auto allowed = idle && connection.trusted ? idle_patience : patience;
-        if (!(idle && connection.more) && Clock::now() - connection.since > allowed) {
+        const bool waits = (connection.more || connection.later) && !connection.pending();
+        if (!waits && Clock::now() - connection.since > connection.allowed()) {
           connection.gone = true;
         }
       }
@@ -279,40 +312,82 @@ struct HttpServer::Implementation {
         return;
       }
       if (connection.more || connection.closing) continue;  // nothing is to be said any more
-      if (connection.in.empty()) connection.since = Clock::now();
+      if (connection.in.empty() && !connection.head) connection.since = Clock::now();
       connection.in.append(bytes.data(), static_cast<std::size_t>(count));
-      // What is behind is read when this is answered.
-      if (connection.in.size() > max_head + max_body) return;
+      if (connection.in.size() > connection.wanted_bytes()) return;
     }
   }
 
   void answer_requests(Connection& connection) {
-    while (!connection.gone && !connection.closing && !connection.more && !connection.pending()) {
-      const std::size_t end = connection.in.find("\r\n\r\n");
-      if (std::min(end, connection.in.size()) > max_head) {
-        refuse(connection, 431);
+    if (connection.later && !connection.gone) {
+      if (auto answer = connection.later()) {
+        connection.later = nullptr;
+        put(connection, std::move(*answer));
+        send_pending(connection);
+      }
+    }
+    while (!connection.gone && !connection.closing && !connection.more && !connection.later &&
+           !connection.pending()) {
+      if (!connection.head && !take_head(connection)) return;
+      Head& head = *connection.head;
+      if (connection.in.size() < head.body_size) {
+        if (std::exchange(head.expected, false)) {
+          connection.out = "HTTP/1.1 100 Continue\r\n\r\n";
+          connection.sent = 0;
+          send_pending(connection);
+        }
         return;
       }
-      if (end == std::string::npos) return;
-      int status = 0;
-      auto head = read_head(std::string_view(connection.in).substr(0, end), status);
-      if (!head) {
-        refuse(connection, status);
-        return;
-      }
-      if (connection.in.size() < end + 4 + head->body_size) return;
-      head->request.body = connection.in.substr(end + 4, head->body_size);
-      connection.in.erase(0, end + 4 + head->body_size);
-      connection.closing = !head->keep;
+      head.request.body = connection.in.substr(0, head.body_size);
+      connection.in.erase(0, head.body_size);
+      connection.closing = !head.keep;
       HttpAnswer answer;
       try {
-        answer = handler(head->request);
+        answer = handler(head.request);
       } catch (const std::exception&) {
         answer = {.status = 500};
+      }
+      connection.head.reset();
+      if (answer.later) {
+        connection.later = std::move(answer.later);
+        return answer_requests(connection);  // it may be there already
       }
       put(connection, std::move(answer));
       send_pending(connection);
     }
+  }
+
+  /// False where it has not come yet, and where the request is refused.
+  bool take_head(Connection& connection) {
+    const std::size_t end = connection.in.find("\r\n\r\n");
+    if (std::min(end, connection.in.size()) > max_head) {
+      refuse(connection, 431);
+      return false;
+    }
+    if (end == std::string::npos) return false;
+    int status = 0;
+    auto head = read_head(std::string_view(connection.in).substr(0, end), options.max_body, status);
+    if (!head) {
+      refuse(connection, status);
+      return false;
+    }
+    std::size_t bodies = head->body_size;
+    for (const Connection& other : connections) bodies += other.head ? other.head->body_size : 0;
+    if (bodies > std::max(options.max_bodies, options.max_body)) {
+      refuse(connection, 503);
+      return false;
+    }
+    connection.in.erase(0, end + 4);
+    connection.head = std::move(head);
+    return true;
+  }
+
+  /// Whether answers are on their way for whom the end may wait.
+  bool has_last_answers() {
+    if (!last) last = Clock::now() + options.last_answers;
+    return Clock::now() < *last && std::ranges::any_of(connections, [](const Connection& one) {
+             return one.later || (one.pending() && !one.more);
+           });
   }
 
   void refuse(Connection& connection, int status) const {
@@ -332,7 +407,7 @@ struct HttpServer::Implementation {
     }
     connection.more = std::move(answer.more);
     connection.out = "HTTP/1.1 " + std::to_string(answer.status) + " " +
-                     std::string(reason_of(answer.status)) + "\r\n" + headers;
+                     std::string(reason_of(answer.status)) + "\r\n" + options.headers;
     if (answer.status != 204) connection.out += "Content-Type: " + answer.type + "\r\n";
     if (!connection.more && answer.status != 204) {
       connection.out += "Content-Length: " + std::to_string(answer.content.size()) + "\r\n";
@@ -358,7 +433,7 @@ struct HttpServer::Implementation {
           }
         }
         if (!connection.pending()) {
-          if (connection.closing) connection.gone = true;
+          if (connection.closing && !connection.later) connection.gone = true;
           return;
         }
       }
@@ -374,13 +449,14 @@ struct HttpServer::Implementation {
     }
   }
 
-  const std::string headers;
+  const HttpServerOptions options;
   const Handler handler;
   const Handle listener;
   const Handle wake;
   int port = 0;
   std::list<Connection> connections;  // of the thread; the oldest first
   std::atomic<bool> ended = false;
+  std::optional<Clock::time_point> last;  // of the thread
   std::thread thread;
 };
 

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace panonav::command {
+
+/// Where a server of this program listens.
+struct ListeningPlace {
+  std::string address = "127.0.0.1";
+  int port = 0;
+};
+
+/// Of "8080" or "192.168.1.5:8080". Throws UsageError, which names the flag.
+[[nodiscard]] ListeningPlace listening_place(std::string_view flag, const std::string& text);
+
+}  // namespace panonav::command

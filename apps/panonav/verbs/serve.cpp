@@ -1,0 +1,130 @@
+#include <algorithm>
+#include <condition_variable>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "cli/arguments.hpp"
+#include "cli/json.hpp"
+#include "cli/session.hpp"
+#include "cli/stop_signals.hpp"
+#include "cli/verbs.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
+#include "server/localisation_server.hpp"
+#include "verbs/listening_place.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+struct ServeArguments {
+  std::vector<std::string> memories;
+  std::string listen = "8080";
+  std::optional<std::string> token_file;
+  int max_waiting = 64;
+  LocaliserOptions localiser;
+};
+
+/// "office=/data/monday.panonav", or a file that gives its own name.
+ServedMemory served_memory(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  const bool named = equals != std::string::npos && text.find('/') > equals;
+  if (named) return {text.substr(0, equals), text.substr(equals + 1)};
+  return {std::filesystem::path(text).stem().string(), text};
+}
+
+/// The first line of the file.
+std::string read_token(const std::string& path) {
+  std::ifstream file(path);
+  if (!file) throw FileError(path, "no such file, or it cannot be opened");
+  std::string token(1026, '\0');
+  file.read(token.data(), static_cast<std::streamsize>(token.size()));
+  if (file.bad() || (file.fail() && !file.eof())) throw FileError(path, "it cannot be read");
+  token.resize(static_cast<std::size_t>(file.gcount()));
+  token.resize(std::min(token.find_first_of("\r\n"), token.size()));
+  const bool fits = token.size() >= 16 && token.size() <= 1024 &&
+                    std::ranges::all_of(token, [](char c) { return c > ' ' && c <= '~'; });
+  if (!fits) {
+    throw FileError(path,
+                    "its first line is no token; allowed: 16 to 1024 visible characters of "
+                    "ASCII without blanks");
+  }
+  return token;
+}
+
+ExitCode serve(const ServeArguments& wanted, Session& session) {
+  std::mutex mutex;
+  std::condition_variable asked;
+  bool stopped = false;
+  const StopSignals signals([&] {
+    const std::lock_guard lock(mutex);
+    stopped = true;
+    asked.notify_all();
+  });
+  const ListeningPlace place = listening_place("--listen", wanted.listen);
+  LocalisationServerOptions options;
+  options.address = place.address;
+  options.port = place.port;
+  options.threads = session.executor().threads();
+  options.max_waiting = static_cast<std::size_t>(wanted.max_waiting);
+  if (wanted.token_file) options.token = read_token(*wanted.token_file);
+  options.localiser = wanted.localiser;
+  options.note = [&](const std::string& line) {
+    const std::lock_guard lock(mutex);
+    session.note(line);
+  };
+  std::vector<ServedMemory> memories;
+  for (const std::string& memory : wanted.memories) memories.push_back(served_memory(memory));
+  const LocalisationServer server(memories, options);
+  std::unique_lock lock(mutex);
+  if (session.json()) {
+    session.print(json_line({{"url", server.url()}}));
+  } else {
+    session.print(session.strong("serving at " + server.url()) + "; Ctrl-C ends it");
+    session.suggest({"curl", "--data-binary", "@view.jpg",
+                     server.url() + "/v1/memories/" + memories.front().name + "/localise"},
+                    "Try:");
+  }
+  session.flush();
+  asked.wait(lock, [&] { return stopped; });
+  return ExitCode::done;
+}
+
+Run declare_serve(Arguments& arguments) {
+  auto wanted = std::make_shared<ServeArguments>();
+  arguments.positionals("MEMORY", wanted->memories,
+                        "Memory files, known to clients by their names without .panonav, or "
+                        "NAME=FILE");
+  arguments.option("--listen PORT", wanted->listen,
+                   "Port for programs of this machine (0: a free one); ADDRESS:PORT serves the "
+                   "network of that address, too");
+  arguments.option("--token-file FILE", wanted->token_file,
+                   "Answer only clients that send the first line of this file as bearer token");
+  arguments.option("--max-waiting", wanted->max_waiting, 1,
+                   "Pictures that may wait for a thread; clients of further ones are told to try "
+                   "again");
+  arguments.options("localiser", wanted->localiser);
+  arguments.common({"--top"});
+  return [wanted](Session& session) { return serve(*wanted, session); };
+}
+
+}  // namespace
+
+Verb serve_verb() {
+  return {
+      "serve", "Answer over HTTP where pictures were taken",
+      "Clients POST a PNG or JPEG to /v1/memories/NAME/localise and get the JSON of localise.\n"
+      "GET /v1/memories lists the memories, /health tells whether the server is ready, /metrics "
+      "is\n"
+      "for Prometheus. A memory whose file changes is read again. There is no encryption: put a\n"
+      "proxy that has it before a server that others than you can reach.",
+      "  panonav serve office.panonav\n"
+      "  panonav serve office.panonav hall=monday.panonav --listen 8090\n"
+      "  panonav serve office.panonav --listen 0.0.0.0:8080 --token-file token.txt",
+      declare_serve};
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,282 @@
+#include "server/localisation_server.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav/pipeline/memoriser.hpp"
+#include "panonav/pipeline/place_recogniser.hpp"
+#include "server/place_json.hpp"
+#include "support/landmark_pictures.hpp"
+#include "support/temporary_folder.hpp"
+#include "support/viewer_peer.hpp"
+
+namespace panonav::testing {
+namespace {
+
+std::string png_of(const Image& image) {
+  const auto bytes = encode_png(image.view());
+  return {bytes.begin(), bytes.end()};
+}
+
+std::string picture_at(const ToyWorld& world, const Pose2& pose) {
+  return png_of(world.picture(pose, 96, 12));
+}
+
+void memorise(const std::filesystem::path& path, const ToyWorld& world, std::size_t from,
+              std::size_t to) {
+  PictureSource source;
+  source.layout.elevations = ElevationBand{radians(-20.0), radians(20.0)};
+  Memoriser memoriser(path, {.source = source});
+  const auto poses = grid_poses(8);
+  for (std::size_t i = from; i < to; ++i) {
+    Observation seen(world.picture(poses[i], 96, 12));
+    seen.name = "a view/" + std::to_string(i);
+    seen.pose = ReferencePose{poses[i].x_m, poses[i].y_m, poses[i].heading_rad};
+    memoriser.add(std::move(seen));
+  }
+  memoriser.finish();
+}
+
+/// A memory of 40 views of a world, and a server of it.
+class LocalisationServerTest : public ::testing::Test {
+ protected:
+  LocalisationServerTest() { memorise(folder_ / "hall.panonav", world_, 0, 40); }
+
+  std::vector<ServedMemory> hall() const { return {{"hall", folder_ / "hall.panonav"}}; }
+
+  static std::string get(const LocalisationServer& server, const std::string& path,
+                         const std::string& more = "", const std::string& method = "GET",
+                         const std::string& body = "") {
+    return Peer(server.url() + "/", 60).ask(path, more, method, body);
+  }
+  static json body_of(const std::string& answer) {
+    return json::parse(answer.substr(std::min(answer.find("\r\n\r\n"), answer.size())));
+  }
+  std::string localise(const LocalisationServer& server, const std::string& picture,
+                       const std::string& more = "") const {
+    return get(server, "/v1/memories/hall/localise", more, "POST", picture);
+  }
+
+  const TemporaryFolder folder_;
+  const ToyWorld world_ = landmark_world(5);
+};
+
+TEST_F(LocalisationServerTest, AnswersAsThePlaceRecogniserDoes) {
+  const LocalisationServer server(hall(), {});
+  const PlaceRecogniser recogniser(folder_ / "hall.panonav");
+  for (const Pose2& pose : {Pose2{0.3, 0.8, 1.0}, Pose2{2.2, 1.1, -2.0}, Pose2{50.0, 60.0, 0.0}}) {
+    const std::string picture = picture_at(world_, pose);
+    nlohmann::ordered_json expected{{"memory", "hall"}};
+    expected.update(place_json(recogniser.localise(decode_image(
+        std::span(reinterpret_cast<const std::uint8_t*>(picture.data()), picture.size()), "it"))));
+    const std::string answer = localise(server, picture);
+    EXPECT_EQ(status_of(answer), 200);
+    EXPECT_EQ(answer.substr(answer.find("\r\n\r\n") + 4), expected.dump() + "\n");
+  }
+}
+
+TEST_F(LocalisationServerTest, TellsWhatThereIs) {
+  const LocalisationServer server(hall(), {});
+  EXPECT_EQ(body_of(get(server, "/health")), json::parse(R"({"status": "ok"})"));
+  const json listed = body_of(get(server, "/v1/memories"));
+  ASSERT_EQ(listed["memories"].size(), 1U);
+  EXPECT_EQ(listed["memories"][0]["name"], "hall");
+  EXPECT_EQ(listed["memories"][0]["views"], 40);
+  EXPECT_EQ(body_of(get(server, "/v1/memories/hall")), listed["memories"][0]);
+  const std::string picture = get(server, "/v1/memories/hall/views/a%20view%2F7/picture");
+  EXPECT_EQ(status_of(picture), 200);
+  EXPECT_NE(picture.find("Content-Type: image/png\r\n"), std::string::npos);
+  EXPECT_EQ(picture.substr(picture.find("\r\n\r\n") + 5, 3), "PNG");
+  for (const std::string path :
+       {"/v1/memories/hall/views/a view/picture", "/v1/memories/hall/views/%zz/picture",
+        "/v1/memories/hall/views/%2/picture", "/v1/memories/hall/views//picture",
+        "/v1/memories/hall/views/picture", "/v1/memories/cellar", "/v1/memories/", "/v1",
+        "/v1/memories/hall/../hall", "/v1/memorieshall", "/v1/memories/hall/localise/"}) {
+    const std::string answer = get(server, path);
+    EXPECT_EQ(status_of(answer), 404) << path;
+  }
+  EXPECT_EQ(status_of(get(server, "/v1/memories/hall/localise")), 405);
+  EXPECT_EQ(status_of(get(server, "/v1/memories", "", "DELETE")), 405);
+}
+
+TEST_F(LocalisationServerTest, RefusesWhatIsNoPictureAndGoesOn) {
+  const LocalisationServer server(hall(), {.threads = 1});
+  const std::string good = picture_at(world_, {1.0, 1.0, 0.0});
+  std::string large(2'000'000, 'x');
+  for (const std::string& bad :
+       {std::string("no picture"), std::string(1, '\0'), good.substr(0, good.size() / 2),
+        "\x89PNG\r\n\x1a\n" + std::string(100, '\xff'), large}) {
+    const std::string answer = localise(server, bad);
+    EXPECT_EQ(status_of(answer), 422);
+    EXPECT_FALSE(body_of(answer)["error"].get<std::string>().empty());
+  }
+  // A picture of another shape does not fit the memory.
+  EXPECT_EQ(status_of(localise(server, png_of(Image(50, 40, 1)))), 422);
+  EXPECT_EQ(status_of(get(server, "/v1/memories/hall/localise", "", "POST")), 422);
+  EXPECT_EQ(status_of(localise(server, good)), 200);
+  const std::string metrics = get(server, "/metrics");
+  EXPECT_NE(metrics.find("\npanonav_refused_total{status=\"422\"} 7\n"), std::string::npos);
+  EXPECT_NE(metrics.find("{memory=\"hall\",answer=\"known\"} 1\n"), std::string::npos);
+  EXPECT_NE(metrics.find("\npanonav_localisation_seconds_bucket{le=\"+Inf\"} 1\n"),
+            std::string::npos);
+  EXPECT_NE(metrics.find("\npanonav_memory_views{memory=\"hall\"} 40\n"), std::string::npos);
+  Peer peer(server.url() + "/", 60);
+  peer.say("POST /v1/memories/hall/localise HTTP/1.1\r\nHost: localhost\r\nContent-Length: " +
+           std::to_string((16 << 20) + 1) + "\r\n\r\n");
+  EXPECT_EQ(status_of(peer.hear_all()), 413);
+}
+
+TEST_F(LocalisationServerTest, LetsAClientAskBeforeItSendsAPicture) {
+  const LocalisationServer server(hall(), {});
+  const std::string picture = picture_at(world_, {1.0, 1.0, 0.0});
+  Peer peer(server.url() + "/", 60);
+  for (int times = 0; times < 2; ++times) {  // over one connection
+    peer.say("POST /v1/memories/hall/localise HTTP/1.1\r\nHost: localhost\r\nExpect: " +
+             std::string("100-continue\r\nContent-Length: ") + std::to_string(picture.size()) +
+             "\r\n\r\n");
+    ASSERT_TRUE(peer.hear_until("HTTP/1.1 100 Continue\r\n\r\n"));
+    peer.say(picture);
+    ASSERT_TRUE(peer.hear_until("\"memory\":\"hall\""));
+    ASSERT_TRUE(peer.hear_until("}\n"));
+    peer.forget();
+  }
+}
+
+TEST_F(LocalisationServerTest, ManyClientsAtOnceGetTheirOwnAnswers) {
+  const LocalisationServer server(hall(), {.threads = 2});
+  const auto poses = grid_poses(8);
+  std::vector<std::string> names(24);
+  std::vector<std::thread> clients;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    clients.emplace_back([&, i] {
+      const std::string answer = localise(server, picture_at(world_, poses[i]));
+      if (status_of(answer) == 200) names[i] = body_of(answer)["matches"][0]["file"];
+    });
+  }
+  for (std::thread& client : clients) client.join();
+  for (std::size_t i = 0; i < names.size(); ++i) EXPECT_EQ(names[i], "a view/" + std::to_string(i));
+}
+
+TEST_F(LocalisationServerTest, TheQueueIsBoundedAndWhoHasGoneIsNotAnswered) {
+  // One thread is kept busy by large pictures, whose decoding takes a while.
+  const LocalisationServer server(hall(), {.threads = 1, .max_waiting = 2});
+  const std::string slow = png_of(Image(4096, 512, 3));
+  const std::string head =
+      "POST /v1/memories/hall/localise HTTP/1.1\r\nHost: localhost\r\nContent-Length: " +
+      std::to_string(slow.size()) + "\r\n\r\n";
+  std::vector<std::unique_ptr<Peer>> peers;
+  for (int i = 0; i < 20; ++i) {
+    peers.push_back(std::make_unique<Peer>(server.url() + "/", 60));
+    peers.back()->say(head + slow);
+  }
+  int busy = 0;
+  int answered = 0;
+  for (std::size_t i = 0; i < peers.size(); ++i) {
+    if (i % 4 == 3) continue;  // these go without an answer
+    ASSERT_TRUE(peers[i]->hear_until("}\n"));
+    const int status = status_of(peers[i]->heard());
+    busy += status == 503 ? 1 : 0;
+    answered += status == 422 ? 1 : 0;  // they do not fit the memory
+  }
+  EXPECT_EQ(busy + answered, 15);
+  EXPECT_GE(answered, 1);
+  peers.clear();
+  EXPECT_EQ(status_of(localise(server, picture_at(world_, {1.0, 1.0, 0.0}))), 200);
+}
+
+TEST_F(LocalisationServerTest, AsksForTheTokenWhereThereIsOne) {
+  const LocalisationServer server(hall(), {.token = "0123456789abcdef"});
+  EXPECT_EQ(status_of(get(server, "/health")), 200);  // for load balancers
+  for (const std::string more :
+       {"", "Authorization: Bearer 0123456789abcdee\r\n", "Authorization: 0123456789abcdef\r\n",
+        "Authorization: Bearer \r\n", "Authorization: Basic 0123456789abcdef\r\n"}) {
+    EXPECT_EQ(status_of(get(server, "/v1/memories", more)), 401) << more;
+    EXPECT_EQ(status_of(get(server, "/metrics", more)), 401) << more;
+    EXPECT_EQ(status_of(localise(server, "x", more)), 401) << more;
+  }
+  const std::string token = "Authorization: Bearer 0123456789abcdef\r\n";
+  EXPECT_EQ(status_of(get(server, "/v1/memories", token)), 200);
+  // Then a proxy may call it by any name.
+  Peer peer(server.url() + "/", 60);
+  peer.say("GET /v1/memories HTTP/1.1\r\nHost: panonav.example\r\n" + token +
+           "Connection: close\r\n\r\n");
+  EXPECT_EQ(status_of(peer.hear_all()), 200);
+}
+
+TEST_F(LocalisationServerTest, WithoutATokenPagesOfOthersGetNothing) {
+  const LocalisationServer server(hall(), {});
+  const auto answer = [&](const std::string& host, const std::string& origin) {
+    Peer peer(server.url() + "/", 60);
+    peer.say("GET /v1/memories HTTP/1.1\r\nHost: " + host + "\r\nConnection: close\r\n" +
+             (origin.empty() ? "" : "Origin: " + origin + "\r\n") + "\r\n");
+    return status_of(peer.hear_all());
+  };
+  EXPECT_EQ(answer("localhost", ""), 200);
+  EXPECT_EQ(answer("localhost", "http://localhost"), 200);
+  EXPECT_EQ(answer("localhost", "http://example.com"), 403);
+  EXPECT_EQ(answer("example.com", ""), 403);
+}
+
+TEST_F(LocalisationServerTest, ReadsAChangedMemoryAgain) {
+  std::vector<std::string> notes;
+  std::mutex mutex;
+  const LocalisationServer server(
+      hall(), {.look_every = std::chrono::milliseconds(20), .note = [&](const std::string& line) {
+                 const std::lock_guard lock(mutex);
+                 notes.push_back(line);
+               }});
+  const auto views = [&] { return body_of(get(server, "/v1/memories/hall"))["views"]; };
+  EXPECT_EQ(views(), 40);
+  memorise(folder_ / "hall.panonav", world_, 40, 64);
+  EXPECT_TRUE(within(std::chrono::seconds(60), [&] { return views() == 64; }));
+  // What cannot be read any more is served as it was.
+  std::filesystem::remove(folder_ / "hall.panonav");
+  std::ofstream(folder_ / "hall.panonav") << "no memory";
+  EXPECT_TRUE(within(std::chrono::seconds(60), [&] {
+    const std::lock_guard lock(mutex);
+    return !notes.empty() && notes.back().find("cannot be read") != std::string::npos;
+  }));
+  EXPECT_EQ(views(), 64);
+  EXPECT_EQ(status_of(localise(server, picture_at(world_, {1.0, 1.0, 0.0}))), 200);
+}
+
+TEST_F(LocalisationServerTest, RefusesOptionsOutOfRange) {
+  const auto path = folder_ / "hall.panonav";
+  EXPECT_THROW(LocalisationServer({}, {}), ContractError);
+  for (const std::string name : {"", "a/b", "a b", "\"", "ä"}) {
+    const std::vector<ServedMemory> memories{{name, path}};
+    EXPECT_THROW(LocalisationServer(memories, {}), ContractError) << name;
+  }
+  const std::vector<ServedMemory> twice{{"a", path}, {"a", path}};
+  EXPECT_THROW(LocalisationServer(twice, {}), ContractError);
+  const std::vector<ServedMemory> missing{{"a", folder_ / "none.panonav"}};
+  EXPECT_THROW(LocalisationServer(missing, {}), FileError);
+  EXPECT_THROW(LocalisationServer(hall(), {.max_waiting = 0}), ContractError);
+  EXPECT_THROW(LocalisationServer(hall(), {.threads = -1}), ContractError);
+  EXPECT_THROW(LocalisationServer(hall(), {.port = 65536}), ContractError);
+}
+
+TEST_F(LocalisationServerTest, WhoWaitsAtTheEndIsAnswered) {
+  std::optional<Peer> peer;
+  {
+    const LocalisationServer server(hall(), {.threads = 1});
+    peer.emplace(server.url() + "/", 60);
+    const std::string picture = picture_at(world_, {1.0, 1.0, 0.0});
+    peer->say("POST /v1/memories/hall/localise HTTP/1.1\r\nHost: localhost\r\nContent-Length: " +
+              std::to_string(picture.size()) + "\r\n\r\n" + picture);
+    ASSERT_TRUE(within(std::chrono::seconds(20), [&] {
+      return get(server, "/metrics").find("panonav_waiting_seconds_count 1\n") != std::string::npos;
+    }));
+  }
+  EXPECT_EQ(status_of(peer->hear_all()), 200);
+}
+
+}  // namespace
+}  // namespace panonav::testing
