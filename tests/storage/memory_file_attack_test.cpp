@@ -4,7 +4,7 @@
 #include <zlib.h>
 
 #include <array>
-#include <chrono>
+#include <ctime>
 #include <functional>
 #include <map>
 
@@ -189,7 +189,7 @@ TEST_F(MemoryFileAttack, IsNamed) {
     SCOPED_TRACE(entry.sql.substr(0, 100));
     const auto copy = folder.write("attacked.panonav", whole);
     attack(copy, entry.sql);
-    const auto start = std::chrono::steady_clock::now();
+    const std::clock_t start = std::clock();
     const std::string fault = fault_of(copy);
     EXPECT_TRUE(contains(fault, entry.fault));
     EXPECT_EQ(fault.find('\n'), std::string::npos);
@@ -204,7 +204,7 @@ TEST_F(MemoryFileAttack, IsNamed) {
       } catch (const FileError&) {
       }
     }
-    EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5));
+    EXPECT_LT(std::clock() - start, 60 * CLOCKS_PER_SEC);
   }
 }
 
@@ -275,14 +275,15 @@ TEST_F(MemoryFileAttack, TablesWithoutEndAreFoundInTime) {
             file.append(random_view(random, file.header().shape, 1000));
           }}}};
     for (const auto& [what, use] : uses) {
-      const auto start = std::chrono::steady_clock::now();
+      const std::clock_t start = std::clock();
       try {
         MemoryFile file = MemoryFile::open(copy, Access::read_write);
         use(file);
       } catch (const FileError& error) {
         EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
       }
-      EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5)) << what;
+      // To read all of it takes years; emulated processors are slow.
+      EXPECT_LT(std::clock() - start, 60 * CLOCKS_PER_SEC) << what;
       folder.write("endless.panonav", with_endless_table(whole, root));
       for (const char* suffix : {"-wal", "-shm"}) std::filesystem::remove(copy.string() + suffix);
     }
