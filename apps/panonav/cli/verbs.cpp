@@ -15,7 +15,7 @@ std::vector<Verb> all_verbs() {
 #ifdef PANONAV_COMMAND_SIMULATES
       navigate_verb(),  catchment_verb(),    evaluate_verb(),     reproduce_verb(),
 #endif
-      help_verb(),      completion_verb(),   man_verb(),
+      sweep_verb(),     help_verb(),         completion_verb(),   man_verb(),
   };
 }
 

@@ -38,6 +38,7 @@ namespace panonav::command {
 [[nodiscard]] Verb serve_verb();
 [[nodiscard]] Verb show_verb();
 [[nodiscard]] Verb simulate_verb();
+[[nodiscard]] Verb sweep_verb();
 [[nodiscard]] Verb track_verb();
 [[nodiscard]] Verb run_verb();
 [[nodiscard]] Verb undo_verb();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <system_error>
+#include <vector>
 
 #include "cli/json.hpp"
 #include "cli/session.hpp"
@@ -10,6 +11,7 @@
 #include "panonav/io/atomic_file.hpp"
 #include "reporting/results_document.hpp"
 #include "reports/results_page.hpp"
+#include "verbs/shared_jobs.hpp"
 
 namespace panonav::command {
 
@@ -120,37 +122,49 @@ ExitCode reproduce_all(const ReproduceArguments& wanted, Session& session) {
   check_scenes(wanted);  // before anything of an earlier run is removed
   const fs::path out(wanted.out.value_or("reproduction"));
   const ordered_json record = run_record(wanted);
-  if (wanted.continues) {
-    require_same_run(out, record);
-  } else {
-    std::error_code error;
-    fs::create_directories(out, error);
-    if (error) throw FileError(out.string(), "cannot be made: " + error.message());
+  const auto papers = reproduced_papers();
+  SharedJobs shared(out, wanted.continues, [&](bool first) {
+    if (!first) require_same_run(out, record);
+    remove_file(out / results_file);
+    if (!first) return;
     // Nothing of an earlier run may be taken for a part of this one.
-    for (const ReproducedPaper& paper : reproduced_papers()) {
-      remove_file(out / paper.name / results_file);
-    }
+    for (const ReproducedPaper& paper : papers) remove_file(out / paper.name / results_file);
     write_file(out / run_file, record.dump(1) + "\n");
-  }
-  remove_file(out / results_file);
+  });
 
+  const auto is_done = [&](const ReproducedPaper& paper) {
+    return fs::exists(out / paper.name / results_file);
+  };
+  const auto tell = [&](const ReproducedPaper& paper, const std::vector<ResultRow>& rows,
+                        std::string_view how) {
+    if (session.json()) return;
+    const TargetCount count = count_targets(rows);
+    session.print("  " + session.strong(paper.name) + ": " + std::to_string(count.held) + " of " +
+                  std::to_string(count.judged) + " targets hold" + std::string(how));
+  };
+  std::vector<bool> told(papers.size());
+  for (std::size_t i = 0; i < papers.size(); ++i) {
+    if (is_done(papers[i]) || !shared.claim(i)) continue;
+    if (!is_done(papers[i])) {  // nobody finished it meanwhile
+      tell(papers[i],
+           reproduce_paper(papers[i], wanted_of(papers[i], wanted), out / papers[i].name, session)
+               .rows,
+           "");
+      told[i] = true;
+    }
+    shared.release(i);
+  }
   ResultsDocument document{
       .version = PANONAV_VERSION, .command = command_line(wanted), .papers = {}};
-  for (const ReproducedPaper& paper : reproduced_papers()) {
-    PaperResults results{std::string(paper.name), std::string(paper.title), {}};
-    const fs::path folder = out / paper.name;
-    const bool done = fs::exists(folder / results_file);
-    if (done) {
-      results.rows = from_json(text_of(folder / results_file), (folder / results_file).string());
-    } else {
-      results.rows = reproduce_paper(paper, wanted_of(paper, wanted), folder, session).rows;
+  for (std::size_t i = 0; i < papers.size(); ++i) {
+    const fs::path file = out / papers[i].name / results_file;
+    if (!fs::exists(file)) {
+      session.note("other processes finish the rest");
+      return ExitCode::done;
     }
-    if (!session.json()) {
-      const TargetCount count = count_targets(results.rows);
-      session.print("  " + session.strong(paper.name) + ": " + std::to_string(count.held) + " of " +
-                    std::to_string(count.judged) + " targets hold" +
-                    (done ? " (finished by an earlier run)" : ""));
-    }
+    PaperResults results{std::string(papers[i].name), std::string(papers[i].title),
+                         from_json(text_of(file), file.string())};
+    if (!told[i]) tell(papers[i], results.rows, " (finished by another run)");
     document.papers.push_back(std::move(results));
   }
   const std::string json = to_json(document);

@@ -13,8 +13,8 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/io/camera_file.hpp"
+#include "panonav/io/csv_table.hpp"
 #include "panonav/io/image_file.hpp"
-#include "panonav/io/internal/csv_table.hpp"
 #include "panonav/io/toml_fields.hpp"
 
 namespace panonav {
