@@ -84,10 +84,10 @@ FileState state_of(const std::filesystem::path& path) {
   const std::array files{path, std::filesystem::path(path.native() + "-wal")};
   for (std::size_t i = 0; i < files.size(); ++i) {
     std::error_code missing;
-    state[i].first = std::filesystem::last_write_time(files[i], missing);
-    if (missing) state[i].first = {};
-    state[i].second = std::filesystem::file_size(files[i], missing);
-    if (missing) state[i].second = 0;
+    const auto size = std::filesystem::file_size(files[i], missing);
+    if (missing || size == 0) continue;  // who opens a file makes it an empty log
+    const auto written = std::filesystem::last_write_time(files[i], missing);
+    if (!missing) state[i] = {written, size};
   }
   return state;
 }

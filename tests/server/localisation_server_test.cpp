@@ -234,6 +234,11 @@ TEST_F(LocalisationServerTest, ReadsAChangedMemoryAgain) {
                }});
   const auto views = [&] { return body_of(get(server, "/v1/memories/hall"))["views"]; };
   EXPECT_EQ(views(), 40);
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  {
+    const std::lock_guard lock(mutex);
+    EXPECT_TRUE(notes.empty()) << notes.front();  // nobody changed it
+  }
   memorise(folder_ / "hall.panonav", world_, 40, 64);
   EXPECT_TRUE(within(std::chrono::seconds(60), [&] { return views() == 64; }));
   // What cannot be read any more is served as it was.
