@@ -8,13 +8,14 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/motion/trajectory.hpp"
 #include "panonav/pipeline/memoriser.hpp"
+#include "panonav/storage/memory_address.hpp"
 
 namespace panonav::ros2 {
 
 namespace {
 
 std::filesystem::path new_file(std::filesystem::path path) {
-  if (std::filesystem::exists(path)) {
+  if (memory_exists(path)) {
     throw FileError(path.string(), "is there already; allowed with --learn: a new file");
   }
   return path;

@@ -7,6 +7,7 @@
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/memory_merge.hpp"
 #include "panonav/pipeline/observation_source.hpp"
+#include "panonav/storage/memory_address.hpp"
 #include "recordings.hpp"
 
 namespace panonav::python {
@@ -39,7 +40,7 @@ MapperOptions mapper_options(const py::kwargs& keywords, SignatureOptions* signa
 MappedRun make_map(const Dataset& recording, const std::filesystem::path& path,
                    const SignatureOptions& signature, const MapperOptions& options, int threads) {
   InterruptibleExecutor executor(threads);
-  const bool there = std::filesystem::exists(path);
+  const bool there = memory_exists(path);
   Mapper mapper(
       there ? MemoryFile::open(path, Access::read_write)
             : MemoryFile::create(path, header_from_first_views(recording, signature, {}, executor)),

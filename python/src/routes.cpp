@@ -4,6 +4,7 @@
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/pipeline/route_follower.hpp"
 #include "panonav/pipeline/route_recorder.hpp"
+#include "panonav/storage/memory_address.hpp"
 #include "recordings.hpp"
 
 namespace panonav::python {
@@ -142,7 +143,7 @@ RecordedRoute record_route(const Dataset& dataset, const std::filesystem::path& 
   }
   if (poses.empty()) throw FileError(dataset.folder.string(), "has neither positions nor odometry");
   RouteRecorder recorder(
-      std::filesystem::exists(memory)
+      memory_exists(memory)
           ? MemoryFile::open(memory, Access::read_write)
           : MemoryFile::create(memory, header_from_first_views(dataset, {}, {}, executor)),
       dataset.source, options);

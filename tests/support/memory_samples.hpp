@@ -4,6 +4,7 @@
 #include <sqlite3.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <string>
 #include <vector>
 
@@ -66,10 +67,16 @@ inline MemoryHeader mirror_header() {
   return header;
 }
 
-/// A folder and the path of a memory file in it for each test.
+/// A folder and the path of a memory file in it for each test; where PANONAV_TEST_SERVER is the
+/// address of a PostgreSQL server, a new memory on that.
 class MemoryFileTest : public InTemporaryFolder {
  protected:
-  std::filesystem::path path = folder / "m.panonav";
+  [[nodiscard]] std::filesystem::path memory(const std::string& name) const {
+    const char* server = std::getenv("PANONAV_TEST_SERVER");
+    if (server == nullptr) return folder / name;
+    return std::string(server) + "&memory=" + folder.path().filename().string() + name;
+  }
+  std::filesystem::path path = memory("m.panonav");
 };
 
 /// Changes a file behind the library's back.

@@ -12,6 +12,7 @@
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
+#include "panonav/storage/memory_address.hpp"
 
 namespace {
 
@@ -20,7 +21,7 @@ using panonav::command::ExitCode;
 /// One line, whatever the message holds.
 void report(std::string_view verb, std::string_view message) {
   std::cerr << "panonav" << (verb.empty() ? "" : " ") << verb << ": "
-            << panonav::readable_line(message) << '\n';
+            << panonav::readable_line(panonav::without_passwords(message)) << '\n';
 }
 
 ExitCode run(std::string_view& verb, std::span<const std::string> words) {

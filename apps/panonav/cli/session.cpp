@@ -12,6 +12,7 @@
 
 #include "cli/json.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/storage/memory_address.hpp"
 
 namespace panonav::command {
 
@@ -65,13 +66,14 @@ Session::Session(const SessionOptions& options)
 
 void Session::say(std::string_view line) {
   clear_bar();
-  std::cerr << readable(line) << '\n';
+  std::cerr << readable(without_passwords(line)) << '\n';
 }
 
-void Session::print(std::string_view line) {
+void Session::print(std::string_view text) {
   clear_bar();
+  const std::string line = without_passwords(text);
   if (options_.former_keys) {
-    std::cout << with_former_keys(line) << '\n';
+    std::cout << with_former_keys(std::string_view(line)) << '\n';
   } else if (options_.json) {
     std::cout << line << '\n';
   } else {

@@ -9,6 +9,7 @@
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/pipeline/run_recorder.hpp"
+#include "panonav/storage/memory_address.hpp"
 #include "viewer/report_page.hpp"
 
 namespace panonav::command {
@@ -115,7 +116,7 @@ void write_localise_report(const std::filesystem::path& folder, const MemoryFile
     if (const auto error = error_m(queries[i])) errors.push_back(*error);
   }
   ReportPage page("Where was this?",
-                  "What the robot saw, and the view of " + file.path().filename().string() +
+                  "What the robot saw, and the view of " + memory_name(file.path()) +
                       " that resembles it most, turned as the robot faced. Where both show the "
                       "same things in the same directions, the answer is right.");
   std::vector<std::pair<std::string, std::string>> summary{

@@ -14,6 +14,7 @@
 #include "panonav/mapping/lattice_map.hpp"
 #include "panonav/pipeline/arrangement.hpp"
 #include "panonav/pipeline/graph_file.hpp"
+#include "panonav/storage/memory_address.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "verbs/recording.hpp"
 #ifdef PANONAV_COMMAND_SIMULATES
@@ -200,7 +201,7 @@ ExitCode arrange_views(const ArrangeArguments& wanted, Session& session) {
 #ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.picture) write_lattice_picture(*wanted.picture, lattice, memory);
   if (wanted.report) {
-    write_arrange_report(*wanted.report, file.path().filename().string(), lattice, memory, steps);
+    write_arrange_report(*wanted.report, memory_name(file.path()), lattice, memory, steps);
   }
 #endif
   if (session.json()) {

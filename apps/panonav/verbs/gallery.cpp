@@ -10,6 +10,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/storage/memory_address.hpp"
 #include "reports/report_page.hpp"
 #include "verbs/view_selection.hpp"
 #include "viewer/page.hpp"
@@ -121,7 +122,7 @@ ExitCode gallery(const GalleryArguments& wanted, Session& session) {
   views.resize(std::min(found, max_views));
 
   ReportPage page(
-      "What " + fs::path(wanted.memory).filename().string() + " remembers",
+      "What " + memory_name(wanted.memory) + " remembers",
       "The reference views of the memory, each as the small picture that is stored "
       "with it: all around the robot, straight ahead in the middle, left and right as "
       "the robot sees them, the edges behind it. Below each: the view's id and name, where it was "

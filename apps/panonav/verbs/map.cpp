@@ -14,6 +14,7 @@
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/mapper.hpp"
 #include "panonav/pipeline/observation_source.hpp"
+#include "panonav/storage/memory_address.hpp"
 #include "verbs/memorising.hpp"
 #include "verbs/recording.hpp"
 #include "verbs/run_record.hpp"
@@ -301,7 +302,7 @@ ExitCode map(const Arguments& arguments, const MapArguments& wanted, Session& se
 #ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) prepare_report_folder(*wanted.report, "map");
 #endif
-  const bool there = fs::exists(wanted.memory);
+  const bool there = memory_exists(wanted.memory);
   std::optional<MemoryFile> memory;
   if (there) memory = MemoryFile::open(wanted.memory, Access::read_write);
   const Dataset recording =

@@ -11,6 +11,7 @@
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/observation_source.hpp"
+#include "panonav/storage/memory_address.hpp"
 #include "verbs/live_run.hpp"
 #include "verbs/memorising.hpp"
 #include "verbs/recording.hpp"
@@ -149,7 +150,7 @@ ExitCode memorise_live(const Arguments& arguments, const MemoriseArguments& want
 }
 
 ExitCode memorise(const Arguments& arguments, const MemoriseArguments& wanted, Session& session) {
-  const bool resumes = fs::exists(wanted.memory);
+  const bool resumes = memory_exists(wanted.memory);
   const bool live = is_live(wanted.input);
   if (!live) refuse_live(arguments, wanted.input, true);
   std::optional<PictureSource> remembered;

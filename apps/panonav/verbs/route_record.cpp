@@ -10,6 +10,7 @@
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/pipeline/route_recorder.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
+#include "panonav/storage/memory_address.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "verbs/memorising.hpp"
 #include "verbs/recording.hpp"
@@ -121,7 +122,7 @@ ExitCode record(const Arguments& arguments, const RecordArguments& wanted, Sessi
   }
   RouteRecorderOptions options{.name = wanted.name, .every_m = wanted.every_m.value_or(0.1)};
   std::optional<MemoryFile> memory;
-  if (fs::exists(wanted.memory)) memory = MemoryFile::open(wanted.memory, Access::read_write);
+  if (memory_exists(wanted.memory)) memory = MemoryFile::open(wanted.memory, Access::read_write);
   const Dataset dataset =
       read_described(wanted.dataset, wanted.pictures,
                      memory ? std::optional(memory->header().source) : std::nullopt,

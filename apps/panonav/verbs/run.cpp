@@ -13,6 +13,7 @@
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/pipeline/route_follower.hpp"
 #include "panonav/pipeline/route_recorder.hpp"
+#include "panonav/storage/memory_address.hpp"
 #include "verbs/live_run.hpp"
 #include "verbs/localised_query.hpp"
 #include "verbs/memorising.hpp"
@@ -166,7 +167,7 @@ RoutePoses route_poses(const Dataset& recording) {
 
 /// Motion that is read from pictures begins anew each time, and so does the frame of its poses.
 void refuse_to_go_on(const RunArguments& wanted, RoutePoses poses) {
-  if (poses != RoutePoses::pictures || !fs::exists(wanted.memory)) return;
+  if (poses != RoutePoses::pictures || !memory_exists(wanted.memory)) return;
   if (!MemoryFile::open(wanted.memory, Access::read_only).route(*wanted.route)) return;
   throw UsageError("--route is " + *wanted.route + ", which " + wanted.memory +
                    " holds already; allowed without odometry: a new name");
@@ -176,7 +177,7 @@ ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& se
   const bool live = is_live(wanted.source);
   if (!live) refuse_live(arguments, wanted.source, false);
   std::optional<PictureSource> remembered;
-  if (fs::exists(wanted.memory)) {
+  if (memory_exists(wanted.memory)) {
     const auto memory = MemoryFile::open(wanted.memory, Access::read_only);
     remembered = memory.header().source;
     require_kept_options(arguments, wanted.signature, wanted.preprocessing, memory);

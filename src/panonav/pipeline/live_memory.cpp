@@ -14,6 +14,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/pipeline/internal/stand_back.hpp"
+#include "panonav/storage/memory_address.hpp"
 
 namespace panonav {
 
@@ -104,12 +105,13 @@ Observation unwrapped(const Observation& observation, Panorama panorama) {
 struct LiveMemory::Implementation {
   Implementation(std::filesystem::path memory, const LiveMemoryOptions& wanted)
       : path(std::move(memory)), options(wanted) {
-    const bool exists = std::filesystem::exists(path);
+    const bool exists = memory_exists(path);
     if (options.learn) {
       memoriser.emplace(path, options.memoriser);
       if (!options.in_step) storer.emplace(*memoriser);
     } else if (!exists) {
-      throw FileError(path.string(), "is not there, and nothing is to be learnt");
+      throw FileError(without_passwords(path.string()),
+                      "is not there, and nothing is to be learnt");
     }
     if (exists) recogniser = make_recogniser();
   }

@@ -14,6 +14,7 @@
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
 #include "panonav/pipeline/observation_source.hpp"
+#include "panonav/storage/memory_address.hpp"
 
 namespace panonav {
 
@@ -91,11 +92,11 @@ MemoryHeader header_from_first_views(const Dataset& recording, const SignatureOp
 
 Memoriser::Memoriser(const std::filesystem::path& memory, MemoriserOptions options)
     : path_(memory), options_(std::move(options)) {
-  if (std::filesystem::exists(path_)) {
+  if (memory_exists(path_)) {
     file_ = MemoryFile::open(path_, Access::read_write);
     encoder_.emplace(file_->header(), options_.source.value_or(file_->header().source));
   } else if (!options_.source) {
-    throw ContractError("source of " + path_.string(), "empty",
+    throw ContractError("source of " + without_passwords(path_.string()), "empty",
                         "how pictures lie, as the file is a new one");
   }
 }

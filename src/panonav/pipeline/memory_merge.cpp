@@ -14,10 +14,13 @@
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
 #include "panonav/pipeline/mapper.hpp"
+#include "panonav/storage/memory_address.hpp"
 
 namespace panonav {
 
 namespace {
+
+namespace fs = std::filesystem;
 
 using NewIds = std::map<ViewId, ViewId>;  // in the new memory, by that in the old
 
@@ -147,7 +150,7 @@ std::vector<std::uint8_t> value_or_empty(std::optional<std::vector<std::uint8_t>
 template <class IsTaken>
 std::string free_name(const std::string& name, const MemoryFile& from, const IsTaken& is_taken) {
   if (!is_taken(name)) return name;
-  const std::string base = from.path().stem().string() + "/" + name;
+  const std::string base = fs::path(memory_name(from.path())).stem().string() + "/" + name;
   std::string wanted = base;
   for (int i = 2; is_taken(wanted); ++i) wanted = base + " (" + std::to_string(i) + ")";
   return wanted;
@@ -294,20 +297,24 @@ MergedMemory merge_memories(const std::filesystem::path& first, const std::files
   const MemoryFile a = MemoryFile::open(first, Access::read_only);
   const MemoryFile b = MemoryFile::open(second, Access::read_only);
   require_comparable(a, b);
-  if (std::filesystem::exists(memory)) {
-    throw FileError(memory.string(), "is there already; a merged memory is a new file");
+  if (memory_exists(memory)) {
+    throw FileError(without_passwords(memory.string()),
+                    "is there already; a merged memory is a new one");
   }
-  TemporaryFile unfinished(memory);
-  std::filesystem::remove(unfinished.path());  // a memory file is made where nothing is
+  const bool on_server = is_server_address(memory);
+  TemporaryFile unfinished(on_server ? fs::temp_directory_path() / "merged.panonav" : memory);
+  fs::remove(unfinished.path());  // a memory file is made where nothing is
   MergedMemory result;
   {
     MemoryFile file = MemoryFile::create(unfinished.path(), a.header());
     Merge merge(a, b, options);
     file.change([&] { result = merge.write(file, advance); });
     keep_models(file);
+    if (on_server) file.copy_to(memory);
   }
+  if (on_server) return result;
   std::error_code error;
-  std::filesystem::rename(unfinished.path(), memory, error);
+  fs::rename(unfinished.path(), memory, error);
   if (error) throw FileError(memory.string(), "cannot be written: " + error.message());
   unfinished.keep();
   return result;

@@ -25,15 +25,15 @@ VisualMemory views_of(const MemoryFile& file) {
 /// of its own: the caller's is not needed afterwards.
 FeatureSource kept_features(const MemoryFile& file, const VisualMemory& memory) {
   struct Kept {
-    Kept(const std::filesystem::path& path, ViewId last_view)
-        : file(MemoryFile::open(path, Access::read_only)), last(last_view) {}
+    Kept(const MemoryFile& others, ViewId last_view)
+        : file(others.reopen(Access::read_only)), last(last_view) {}
     MemoryFile file;
     ViewId last;
     FeatureSource read = features_in(file);
     std::map<ViewId, std::optional<LocalFeatures>> views;
     std::mutex mutex;
   };
-  const auto kept = std::make_shared<Kept>(file.path(), std::ranges::max(memory.views()));
+  const auto kept = std::make_shared<Kept>(file, std::ranges::max(memory.views()));
   if (!kept->read) return {};
   return [kept](ViewId view) -> std::optional<LocalFeatures> {
     if (kept->last < view) return std::nullopt;

@@ -55,9 +55,10 @@ void MemoryTables::fail_damaged(std::string_view what) const {
   throw FileError(place().string(), "is damaged: " + std::string(what));
 }
 
-MemoryFile::Implementation::Implementation(std::unique_ptr<MemoryTables> tables_,
+MemoryFile::Implementation::Implementation(std::filesystem::path address_,
+                                           std::unique_ptr<MemoryTables> tables_,
                                            MemoryHeader header_)
-    : tables(std::move(tables_)), header(std::move(header_)) {}
+    : address(std::move(address_)), tables(std::move(tables_)), header(std::move(header_)) {}
 
 const ViewRow& MemoryFile::Implementation::checked(const ViewRow& row) {
   if (row.signature.size() != 2 * header.shape.size() ||
@@ -127,13 +128,17 @@ MemoryFile::MemoryFile(MemoryFile&&) noexcept = default;
 MemoryFile& MemoryFile::operator=(MemoryFile&&) noexcept = default;
 
 MemoryFile MemoryFile::create(const std::filesystem::path& path, const MemoryHeader& header) {
-  make_memory_file(path, header);
+  make_memory_tables(path, header, {});
   return open(path, Access::read_write);
+}
+
+MemoryFile MemoryFile::reopen(Access access) const {
+  return open(implementation_->address, access);
 }
 
 MemoryFile MemoryFile::open(const std::filesystem::path& path, Access access) {
   auto [tables, header] = open_memory_tables(path, access);
-  return MemoryFile(std::make_unique<Implementation>(std::move(tables), std::move(header)));
+  return MemoryFile(std::make_unique<Implementation>(path, std::move(tables), std::move(header)));
 }
 
 const MemoryHeader& MemoryFile::header() const noexcept {
@@ -309,6 +314,10 @@ VisualMemory MemoryFile::load(std::span<const ViewId> views) const {
 
 std::vector<ViewId> MemoryFile::views() const {
   return implementation_->tables->views();
+}
+
+std::vector<ViewId> MemoryFile::views_within(const PositionBounds& bounds) const {
+  return implementation_->tables->views_within(bounds);
 }
 
 std::vector<Link> MemoryFile::links() const {

@@ -43,6 +43,12 @@ struct NewView {
   std::vector<std::uint8_t> features;   ///< packed `LocalFeatures`; empty: none
 };
 
+/// A rectangle of positions.
+struct PositionBounds {
+  double min_x_m = 0.0, max_x_m = 0.0;
+  double min_y_m = 0.0, max_y_m = 0.0;
+};
+
 enum class Access { read_only, read_write };
 
 /// What is wrong in a memory file; `view` where it concerns one.
@@ -71,7 +77,9 @@ struct MemoryFileInfo {
   friend bool operator==(const MemoryFileInfo&, const MemoryFileInfo&) = default;
 };
 
-/// A visual memory on disk (an SQLite file, docs/formats.md). What a changing member function
+/// A visual memory on disk: an SQLite file (docs/formats.md), or with the address of a server
+/// (memory_address.hpp) the same on PostgreSQL (docs/scale.md), where `path` is the address without
+/// a password and a lost connection is a FileError. What a changing member function
 /// returned for is still there after the process is killed or the machine loses its power. One
 /// process writes at a time, any number read beside it, each seeing a state between two changes. A
 /// damaged or foreign file or one of a newer version is refused and never changed. One object
@@ -88,6 +96,13 @@ class MemoryFile {
   ~MemoryFile();
   MemoryFile(MemoryFile&&) noexcept;
   MemoryFile& operator=(MemoryFile&&) noexcept;
+
+  /// The same memory once more, for another thread.
+  [[nodiscard]] MemoryFile reopen(Access access) const;
+  /// Makes a memory at `path`, in a file or on a server, that holds the same under the same ids:
+  /// whole or not at all. The change that could be undone is not taken along. Throws FileError as
+  /// `create`, and on damage.
+  void copy_to(const std::filesystem::path& path) const;
 
   [[nodiscard]] const MemoryHeader& header() const noexcept;
   [[nodiscard]] const std::filesystem::path& path() const noexcept;
@@ -176,6 +191,9 @@ class MemoryFile {
   [[nodiscard]] VisualMemory load(std::span<const ViewId> views) const;
   /// All views, ascending.
   [[nodiscard]] std::vector<ViewId> views() const;
+  /// Views whose position lies in these bounds, each included, ascending. On a server only the
+  /// areas of the bounds are read.
+  [[nodiscard]] std::vector<ViewId> views_within(const PositionBounds& bounds) const;
   /// All links, ascending.
   [[nodiscard]] std::vector<Link> links() const;
   /// Everything that is wrong with the file, in full: structure, then view by view. Empty: intact.

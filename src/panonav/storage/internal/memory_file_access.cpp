@@ -12,8 +12,11 @@
 #include "panonav/core/temporary_file.hpp"
 #include "panonav/storage/internal/database.hpp"
 #include "panonav/storage/internal/memory_schema.hpp"
+#include "panonav/storage/internal/postgresql_tables.hpp"
+#include "panonav/storage/internal/server_address.hpp"
 #include "panonav/storage/internal/sqlite_tables.hpp"
 #include "panonav/storage/internal/write_ahead_log.hpp"
+#include "panonav/storage/memory_address.hpp"
 #include "panonav/storage/memory_header.hpp"
 
 namespace panonav {
@@ -128,7 +131,11 @@ void prepare_for_changes(Database& database) {
 
 }  // namespace
 
-void make_memory_file(const fs::path& path, const MemoryHeader& header) {
+void make_memory_tables(const fs::path& path, const MemoryHeader& header,
+                        const std::function<void(MemoryTables&)>& fill) {
+  if (is_server_address(path)) {
+    return make_postgresql_memory(parse_server_address(path), header, fill);
+  }
   validate(header);
   std::error_code ignored;
   const std::string name = path.string();
@@ -164,6 +171,12 @@ void make_memory_file(const fs::path& path, const MemoryHeader& header) {
     for (const auto& [key, value] : settings_of(header)) write_setting(database, key, value);
     transaction.commit();
     database.execute("PRAGMA journal_mode=WAL");
+    if (fill) {
+      SqliteTables tables(path, std::move(database));
+      const auto filling = tables.transaction(MemoryTables::Kind::writing);
+      fill(tables);
+      filling->commit();
+    }
   } catch (...) {
     remove_beside(unfinished.path());
     throw;
@@ -180,8 +193,17 @@ void make_memory_file(const fs::path& path, const MemoryHeader& header) {
 }
 
 OpenedMemory open_memory_tables(const fs::path& path, Access access) {
-  Database database = open_memory_database(path, access);
   std::optional<MemoryHeader> header;
+  if (is_server_address(path)) {
+    auto tables = open_postgresql_tables(parse_server_address(path), access);
+    try {
+      header = header_from(tables->settings());
+    } catch (const ContractError& error) {
+      tables->fail_damaged(error.what());
+    }
+    return {std::move(tables), std::move(*header)};
+  }
+  Database database = open_memory_database(path, access);
   try {
     const Transaction reading(database, Transaction::Kind::reading);
     require_schema(database);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 
 #include "panonav/storage/internal/memory_tables.hpp"
@@ -8,19 +9,20 @@
 
 namespace panonav {
 
-/// Makes an empty memory file at `path`, whole or not at all. Throws FileError when something is
-/// there.
-void make_memory_file(const std::filesystem::path& path, const MemoryHeader& header);
+/// Makes a memory, in a file or on a server, with what `fill` writes, whole or not at all. Throws
+/// FileError when something is there.
+void make_memory_tables(const std::filesystem::path& path, const MemoryHeader& header,
+                        const std::function<void(MemoryTables&)>& fill);
 
 struct OpenedMemory {
   std::unique_ptr<MemoryTables> tables;
   MemoryHeader header;
 };
 
-/// Opens an existing file after a look at its first bytes, and checks its schema and header. With
-/// read_only nothing that is asked of it can change the file. A file of an older version or in
-/// another journal mode is given what changes need. Throws FileError: missing, no memory file,
-/// damaged, newer, no permission, or another program is using it just then.
+/// Opens an existing memory on a server, or a file after a look at its first bytes, and checks its
+/// schema and header. With read_only nothing that is asked of it can change the file. A file of an
+/// older version or in another journal mode is given what changes need. Throws FileError: missing,
+/// no memory file, damaged, newer, no permission, or another program is using it just then.
 [[nodiscard]] OpenedMemory open_memory_tables(const std::filesystem::path& path, Access access);
 
 }  // namespace panonav

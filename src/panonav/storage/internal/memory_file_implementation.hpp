@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -12,7 +13,8 @@
 namespace panonav {
 
 struct MemoryFile::Implementation {
-  Implementation(std::unique_ptr<MemoryTables> tables_, MemoryHeader header_);
+  Implementation(std::filesystem::path address_, std::unique_ptr<MemoryTables> tables_,
+                 MemoryHeader header_);
 
   /// The row itself. Throws FileError when it does not match its checksum.
   const ViewRow& checked(const ViewRow& row);
@@ -24,6 +26,7 @@ struct MemoryFile::Implementation {
   /// Checked. Throws as `refuse_view`.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> bytes(BesideViews table, ViewId view);
 
+  std::filesystem::path address;  ///< as it was opened; it may hold a password
   std::unique_ptr<MemoryTables> tables;
   MemoryHeader header;
   RecordBytes scratch;

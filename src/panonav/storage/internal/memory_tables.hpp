@@ -113,6 +113,8 @@ class MemoryTables {
   /// Ascending.
   [[nodiscard]] virtual std::vector<ViewId> views() = 0;
   /// Ascending.
+  [[nodiscard]] virtual std::vector<ViewId> views_within(const PositionBounds& bounds) = 0;
+  /// Ascending.
   [[nodiscard]] virtual std::vector<ViewId> views_with(BesideViews table) = 0;
   [[nodiscard]] virtual std::optional<StoredBytes> bytes(BesideViews table, ViewId view) = 0;
 

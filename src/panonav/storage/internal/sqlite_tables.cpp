@@ -261,6 +261,17 @@ std::vector<ViewId> SqliteTables::views() {
   return views;
 }
 
+std::vector<ViewId> SqliteTables::views_within(const PositionBounds& bounds) {
+  std::vector<ViewId> views;
+  Statement rows(database_,
+                 "SELECT id FROM views WHERE x_m BETWEEN ? AND ? AND y_m BETWEEN ? AND ? ORDER BY "
+                 "id");
+  rows.bind(1, bounds.min_x_m).bind(2, bounds.max_x_m);
+  rows.bind(3, bounds.min_y_m).bind(4, bounds.max_y_m);
+  while (rows.step()) views.push_back(id_in(rows, 0));
+  return views;
+}
+
 std::vector<ViewId> SqliteTables::views_with(BesideViews table) {
   std::vector<ViewId> views;
   if (!has(table)) return views;

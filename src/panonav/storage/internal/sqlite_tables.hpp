@@ -34,6 +34,7 @@ class SqliteTables final : public MemoryTables {
   [[nodiscard]] std::optional<ViewId> find(std::string_view name) override;
   [[nodiscard]] std::vector<std::string> names() override;
   [[nodiscard]] std::vector<ViewId> views() override;
+  [[nodiscard]] std::vector<ViewId> views_within(const PositionBounds& bounds) override;
   [[nodiscard]] std::vector<ViewId> views_with(BesideViews table) override;
   [[nodiscard]] std::optional<StoredBytes> bytes(BesideViews table, ViewId view) override;
 

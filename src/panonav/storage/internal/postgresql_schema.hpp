@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "panonav/storage/internal/postgresql_connection.hpp"
+
+namespace panonav {
+
+/// The schema `panonav` of a database has at most this version; a newer one is refused.
+inline constexpr int postgresql_schema_version = 1;
+
+/// Version of the schema that is there; 0: there is none.
+[[nodiscard]] int schema_version(PostgresqlConnection& connection);
+
+/// Makes the schema and the roles, or brings them to this version, in one transaction that waits
+/// for others that do so. Throws FileError without the rights.
+void migrate_schema(PostgresqlConnection& connection);
+
+}  // namespace panonav

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+namespace panonav {
+
+/// The parts of the address of a memory on a server (memory_address.hpp).
+struct ServerAddress {
+  std::string uri;              ///< what libpq reads: without panonav's own parameters
+  std::filesystem::path shown;  ///< the address without its password
+  std::string memory;
+  std::optional<std::string> fleet;
+  std::optional<std::string> robot;
+};
+
+/// Throws FileError unless the address names a memory.
+[[nodiscard]] ServerAddress parse_server_address(const std::filesystem::path& memory);
+
+}  // namespace panonav

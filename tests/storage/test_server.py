@@ -1,0 +1,230 @@
+#!/usr/bin/env python3
+"""Memories on a PostgreSQL server: test_server.py PANONAV TEST_STORAGE PANONAV_POSTGRESQL. One server for all, in a
+temporary folder. Exits with 77 (skipped) where there is no server program or panonav was built without libpq.
+"""
+import json
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+PANONAV, TEST_STORAGE, SERVER = sys.argv[1:4]
+SHARED = ("MemoryFileContent.HeadersComeBack:MemoryFileContent.ContentComesBack:MemoryFileContent.IdsAre*:"
+          "MemoryFileContent.Para*:MemoryFileContent.ABad*:MemoryFileContent.Readers*:MemoryFileContent.TwoW*:"
+          "MapTables.*:RouteTables.W*:RouteTables.B*:MemoryFileUndo.*:"
+          "ViewsOfAMemoryFile.AreThose*:ViewsOfAMemoryFile.See*:MemoryOnServer.*"
+          "-*Tampered*:MemoryFileUndo.Damage*")
+
+
+def run(*words, code=0, **more):
+    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, timeout=120, **more)
+    assert done.returncode == code, (words, done.returncode, done.stdout, done.stderr)
+    return done.stdout
+
+
+def refused(*words, saying):
+    """One line that says so, without a password."""
+    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 2, (words, done.returncode, done.stdout, done.stderr)
+    lines = done.stderr.strip().splitlines()
+    assert len(lines) == 1 and re.search(saying, lines[0]), (words, saying, done.stderr)
+    assert "geheim" not in done.stdout + done.stderr, done.stderr
+
+
+class Server:
+    def __init__(self, folder):
+        self.folder = folder
+
+    def start(self):
+        run(SERVER, self.folder, "start")
+
+    def stop(self):
+        run(SERVER, self.folder, "stop")
+
+    def kill(self):
+        """As when the machine loses its power: all of its processes at once."""
+        first = int((self.folder / "data/postmaster.pid").read_text().split()[0])
+        pids = [first] + [int(pid) for pid in subprocess.run(
+            ["pgrep", "-P", str(first)], capture_output=True, text=True).stdout.split()]
+        for pid in pids:
+            os.kill(pid, signal.SIGKILL)
+        for _ in range(200):
+            if not any(pathlib.Path(f"/proc/{pid}/cmdline").exists() and
+                       pathlib.Path(f"/proc/{pid}/cmdline").read_bytes() for pid in pids):
+                return
+            time.sleep(0.05)
+        raise AssertionError("the server is still there")
+
+    def memory(self, name, user="panonav", more=""):
+        return f"postgresql://{user}@/panonav?host={self.folder}&memory={name}{more}"
+
+    def sql(self, text):
+        return run("psql", "-X", "-q", "-t", "-A", "-v", "ON_ERROR_STOP=1", "-h", self.folder, "-U", "panonav",
+                   "-d", "panonav", "-c", text).strip()
+
+
+def same_answers(server, folder):
+    """Every verb that answers says the same of both, to the last digit."""
+    run(PANONAV, "simulate", "hall", folder / "grid", "--grid", "1.2", "--kind", "panorama", "--seed", "3")
+    run(PANONAV, "simulate", "hall", folder / "drive", "--kind", "panorama", "--seed", "3", "--path", "walk",
+        "--spacing-m", "0.1", "--poses", "25")
+    answers = {}
+    for memory, mapped in ((folder / "hall.panonav", folder / "mapped.panonav"),
+                           (server.memory("hall"), server.memory("mapped"))):
+        def answer(*words):
+            done = subprocess.run([PANONAV, *words, "--json"], capture_output=True, text=True, timeout=120)
+            assert done.returncode in (0, 1), (words, done.stderr)  # 1: no answer, for both
+            said = f"{done.returncode} {done.stdout}"
+            for one in (memory, mapped):
+                said = said.replace(json.dumps(str(one)), '"MEMORY"')
+            said = re.sub(r'"(created_s|bytes|file_bytes|\w*_ms)":[^,}]*', "", said)
+            answers.setdefault(str(memory), []).append(said)
+        answer("memorise", folder / "grid", memory)
+        answer("memorise", folder / "grid", memory)  # goes on: nothing is new
+        answer("localise", memory, folder / "drive")
+        answer("home", "view_00003.png", folder / "drive/view_00004.png", "--memory", memory)
+        answer("route", "record", folder / "drive", memory, "--name", "way")
+        answer("route", "follow", memory, folder / "drive")
+        answer("map", folder / "drive", mapped)
+        answer("track", mapped, folder / "drive")
+        answer("list", memory)
+        answer("info", memory)
+        answer("rename", memory, "view_00002.png", "the 'door'")
+        answer("forget", memory, "view_00001.png")
+        answer("undo", memory)
+        answer("list", memory)
+        answer("verify", memory)
+        run(PANONAV, "export", memory, "-o", folder / f"export{len(answers)}")
+    file, kept = answers.values()
+    for one, other in zip(file, kept, strict=True):
+        assert one == other, (one[:3000], other[:3000])
+    exported = [{str(path.relative_to(root)): path.read_bytes() for path in root.rglob("*") if path.is_file()}
+                for root in (folder / "export1", folder / "export2")]
+    assert exported[0].keys() == exported[1].keys() and len(exported[0]) > 10
+    assert all(exported[0][name] == exported[1][name] for name in exported[0] if name.endswith(".png"))
+    # merged on the server as in a file
+    run(PANONAV, "memorise", folder / "drive", folder / "second.panonav")
+    for first, out in ((folder / "hall.panonav", folder / "both.panonav"),
+                       (server.memory("hall"), server.memory("both"))):
+        run(PANONAV, "merge", first, folder / "second.panonav", "-o", out, code=1)  # nothing in common: kept apart
+    views = [run(PANONAV, "list", out, "--json") for out in (folder / "both.panonav", server.memory("both"))]
+    assert [re.sub(r'"memory":"[^"]*"', "", view) for view in views][0] == \
+        [re.sub(r'"memory":"[^"]*"', "", view) for view in views][1]
+
+
+def roles(server, folder):
+    server.sql("""CREATE ROLE reads LOGIN IN ROLE panonav_reader; CREATE ROLE adds LOGIN IN ROLE panonav_contributor;
+        CREATE ROLE curates LOGIN IN ROLE panonav_curator; CREATE ROLE stranger LOGIN;
+        CREATE ROLE other LOGIN IN ROLE panonav_curator; INSERT INTO panonav.members VALUES ('other', 'south')""")
+    reads, adds, curates, other = (server.memory("hall", user) for user in ("reads", "adds", "curates", "other"))
+    before = run(PANONAV, "list", reads, "--json").split('"views"')[1]
+    refused(PANONAV, "memorise", folder / "drive", reads, saying="cannot be changed.*panonav_contributor")
+    refused(PANONAV, "memorise", folder / "grid", server.memory("new", "reads"), saying="permission denied")
+    refused(PANONAV, "localise", server.memory("hall", "stranger"), folder / "drive", saying="permission denied")
+    for verb in (("forget", adds, "view_00001.png"), ("rename", adds, "view_00001.png", "a")):
+        refused(PANONAV, *verb, saying="permission denied.*panonav_curator")
+    refused(PANONAV, "localise", other, folder / "drive", saying="no memory 'hall'")
+    refused(PANONAV, "localise", other + "&fleet=", folder / "drive", saying="no memory 'hall'")
+    refused(PANONAV, "memorise", folder / "grid", other.replace("hall", "new") + "&fleet=", saying="row-level security")
+    assert before == run(PANONAV, "list", reads, "--json").split('"views"')[1]
+    # What each may do.
+    run(PANONAV, "memorise", folder / "grid", server.memory("small", "adds", "&robot=red%20one"))
+    run(PANONAV, "forget", server.memory("small", "curates"), "view_00001.png")
+    run(PANONAV, "memorise", folder / "grid", other)  # of the same name, in the other fleet
+    assert server.sql("SELECT string_agg(fleet || '/' || name, ' ' ORDER BY fleet, name) FROM panonav.memories "
+                      "WHERE name IN ('hall', 'small')") == "/hall /small south/hall"
+    assert server.sql("SELECT r.name || ' ' || s.login || ' ' || count(*) FROM panonav.views v JOIN panonav.sessions s "
+                      "ON s.id = v.session JOIN panonav.robots r ON r.id = s.robot WHERE r.name LIKE 'red%' "
+                      "GROUP BY r.name, s.login").startswith("red one adds ")
+    # Not by SQL of one's own, either.
+    for sql in ("DELETE FROM panonav.views", "UPDATE panonav.settings SET checksum = 0 WHERE key = 'rows' RETURNING "
+                "1 / 0", "INSERT INTO panonav.views VALUES ((SELECT min(id) FROM panonav.memories), 99, 'a', "
+                "NULL, NULL, NULL, NULL, NULL, '', 0)"):
+        done = subprocess.run(["psql", "-X", "-v", "ON_ERROR_STOP=1", "-h", server.folder, "-U", "other", "-d",
+                               "panonav", "-c", "BEGIN", "-c", "SELECT set_config('role', 'adds', true)", "-c", sql],
+                              capture_output=True, text=True)
+        assert done.returncode != 0 or "UPDATE 0" in done.stdout, (sql, done.stdout)
+
+
+def wrong_addresses(server, folder):
+    hba = server.folder / "data/pg_hba.conf"
+    hba.write_text("local all locked scram-sha-256\n" + hba.read_text())
+    server.sql("CREATE ROLE locked LOGIN PASSWORD 'richtig' IN ROLE panonav_reader; SELECT pg_reload_conf()")
+    locked = server.memory("hall", "locked:geheim").replace("@/", "@/")
+    for _ in range(100):  # until the server has read its file again
+        if subprocess.run([PANONAV, "info", locked], capture_output=True).returncode == 2:
+            break
+        time.sleep(0.05)
+    refused(PANONAV, "info", locked, saying="password authentication failed")
+    assert '"views"' in run(PANONAV, "info", server.memory("hall", "locked:richtig"), "--json")
+    assert "richtig" not in run(PANONAV, "info", server.memory("hall", "locked:richtig"), "--json")
+    refused(PANONAV, "info", server.memory("hall").replace("/panonav?", "/nowhere?"), saying='"nowhere" does not exist')
+    refused(PANONAV, "info", server.memory("nothing"), saying="no memory 'nothing'")
+    refused(PANONAV, "info", f"postgresql:///panonav?host={folder}/absent&memory=m", saying="No such file")
+    refused(PANONAV, "info", "postgresql://u:geheim@127.0.0.1:1/d?memory=m", saying="refused")
+    refused(PANONAV, "info", "postgresql://u:geh%eim@h/d?memory=m", saying="libpq")
+    refused(PANONAV, "info", f"postgresql:///panonav?host={server.folder}", saying="names no memory")
+    refused(PANONAV, "info", server.memory("hall", more="&sslmode=sometimes"), saying="sslmode")
+
+
+def killed_server(server):
+    """What was acknowledged is there once, the rest not at all or whole."""
+    address = server.memory("appended")
+    appending = subprocess.Popen([TEST_STORAGE, "--gtest_filter=MemoryOnServer.AppendsUntil*"], text=True,
+                                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                 env=os.environ | {"PANONAV_TEST_SERVER": address, "PANONAV_TEST_APPEND": address})
+    acknowledged = 0
+    killed = False
+    said = []
+    for line in appending.stdout:
+        said.append(line)
+        if line.startswith("acknowledged"):
+            acknowledged = int(line.split()[1])
+            if acknowledged >= 400 and not killed:
+                killed = True
+                server.kill()
+    assert appending.wait() == 0 and acknowledged >= 400, "".join(said)
+    server.start()
+    views = json.loads(run(PANONAV, "list", address, "--json"))["views"]
+    names = [view["name"] for view in views]
+    assert names == [f"view_{i}.png" for i in range(len(names))], names
+    assert len(names) in (acknowledged, acknowledged + 20), (len(names), acknowledged)
+    run(PANONAV, "verify", address)
+
+
+def main():
+    refusal = subprocess.run([PANONAV, "info", "postgresql:///d?memory=m&host=/nowhere"], capture_output=True, text=True)
+    if "built without PostgreSQL" in refusal.stderr:
+        print("skipped: built without PostgreSQL")
+        return 77
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        server = Server(folder / "server")
+        started = subprocess.run([SERVER, server.folder, "start"], capture_output=True, text=True)
+        if "the package postgresql has it" in started.stderr:
+            print("skipped: no PostgreSQL server is installed")
+            return 77
+        assert started.returncode == 0, started.stderr
+        try:
+            same_answers(server, folder)
+            print("same answers")
+            tests = run(TEST_STORAGE, f"--gtest_filter={SHARED}",
+                        env=os.environ | {"PANONAV_TEST_SERVER": server.memory("x").replace("&memory=x", "")})
+            assert int(re.search(r"PASSED +\] (\d+)", tests)[1]) >= 20, tests
+            print("storage tests")
+            roles(server, folder)
+            print("roles")
+            wrong_addresses(server, folder)
+            print("addresses")
+            killed_server(server)
+            print("killed server")
+        finally:
+            server.stop()
+    return 0
+
+
+sys.exit(main())
