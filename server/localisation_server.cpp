@@ -23,6 +23,8 @@
 #include "panonav/core/text.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
+#include "panonav/storage/memory_address.hpp"
+#include "panonav/storage/memory_changes.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "server/http_server.hpp"
 #include "server/place_json.hpp"
@@ -92,6 +94,37 @@ FileState state_of(const std::filesystem::path& path) {
   return state;
 }
 
+/// Tells when a memory is another one than it was.
+class MemoryWatch {
+ public:
+  /// From now on.
+  explicit MemoryWatch(std::filesystem::path memory)
+      : memory_(std::move(memory)), state_(state_of(memory_)) {
+    if (is_server_address(memory_)) changes_.emplace(memory_);
+  }
+  /// Since this was asked last. A server that cannot be asked may have changed it once it is back.
+  [[nodiscard]] bool changed() {
+    if (!is_server_address(memory_)) {
+      const FileState before = std::exchange(state_, state_of(memory_));
+      return state_ != before;
+    }
+    try {
+      bool changed = !changes_;
+      if (!changes_) changes_.emplace(memory_);
+      while (changes_->wait(std::chrono::milliseconds(0))) changed = true;
+      return changed;
+    } catch (const FileError&) {
+      changes_.reset();
+      return false;
+    }
+  }
+
+ private:
+  std::filesystem::path memory_;
+  FileState state_;
+  std::optional<MemoryChanges> changes_;
+};
+
 /// A memory as it was read.
 struct LoadedMemory {
   LoadedMemory(const std::filesystem::path& path, const LocaliserOptions& localiser)
@@ -148,7 +181,7 @@ struct LocalisationServer::Implementation {
   /// A memory that is served; what was loaded is swapped when the file changes.
   struct Served {
     ServedMemory memory;
-    FileState state;
+    std::optional<MemoryWatch> watch;
     std::shared_ptr<LoadedMemory> loaded;
     std::uint64_t known = 0;
     std::uint64_t unknown = 0;
@@ -175,13 +208,12 @@ struct LocalisationServer::Implementation {
         throw ContractError("name of a memory", readable_line(memory.name),
                             "1 to 64 letters, digits, '-', '_' and '.'");
       }
-      const FileState state = state_of(memory.path);
       const auto [at, is_new] = served.try_emplace(memory.name);
       if (!is_new) {
         throw ContractError("name of a memory", memory.name, "a name that no other memory has");
       }
       at->second.memory = memory;
-      at->second.state = state;
+      at->second.watch.emplace(memory.path);
       at->second.loaded = std::make_shared<LoadedMemory>(memory.path, options.localiser);
     }
     const auto cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
@@ -434,8 +466,7 @@ struct LocalisationServer::Implementation {
       pause = options.look_every;
       for (auto& [name, one] : served) {
         lock.unlock();
-        const FileState state = state_of(one.memory.path);
-        const bool same = state == one.state;
+        const bool same = !one.watch->changed();
         std::shared_ptr<LoadedMemory> again;
         std::string fault;
         const auto from = Clock::now();
@@ -459,7 +490,6 @@ struct LocalisationServer::Implementation {
         }
         lock.lock();
         if (same) continue;
-        one.state = state;
         ++(again ? one.reloads : one.failed_reloads);
         if (again) one.loaded.swap(again);
         lock.unlock();
@@ -473,7 +503,7 @@ struct LocalisationServer::Implementation {
   mutable std::mutex mutex;
   std::condition_variable came;          // a picture, or the end
   std::condition_variable ended;         // for the watcher
-  std::map<std::string, Served> served;  // names stay; `state` is of the watcher
+  std::map<std::string, Served> served;  // names stay; `watch` is of the watcher
   std::deque<std::pair<std::weak_ptr<Job>, std::size_t>> waiting;
   std::size_t waiting_bytes = 0;
   std::map<int, std::uint64_t> refused;

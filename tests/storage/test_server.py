@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import urllib.request
 
 PANONAV, TEST_STORAGE, SERVER = sys.argv[1:4]
 SHARED = ("MemoryFileContent.HeadersComeBack:MemoryFileContent.ContentComesBack:MemoryFileContent.IdsAre*:"
@@ -116,6 +117,41 @@ def same_answers(server, folder):
         [re.sub(r'"memory":"[^"]*"', "", view) for view in views][1]
 
 
+def copies(server, folder):
+    """To the server and back: the same, and never instead of something."""
+    def said(memory):
+        return re.sub(r'"(memory|created_s|file_bytes)":[^,}]*', "", run(PANONAV, "list", memory, "--json") +
+                      run(PANONAV, "info", memory, "--json") + run(PANONAV, "verify", memory))
+    run(PANONAV, "copy", folder / "hall.panonav", server.memory("the%20copy"))
+    run(PANONAV, "copy", server.memory("the%20copy"), folder / "back.panonav")
+    assert said(folder / "back.panonav").replace("back.panonav", "hall.panonav") == said(folder / "hall.panonav")
+    refused(PANONAV, "copy", folder / "hall.panonav", server.memory("hall"), saying="is there already")
+    refused(PANONAV, "copy", server.memory("hall"), folder / "back.panonav", saying="is there already")
+
+
+def served(server, folder):
+    """`serve` answers from a memory on a server, and from its new state once somebody changed it."""
+    memory = server.memory("served")
+    run(PANONAV, "memorise", folder / "grid", memory)
+    serving = subprocess.Popen([PANONAV, "serve", memory, "--listen", "0", "--json"], stdout=subprocess.PIPE, text=True)
+    try:
+        url = json.loads(serving.stdout.readline())["url"]
+        def views():
+            with urllib.request.urlopen(url.rstrip("/") + "/v1/memories", timeout=60) as answer:
+                return json.load(answer)
+        before = views()
+        assert "served" in json.dumps(before), before
+        run(PANONAV, "forget", memory, "view_00001.png")
+        for _ in range(600):
+            if views() != before:
+                return
+            time.sleep(0.1)
+        raise AssertionError(views())
+    finally:
+        serving.send_signal(signal.SIGINT)
+        serving.wait(timeout=60)
+
+
 def roles(server, folder):
     server.sql("""CREATE ROLE reads LOGIN IN ROLE panonav_reader; CREATE ROLE adds LOGIN IN ROLE panonav_contributor;
         CREATE ROLE curates LOGIN IN ROLE panonav_curator; CREATE ROLE stranger LOGIN;
@@ -216,6 +252,10 @@ def main():
                         env=os.environ | {"PANONAV_TEST_SERVER": server.memory("x").replace("&memory=x", "")})
             assert int(re.search(r"PASSED +\] (\d+)", tests)[1]) >= 20, tests
             print("storage tests")
+            copies(server, folder)
+            print("copies")
+            served(server, folder)
+            print("served")
             roles(server, folder)
             print("roles")
             wrong_addresses(server, folder)

@@ -17,6 +17,7 @@
 #include "panonav/core/text.hpp"
 #include "panonav/io/option_file.hpp"
 #include "panonav/io/toml_fields.hpp"
+#include "panonav/storage/memory_address.hpp"
 
 namespace panonav::command {
 
@@ -120,7 +121,8 @@ bool looks_like_flag(std::string_view word) {
 
 bool is_memory_file(const std::string& word) {
   std::error_code ignored;
-  return word.ends_with(".panonav") && !std::filesystem::is_directory(word, ignored);
+  return is_server_address(word) ||
+         (word.ends_with(".panonav") && !std::filesystem::is_directory(word, ignored));
 }
 
 }  // namespace
@@ -400,7 +402,10 @@ void Arguments::take_positionals(std::span<const std::string> words, std::string
   }
   // A memory file where something else belongs, and no memory in its place.
   for (std::size_t i = 0; i < std::min(wanted.size(), words.size()); ++i) {
-    if (infos[wanted[i]].name != "MEMORY" || words[i].ends_with(".panonav")) continue;
+    if (infos[wanted[i]].name != "MEMORY" || words[i].ends_with(".panonav") ||
+        is_server_address(words[i])) {
+      continue;
+    }
     const auto other = std::ranges::find_if(words, is_memory_file);
     const auto there = static_cast<std::size_t>(other - words.begin());
     if (other == words.end()) continue;

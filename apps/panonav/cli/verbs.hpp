@@ -17,6 +17,7 @@ namespace panonav::command {
 [[nodiscard]] Verb evaluate_verb();
 [[nodiscard]] Verb export_verb();
 [[nodiscard]] Verb convert_verb();
+[[nodiscard]] Verb copy_verb();
 [[nodiscard]] Verb forget_verb();
 [[nodiscard]] Verb gallery_verb();
 [[nodiscard]] Verb help_verb();

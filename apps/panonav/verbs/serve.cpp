@@ -13,6 +13,7 @@
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
+#include "panonav/storage/memory_address.hpp"
 #include "server/localisation_server.hpp"
 #include "verbs/listening_place.hpp"
 
@@ -33,7 +34,7 @@ ServedMemory served_memory(const std::string& text) {
   const std::size_t equals = text.find('=');
   const bool named = equals != std::string::npos && text.find('/') > equals;
   if (named) return {text.substr(0, equals), text.substr(equals + 1)};
-  return {std::filesystem::path(text).stem().string(), text};
+  return {std::filesystem::path(memory_name(text)).stem().string(), text};
 }
 
 /// The first line of the file.
