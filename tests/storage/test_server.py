@@ -176,7 +176,15 @@ def roles(server, folder):
     assert server.sql("SELECT r.name || ' ' || s.login || ' ' || count(*) FROM panonav.views v JOIN panonav.sessions s "
                       "ON s.id = v.session JOIN panonav.robots r ON r.id = s.robot WHERE r.name LIKE 'red%' "
                       "GROUP BY r.name, s.login").startswith("red one adds ")
-    # Not by SQL of one's own, either.
+    # Row-level security leaves the index of positions in use.
+    plan = run("psql", "-X", "-q", "-t", "-A", "-h", server.folder, "-U", "adds", "-d", "panonav", "-c",
+               "SET enable_seqscan = off", "-c", "EXPLAIN SELECT id FROM panonav.views WHERE memory = 1 AND x_m IS NOT "
+               "NULL AND x_m BETWEEN 0 AND 0.1 AND y_m BETWEEN 0 AND 0.1")
+    assert re.search(r"views_by_position.*\n? *Index Cond: .*x_m >=.*y_m >=", plan), plan
+    # Not by SQL of one's own, either, nor under the name of a role.
+    assert run("psql", "-X", "-q", "-t", "-A", "-h", server.folder, "-U", "other", "-d", "panonav", "-c",
+               "SET ROLE panonav_curator", "-c", "SELECT fleet || '/' || name FROM panonav.memories").split() == \
+        ["south/hall"]
     for sql in ("DELETE FROM panonav.views", "UPDATE panonav.settings SET checksum = 0 WHERE key = 'rows' RETURNING "
                 "1 / 0", "INSERT INTO panonav.views VALUES ((SELECT min(id) FROM panonav.memories), 99, 'a', "
                 "NULL, NULL, NULL, NULL, NULL, '', 0)"):

@@ -191,8 +191,8 @@ class MemoryFile {
   [[nodiscard]] VisualMemory load(std::span<const ViewId> views) const;
   /// All views, ascending.
   [[nodiscard]] std::vector<ViewId> views() const;
-  /// Views whose position lies in these bounds, each included, ascending. On a server only the
-  /// areas of the bounds are read.
+  /// Views whose position lies in these bounds, each included, ascending. On a server an index of
+  /// positions is used; a file is read through.
   [[nodiscard]] std::vector<ViewId> views_within(const PositionBounds& bounds) const;
   /// All links, ascending.
   [[nodiscard]] std::vector<Link> links() const;

@@ -36,10 +36,11 @@ GRANT panonav_contributor TO panonav_curator;
 CREATE TABLE panonav.schema_version(version integer NOT NULL);
 INSERT INTO panonav.schema_version VALUES (1);
 
--- Whose memories a login sees. Logins that are not listed are all of the fleet ''.
+-- Whose memories a login sees. Logins that are not listed are all of the fleet ''. By the login
+-- itself, as whoever is a member of a role may take that role's name.
 CREATE TABLE panonav.members(login name PRIMARY KEY, fleet text COLLATE "C" NOT NULL);
 CREATE FUNCTION panonav.fleet() RETURNS text LANGUAGE sql STABLE AS
-  $$ SELECT coalesce((SELECT fleet FROM panonav.members WHERE login = current_user), '') $$;
+  $$ SELECT coalesce((SELECT fleet FROM panonav.members WHERE login = session_user), '') $$;
 
 -- `channel` cannot be guessed: only who may read the memory can listen to its changes.
 CREATE TABLE panonav.memories(
@@ -60,7 +61,7 @@ CREATE TABLE panonav.sessions(
   id bigint GENERATED ALWAYS AS IDENTITY PRIMARY KEY,
   memory bigint NOT NULL REFERENCES panonav.memories ON DELETE CASCADE,
   robot bigint NOT NULL REFERENCES panonav.robots,
-  login name NOT NULL DEFAULT current_user,
+  login name NOT NULL DEFAULT session_user,
   began timestamptz NOT NULL DEFAULT now());
 
 CREATE TABLE panonav.settings(
@@ -84,9 +85,9 @@ CREATE TABLE panonav.views(
   PRIMARY KEY (memory, id),
   UNIQUE (memory, name)) WITH (toast_tuple_target = 8160);
 ALTER TABLE panonav.views ALTER signature SET STORAGE EXTERNAL;
--- An area is a square of 10 m.
-CREATE INDEX views_by_area ON panonav.views(memory, floor(x_m / 10), floor(y_m / 10))
-  WHERE x_m IS NOT NULL;
+-- Bare columns: under row-level security no index on what a function makes of them is used, as the
+-- function could tell rows of others by failing.
+CREATE INDEX views_by_position ON panonav.views(memory, x_m, y_m) WHERE x_m IS NOT NULL;
 
 CREATE TABLE panonav.thumbnails(
   memory bigint REFERENCES panonav.memories ON DELETE CASCADE,
@@ -190,7 +191,7 @@ CREATE POLICY own_fleet ON panonav.memories USING (fleet = (SELECT panonav.fleet
 ALTER TABLE panonav.robots ENABLE ROW LEVEL SECURITY;
 CREATE POLICY own_fleet ON panonav.robots USING (fleet = (SELECT panonav.fleet()));
 ALTER TABLE panonav.members ENABLE ROW LEVEL SECURITY;
-CREATE POLICY oneself ON panonav.members USING (login = current_user);
+CREATE POLICY oneself ON panonav.members USING (login = session_user);
 -- What views are made with is fixed when the memory is made.
 CREATE POLICY fixed_header ON panonav.settings AS RESTRICTIVE FOR UPDATE
   USING (key LIKE 'parameter.%');

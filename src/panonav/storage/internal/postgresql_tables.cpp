@@ -264,12 +264,12 @@ std::uint32_t PostgresqlTables::last_id() {
 void PostgresqlTables::require_session() {
   if (session_) return;
   const std::string insert_robot = "INSERT INTO panonav.robots(fleet, name) SELECT fleet, " +
-                                   std::string(robot_ ? "$2" : "current_user::text") +
+                                   std::string(robot_ ? "$2" : "session_user::text") +
                                    " FROM panonav.memories WHERE id = $1 ON CONFLICT DO NOTHING";
   const std::string insert_session =
       "INSERT INTO panonav.sessions(memory, robot) SELECT m.id, r.id FROM panonav.memories m "
       "JOIN panonav.robots r ON r.fleet = m.fleet AND r.name = " +
-      std::string(robot_ ? "$2" : "current_user::text") + " WHERE m.id = $1 RETURNING id";
+      std::string(robot_ ? "$2" : "session_user::text") + " WHERE m.id = $1 RETURNING id";
   Values values;
   values.add(memory_);
   if (robot_) values.add(std::string_view(*robot_));
@@ -429,8 +429,6 @@ std::vector<ViewId> PostgresqlTables::views_within(const PositionBounds& bounds)
   std::vector<ViewId> views;
   const Rows rows = connection_.run(
       "SELECT id FROM panonav.views WHERE memory = $1 AND x_m IS NOT NULL AND "
-      "floor(x_m / 10) BETWEEN floor($2 / 10) AND floor($3 / 10) AND "
-      "floor(y_m / 10) BETWEEN floor($4 / 10) AND floor($5 / 10) AND "
       "x_m BETWEEN $2 AND $3 AND y_m BETWEEN $4 AND $5 ORDER BY id",
       Values()
           .add(memory_)
