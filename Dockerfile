@@ -7,7 +7,7 @@ ARG SOURCE_DATE_EPOCH=1767225600
 WORKDIR /panonav
 COPY run ./
 # Of the script alone, so that a change of the sources does not install everything again.
-RUN apt-get update && ./run setup && apt-get install -y --no-install-recommends dpkg-dev && rm -rf /var/lib/apt/lists/*
+RUN apt-get update && ./run setup && apt-get install -y --no-install-recommends dpkg-dev file && rm -rf /var/lib/apt/lists/*
 COPY . .
 RUN SOURCE_DATE_EPOCH=$SOURCE_DATE_EPOCH tools/make_packages /packages
 
