@@ -3,11 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstddef>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
+#include "panonav/kernels/similarity.hpp"
 
 namespace panonav::kernels {
 namespace {
@@ -92,6 +95,41 @@ TEST(MovePoses, RefusesSpansOfDifferentSizes) {
   std::vector<float> first(2), second(1);
   const std::vector<std::uint64_t> bits(2);
   EXPECT_THROW(normal_pairs(bits, first, second, Instructions::scalar), ContractError);
+}
+
+template <class Number>
+std::uint64_t sum_of_bytes(const std::vector<Number>& numbers) {  // FNV-1a
+  std::uint64_t sum = 1469598103934665603ULL;
+  for (const std::byte byte : std::as_bytes(std::span(numbers))) {
+    sum = (sum ^ std::to_integer<std::uint64_t>(byte)) * 1099511628211ULL;
+  }
+  return sum;
+}
+
+// The sums were written down on x86-64; those of 64-bit ARM are the same.
+TEST(Motion, HasTheSameBitsOnEveryProcessor) {
+  Random random(7);
+  constexpr int count = 10007;
+  std::vector<std::uint64_t> bits(count);
+  for (auto& number : bits) number = random.next();
+  std::vector<double> uniform(count);
+  for (double& number : uniform) number = random.uniform();
+  EXPECT_EQ(sum_of_bytes(uniform), 1451085779581026341ULL);
+  for (const Instructions set : available_instructions()) {
+    SCOPED_TRACE(name(set));
+    std::vector<float> first(count), second(count), logarithms(count), values(count);
+    normal_pairs(bits, first, second, set);
+    EXPECT_EQ(sum_of_bytes(first), 10814958429094395755ULL);
+    EXPECT_EQ(sum_of_bytes(second), 3295923205418411501ULL);
+    Columns poses{uniform, uniform, uniform};
+    move_poses({poses.x_m, poses.y_m, poses.heading_rad}, {uniform, uniform, uniform, 0.3, 0.5},
+               set);
+    EXPECT_EQ(sum_of_bytes(poses.x_m), 2493289068217550661ULL);
+    EXPECT_EQ(sum_of_bytes(poses.y_m), 7882735404004982888ULL);
+    for (int i = 0; i < count; ++i) logarithms[i] = -80.0F * static_cast<float>(uniform[i]);
+    exponentials(logarithms, 0.7F, values, set);
+    EXPECT_EQ(sum_of_bytes(values), 3420407362764142580ULL);
+  }
 }
 
 }  // namespace
