@@ -170,6 +170,8 @@ struct ElsewhereReproductionOptions {
   int runs = 40;              ///< homing runs and missions in each place, >= 2
   int rows = 80;              ///< of the views
   bool floors = true;         ///< whole floors of the worlds are arranged
+  int days = 30;              ///< that a place changes while its memory learns, >= 1
+  int day_pictures = 120;     ///< of a robot's errands on each of them, half a metre apart, >= 4
   std::uint64_t seed = 5001;  ///< of the first variant; the others follow it
   /// Folder of the recordings and Gazebo worlds (docs/formats.md); empty: these are left out.
   std::filesystem::path data;

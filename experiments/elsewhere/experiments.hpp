@@ -48,6 +48,10 @@ void reproduce_tilted_homing(const ElsewhereReproductionOptions& options, Execut
 /// over that.
 void reproduce_floor(const ElsewhereReproductionOptions& options, const std::string& world,
                      double spacing_m, Executor& executor, Reproduction& result);
+/// A place whose furniture moves and whose light changes for days, asked of its memory with and
+/// without learning.
+void reproduce_days(const ElsewhereReproductionOptions& options, const std::string& place,
+                    Executor& executor, Reproduction& result);
 /// A recording, a data set's folder: each picture, turned, is asked of the memory of all others, of
 /// panonav, of rivals that need no library, and of those that the caller has beside them.
 void reproduce_leave_one_out(const ElsewhereReproductionOptions& options,

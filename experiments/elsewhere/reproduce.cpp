@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -5,6 +6,7 @@
 #include "experiments/reproduction_stages.hpp"
 #include "experiments/runs/worlds.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/simulation/scenes.hpp"
 
 namespace panonav {
 
@@ -14,6 +16,8 @@ ElsewhereReproductionOptions quick_run(ElsewhereReproductionOptions options) {
   options.queries = 8;
   options.runs = 2;
   options.floors = false;
+  options.days = 3;
+  options.day_pictures = 20;
   return options;
 }
 
@@ -22,6 +26,8 @@ Reproduction reproduce_elsewhere(const ElsewhereReproductionOptions& options, Ex
   require(options.scenes >= 1, "scenes", options.scenes, ">= 1");
   require(options.queries >= 4, "queries", options.queries, ">= 4");
   require(options.runs >= 2, "runs", options.runs, ">= 2");
+  require(options.days >= 1, "days", options.days, ">= 1");
+  require(options.day_pictures >= 4, "day_pictures", options.day_pictures, ">= 4");
   require(!options.built_in.empty(), "built-in scenes", 0.0, ">= 1");
   make_folder(options.out);
   Reproduction result;
@@ -47,6 +53,14 @@ Reproduction reproduce_elsewhere(const ElsewhereReproductionOptions& options, Ex
                         reproduce_leave_one_out(options, options.data / recording, {}, executor,
                                                 result);
                       }});
+  }
+  for (const char* const name : {"office", "small_warehouse"}) {
+    const std::vector<std::string> worlds = worlds_in(options.data);
+    const bool is_there = std::ranges::find(scene_names(), name) != scene_names().end() ||
+                          std::ranges::find(worlds, name) != worlds.end();
+    if (!is_there) continue;
+    stages.push_back({std::string("days in ") + name, 60.0,
+                      [&, name] { reproduce_days(options, name, executor, result); }});
   }
   if (options.floors) {
     for (const std::string& world : all_worlds_in(options.data)) {

@@ -54,6 +54,45 @@ class Localise : public ::testing::Test {
   inline static std::optional<std::vector<Pose2>> asked_;
 };
 
+TEST_F(Localise, LearnsWhatHasChangedAndUndoTakesItBack) {
+  const std::string file = *folder_ / "learning.panonav";
+  std::filesystem::copy_file(memory(), file);
+  const ToyWorld changed = landmark_world(11);
+  std::vector<Pose2> drive;
+  for (int i = 0; i < 17; ++i) drive.push_back({0.125 * i, 1.05, 0.0});
+  write_dataset(*folder_ / "drive", *world_, drive);
+  std::string csv = "file,odom_x_m,odom_y_m,odom_heading_deg\n";
+  for (std::size_t i = 0; i < drive.size(); ++i) {
+    if (i >= 7 && i < 11) write_picture(*folder_ / "drive" / view_name(i), changed, drive[i]);
+    csv += view_name(i) + "," + to_text(-drive[i].y_m) + "," + to_text(drive[i].x_m) + ",90\n";
+  }
+  write_file(*folder_ / "drive" / "poses.csv", std::string_view(csv));
+  const std::string drive_folder = *folder_ / "drive";
+  const auto views = [&] { return answers_of({"list", file, "--json"}).at(0).at("views").size(); };
+  const auto changes = [&] { return answers_of({"history", file, "--json"}).at(0).at("changes"); };
+  const std::size_t before = views();
+  EXPECT_TRUE(changes().empty());
+  run_well({"localise", file, drive_folder, "--learn"});
+  EXPECT_GT(views(), before);
+  ASSERT_EQ(changes().size(), 1U);
+  EXPECT_TRUE(changes()[0].at("undoable"));
+  run_well({"undo", file});
+  EXPECT_EQ(views(), before);
+  EXPECT_TRUE(changes().empty());
+
+  const auto refused = [&](const std::vector<std::string>& more, std::string_view part) {
+    std::vector<std::string> arguments{"localise", file};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const auto result = run_panonav(arguments);
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_NE(result.err.find(part), std::string::npos) << result.err;
+  };
+  refused({drive_folder, "--appearances", "2"}, "without --learn");
+  refused({drive_folder, "--learn", "--turn-randomly", "1"}, "with --learn");
+  refused({drive_folder + "/" + view_name(0), drive_folder + "/" + view_name(1), "--learn"},
+          "one recording");
+}
+
 TEST_F(Localise, TheLibraryGivesTheCommandsAnswerToTheBit) {
   const PlaceRecogniser recogniser(memory());
   const auto told = answers({memory(), asked()});

@@ -85,14 +85,17 @@ TEST_F(Reproductions, ElsewhereIsTheSameOnOneAndTwoThreads) {
                                 .queries = 4,
                                 .runs = 2,
                                 .rows = 20,
+                                .days = 3,
+                                .day_pictures = 12,
                                 .seed = 7},
                                executor);
   };
-  expect_same_on_one_and_two_threads(reproduce, 25, 0);
+  expect_same_on_one_and_two_threads(reproduce, 30, 1);
   for (const char* const id :
        {"elsewhere.places.office.clean.known", "elsewhere.places.lab.radius",
         "elsewhere.places.other", "elsewhere.places.variant", "elsewhere.home.foreign",
-        "elsewhere.home.noise_16", "elsewhere.tilt.lab.3", "elsewhere.tracks.office.ellipse"}) {
+        "elsewhere.home.noise_16", "elsewhere.tilt.lab.3", "elsewhere.tracks.office.ellipse",
+        "elsewhere.days.office.with", "elsewhere.days.office.views"}) {
     EXPECT_TRUE(ids.contains(id)) << id;
   }
 }

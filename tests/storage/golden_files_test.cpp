@@ -12,8 +12,8 @@ namespace panonav::testing {
 namespace {
 
 /// Files that the program of each version of the format wrote, and that stay as they are:
-/// data/version_N.panonav. All have five views with numbers that follow from those of the view; 2
-/// has a chain, from 3 on there is a map, from 4 on a route.
+/// data/version_N.panonav. 7 keeps two changes. All have five views with numbers that
+/// follow from those of the view; 2 has a chain, from 3 on there is a map, from 4 on a route.
 class GoldenMemoryFiles : public ::testing::TestWithParam<int> {
  protected:
   void SetUp() override {
@@ -70,6 +70,13 @@ TEST_P(GoldenMemoryFiles, AreReadAndGrow) {
     EXPECT_EQ(file.header().created_s, 1700000000.5);
     EXPECT_EQ(file.parameter("learnt"), "a model");
     expect_views(file);
+    const auto history = file.history();
+    ASSERT_EQ(history.size(), GetParam() >= 7 ? 2U : 0U);
+    if (!history.empty()) {
+      EXPECT_EQ(history[0].what, "back again");
+      EXPECT_EQ(history[1].what, "learnt anew");
+      EXPECT_TRUE(history[1].undoable);
+    }
     const auto map = file.map("map");
     ASSERT_EQ(map.has_value(), GetParam() >= 3);
     if (map) {
@@ -92,13 +99,40 @@ TEST_P(GoldenMemoryFiles, AreReadAndGrow) {
   more.info.name = "more.png";
   more.signature = file.load().packed(ViewId{1});
   EXPECT_EQ(file.append(more), ViewId{6});
-  EXPECT_EQ(file.info().format_version, 6);
+  EXPECT_EQ(file.info().format_version, 7);
   file.change([&] { file.remove(std::array{ViewId{6}}); }, "removed");
   EXPECT_TRUE(file.verify().empty());
   expect_views(file);
 }
 
-INSTANTIATE_TEST_SUITE_P(Versions, GoldenMemoryFiles, ::testing::Range(1, 7));
+// Version 6 kept one change, without a stamp, in a table of its own.
+TEST(GoldenMemoryFile, TheChangeThatAnOlderVersionKeptIsTakenBack) {
+  const TemporaryFolder folder;
+  const std::filesystem::path path = folder / "m.panonav";
+  std::filesystem::copy_file(
+      std::filesystem::path(PANONAV_TEST_DATA) / "version_6_forgotten.panonav", path);
+  {
+    const MemoryFile file = MemoryFile::open(path, Access::read_only);
+    EXPECT_EQ(file.info().format_version, 6);
+    ASSERT_EQ(file.history().size(), 1U);
+    EXPECT_EQ(file.undoable(), "forget: 1 views dropped");
+    EXPECT_FALSE(file.history().front().stamp_s);
+    EXPECT_EQ(file.load().size(), 4U);
+    EXPECT_TRUE(file.verify().empty());
+  }
+  MemoryFile file = MemoryFile::open(path, Access::read_write);
+  file.change([&] { file.set_parameter("mark", "x"); }, "mark");
+  EXPECT_EQ(file.info().format_version, 7);
+  ASSERT_EQ(file.history().size(), 2U);
+  file.undo();
+  EXPECT_EQ(file.undoable(), "forget: 1 views dropped");
+  file.undo();
+  EXPECT_TRUE(file.history().empty());
+  expect_views(file);
+  EXPECT_TRUE(file.verify().empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(Versions, GoldenMemoryFiles, ::testing::Range(1, 8));
 
 }  // namespace
 }  // namespace panonav::testing

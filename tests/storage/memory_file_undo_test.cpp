@@ -49,11 +49,40 @@ TEST_F(MemoryFileUndo, BringsBackAllThatWasDropped) {
   file.reset();
   file.emplace(MemoryFile::open(path, Access::read_write));
   EXPECT_EQ(file->undoable(), "forget 2");
-  file->undo();  // the last change, not the one before
+  file->undo();  // the last change before the one before it
   EXPECT_EQ(file->load().size(), 11U);
   EXPECT_EQ(file->thumbnail(ids[4]), thumbnail);
   EXPECT_EQ(file->map("map")->nodes.size(), 10U);
+  EXPECT_EQ(file->undoable(), "forget 1");
+  EXPECT_TRUE(file->verify().empty());
+  file->undo();
+  EXPECT_TRUE(same_content(file->load(), *before));
+  EXPECT_EQ(file->map("map"), map);
   EXPECT_FALSE(file->undoable());
+  EXPECT_TRUE(file->verify().empty());
+}
+
+TEST_F(MemoryFileUndo, HistoryIsBoundedAndToldNewestFirst) {
+  EXPECT_TRUE(file->history().empty());
+  constexpr auto levels = static_cast<int>(MemoryFile::max_undo_levels);
+  constexpr auto lines = static_cast<int>(MemoryFile::max_history);
+  for (int i = 0; i < lines + 5; ++i) {
+    file->change([&] { file->set_parameter("mark", std::to_string(i)); }, std::to_string(i));
+  }
+  const auto history = file->history();
+  ASSERT_EQ(history.size(), MemoryFile::max_history);
+  for (int i = 0; i < lines; ++i) {
+    const KeptChange& kept = history[static_cast<std::size_t>(i)];
+    EXPECT_EQ(kept.what, std::to_string(lines + 4 - i));
+    EXPECT_EQ(kept.undoable, i < levels);
+    EXPECT_EQ(kept.bytes > 0, i < levels);
+    EXPECT_TRUE(kept.stamp_s);
+  }
+  for (int i = 0; i < levels; ++i) file->undo();
+  EXPECT_EQ(file->parameter("mark"), std::to_string(lines + 4 - levels));
+  EXPECT_FALSE(file->undoable());
+  EXPECT_FALSE(message_of<ContractError>([&] { file->undo(); }).empty());
+  EXPECT_EQ(file->history().size(), MemoryFile::max_history - MemoryFile::max_undo_levels);
   EXPECT_TRUE(file->verify().empty());
 }
 
@@ -143,7 +172,7 @@ TEST_F(MemoryFileUndo, IsRefusedWhereItWouldOverwrite) {
 TEST_F(MemoryFileUndo, DamageIsNotApplied) {
   forget({ids[4]});
   file.reset();
-  run_sql(path, "UPDATE undo SET changes = CAST(changes || x'00' AS BLOB)");
+  run_sql(path, "UPDATE history SET changes = CAST(changes || x'00' AS BLOB)");
   file.emplace(MemoryFile::open(path, Access::read_write));
   EXPECT_TRUE(
       contains(message_of<FileError>([&] { file->undo(); }), "does not match its checksum"));

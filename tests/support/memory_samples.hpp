@@ -90,11 +90,11 @@ inline void run_sql(const std::filesystem::path& path, const std::string& sql) {
 
 /// Takes from a new file what versions after the first added. It held no map and no route.
 inline void make_version_1(const std::filesystem::path& path) {
-  run_sql(
-      path,
-      "PRAGMA journal_mode=DELETE; DROP TABLE log; DROP TABLE undo; DROP TABLE maps; DROP TABLE "
-      "routes; DROP TABLE route_blocks; DROP TABLE features; PRAGMA user_version=1; PRAGMA "
-      "journal_mode=WAL");
+  run_sql(path,
+          "PRAGMA journal_mode=DELETE; DROP TABLE log; DROP TABLE undo; DROP TABLE history; DROP "
+          "TABLE maps; DROP TABLE "
+          "routes; DROP TABLE route_blocks; DROP TABLE features; PRAGMA user_version=1; PRAGMA "
+          "journal_mode=WAL");
 }
 
 /// Makes a file of version 1 one of version 2, as programs did that saved chains of snapshots: with

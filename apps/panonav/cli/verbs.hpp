@@ -43,6 +43,7 @@ namespace panonav::command {
 [[nodiscard]] Verb track_verb();
 [[nodiscard]] Verb run_verb();
 [[nodiscard]] Verb undo_verb();
+[[nodiscard]] Verb history_verb();
 [[nodiscard]] Verb unwrap_verb();
 [[nodiscard]] Verb verify_verb();
 

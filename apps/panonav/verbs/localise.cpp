@@ -11,7 +11,9 @@
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
+#include "panonav/pipeline/memory_learner.hpp"
 #include "panonav/pipeline/observation_source.hpp"
+#include "panonav/pipeline/visual_motion.hpp"
 #include "reports/localise_report.hpp"
 #include "verbs/live_run.hpp"
 #include "verbs/localised_query.hpp"
@@ -34,6 +36,8 @@ struct LocaliseArguments {
   WantedAccuracy accuracy;
   std::optional<std::uint64_t> turn_seed;
   bool exclude_same_file = false;
+  bool learn = false;
+  MemoryUpdateOptions update;
   bool areas = false;
   std::optional<std::string> out;
   std::optional<std::string> report;
@@ -92,6 +96,7 @@ struct Answer {
   LocalisedQuery query;
   std::exception_ptr failure;  ///< why there is none
   std::optional<RunMoment> moment;
+  std::optional<Observation> seen;  ///< with its panorama, where the memory learns from it
 };
 
 /// `name`: what is called the same file. `shown`: null where nothing is recorded.
@@ -113,6 +118,12 @@ Answer answer(const PlaceRecogniser& recogniser, const LocaliseArguments& wanted
       observation.name, turned_rad,
       recogniser.localise(observation, std::span(&name, wanted.exclude_same_file ? 1 : 0)),
       observation.pose, ""};
+  if (wanted.learn) {
+    answer.seen.emplace(recogniser.encoder().panorama(observation));
+    answer.seen->name = observation.name;
+    answer.seen->stamp_s = observation.stamp_s;
+    answer.seen->odometry = observation.odometry;
+  }
   if (!answer.moment) return answer;
   RunMoment& moment = *answer.moment;
   clock.stage(moment.panorama ? "signature, search, ranking" : "unwarping to ranking");
@@ -168,7 +179,8 @@ void check(const Arguments& arguments, const LocaliseArguments& wanted,
 /// All answers, told as they come. What cannot be read is named; throws where nothing can.
 std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
                                        const LocaliseArguments& wanted, const Dataset& recording,
-                                       const MemoryFile& file, Session& session) {
+                                       const MemoryFile& file, MemoryLearner* learner,
+                                       Session& session) {
   std::vector<std::string> read = wanted.inputs;
   read.push_back(wanted.memory);
   RunRecord record(wanted.record, read, false, session, {.memory = wanted.memory});
@@ -189,7 +201,8 @@ std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
         try {
           seen = read_observation(entry);
         } catch (const FileError& error) {
-          return {{entry.file, 0.0, {}, entry.pose, error.what()}, std::current_exception(), {}};
+          return {
+              {entry.file, 0.0, {}, entry.pose, error.what()}, std::current_exception(), {}, {}};
         }
         clock.stage("reading");
         // Several pictures are called as they were typed.
@@ -201,6 +214,9 @@ std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
         return given;
       },
       [&](std::size_t, Answer&& made) {
+        if (learner != nullptr && made.seen) {
+          learner->see(*made.seen, std::get<Panorama>(made.seen->picture), made.query.place);
+        }
         if (made.moment) {
           made.moment->best_match = best_match_of(made.query.place, file);
           if (std::exchange(first, false)) shown->put(*made.moment);
@@ -230,7 +246,7 @@ std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
 ExitCode localise_live(const Arguments& arguments, const LocaliseArguments& wanted,
                        const MemoryFile& file, Session& session) {
   const std::string& input = wanted.inputs.front();
-  arguments.refuse_unused({"--report", "--exclude-same-file"},
+  arguments.refuse_unused({"--report", "--exclude-same-file", "--learn"},
                           "where " + input + " is a live source");
   const auto source = open_live(arguments, input, checked_beside(wanted.pictures, file),
                                 file.header().source, wanted.live);
@@ -285,15 +301,31 @@ ExitCode localise(const Arguments& arguments, const LocaliseArguments& wanted, S
     return localise_live(arguments, wanted, file, session);
   }
   refuse_live(arguments, wanted.inputs.front(), true);
+  if (wanted.learn) {
+    arguments.refuse_unused({"--turn-randomly", "--exclude-same-file"}, "with --learn");
+  }
 #ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) prepare_report_folder(*wanted.report, "localise");
 #endif
-  const auto recording = open_queries(wanted, file, session);
+  if (wanted.learn && wanted.inputs.size() > 1) {
+    throw UsageError("--learn goes with one recording, whose pictures are in order");
+  }
+  std::optional<MemoryLearner> learner;  // refuses before anything is answered
+  if (wanted.learn) learner.emplace(wanted.memory, wanted.update);
+  auto recording = open_queries(wanted, file, session);
   const PlaceRecogniser recogniser(
       file, {.localiser = wanted.localiser,
              .source = recording.source,
              .areas = wanted.areas ? std::optional(wanted.accuracy) : std::nullopt});
-  const auto answers = answer_all(recogniser, wanted, recording, file, session);
+  const bool moves = std::ranges::all_of(
+      recording.entries, [](const DatasetEntry& entry) { return entry.odometry.has_value(); });
+  if (learner && !moves) {
+    session.note("motion is read from the pictures, as some have no odometry: " +
+                 add_visual_odometry(recording, recogniser.memory(), recogniser.encoder(),
+                                     session.executor()));
+  }
+  const auto answers =
+      answer_all(recogniser, wanted, recording, file, learner ? &*learner : nullptr, session);
   const auto count = [&](const auto& holds) {
     return static_cast<std::size_t>(std::ranges::count_if(answers, holds));
   };
@@ -321,6 +353,13 @@ ExitCode localise(const Arguments& arguments, const LocaliseArguments& wanted, S
     tell_report(*wanted.report, session);
   }
 #endif
+  if (learner) {
+    const auto changes = learner->finish("learn from " + wanted.inputs.front());
+    session.note(as_text(changes) + "; " + std::to_string(changes.certain) + " of " +
+                 std::to_string(changes.seen) + " places certain");
+    if (changes.certain > 0)
+      session.suggest({"panonav", "undo", wanted.memory}, "To take it back:");
+  }
   return known > 0 ? ExitCode::done : ExitCode::no_answer;
 }
 
@@ -345,14 +384,22 @@ Run declare_localise(Arguments& arguments) {
 #endif
   arguments.flag("--exclude-same-file", wanted->exclude_same_file,
                  "Leave out the reference view of the same file name (leave-one-out)");
+  arguments.flag("--learn", wanted->learn,
+                 "Keep the memory true by a recording in order, whose odometry counts or motion is "
+                 "read from the pictures: other appearances of known places are added, up to "
+                 "--appearances, and what keeps failing is replaced");
   arguments.option("--turn-randomly SEED", wanted->turn_seed,
                    "Turn the robot before each query by a random number of whole columns; "
                    "turned_rad is the turn, counter-clockwise positive");
+  arguments.uncommon({"--turn-randomly"});
   arguments.flag("--areas", wanted->areas,
                  "Also show the area where the robot may be, component by component");
   arguments.options("localiser", wanted->localiser);
   arguments.options("accuracy", wanted->accuracy, "area");
+  arguments.options("learning", wanted->update);
   arguments.common({"--top"});
+  arguments.used_only(
+      {"[learning]"}, [wanted] { return wanted->learn; }, "without --learn");
   arguments.used_only(
       {"[accuracy]"}, [wanted] { return wanted->areas; }, "without --areas");
   return [wanted, &arguments](Session& session) { return localise(arguments, *wanted, session); };
@@ -372,6 +419,7 @@ Verb localise_verb() {
       "  panonav localise office.panonav one.png two.png -o answers.csv\n"
       "  panonav localise office.panonav view.png --json\n"
       "  panonav localise office.panonav /dev/video0\n"
+      "  panonav localise office.panonav monday_run --learn\n"
       "  panonav localise office.panonav office_run --exclude-same-file --turn-randomly 7 --json",
       declare_localise,
       "localize"};

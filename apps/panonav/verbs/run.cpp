@@ -39,6 +39,7 @@ struct RunArguments {
   std::optional<std::string> route;
   SignatureOptions signature;
   PreprocessingOptions preprocessing;
+  MemoryUpdateOptions update;
 };
 
 /// Whose poses the lines of a route get.
@@ -203,6 +204,7 @@ ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& se
                      RouteFollowerOptions{.name = wanted.route, .tracker = {}, .fit = {}});
   }
   LiveMemoryOptions options{.learn = wanted.learn,
+                            .update = wanted.update,
                             .in_step = !live,
                             .memoriser = {.source = source->pictures(),
                                           .signature = wanted.signature,
@@ -239,7 +241,8 @@ ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& se
         if (record.wanted()) record.add(moments.of(seen, answer, record, stages));
         if (answer.is_new) memory.learn(std::move(seen));
       });
-  memory.finish();  // a reader of the lines may never go on
+  // A reader of the lines may never go on.
+  const auto changes = memory.finish("learn from " + wanted.source);
   const std::size_t lines = route ? route->finish() : 0;
   record.close();
   const LiveCounts& counts = taking.finish();
@@ -248,6 +251,7 @@ ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& se
       std::to_string(counts.pictures) + " pictures, " + std::to_string(known) + " of places of " +
       wanted.memory +
       (wanted.learn ? ", " + std::to_string(memory.learnt()) + " views learnt" : "") +
+      (changes ? ", " + as_text(*changes) : "") +
       (route ? ", " + std::to_string(lines) + " lines of the route" : "") +
       events_text(counts, record.left_out()) +
       (live ? ", unwrapping " + fixed(unwrapping.count() / std::max(1.0, asked), 1) + " ms" : ""));
@@ -260,7 +264,9 @@ Run declare_run(Arguments& arguments) {
                        "Camera (/dev/video0), address (rtsp://, http://, tcp://), - for JPEG "
                        "pictures on standard input, or a recording");
   arguments.required_option("--memory FILE", wanted->memory, "Memory file (NAME.panonav)");
-  arguments.flag("--learn", wanted->learn, "Add views of places that the memory does not know");
+  arguments.flag("--learn", wanted->learn,
+                 "Add views of places that the memory does not know, and keep those of known ones "
+                 "true");
   arguments.option("--learn-interval-s", wanted->learn_interval_s,
                    "Time between two views that are added, at least; default 0.5");
   declare_record(arguments, wanted->record);
@@ -271,9 +277,10 @@ Run declare_run(Arguments& arguments) {
   declare_pictures(arguments, wanted->pictures);
   arguments.options("signature", wanted->signature);
   arguments.options("preprocessing", wanted->preprocessing);
+  arguments.options("learning", wanted->update);
   arguments.common({"--count"});
   arguments.used_only(
-      {"--learn-interval-s"}, [wanted] { return wanted->learn; }, "without --learn");
+      {"--learn-interval-s", "[learning]"}, [wanted] { return wanted->learn; }, "without --learn");
   return [wanted, &arguments](Session& session) { return run(arguments, *wanted, session); };
 }
 
@@ -284,6 +291,10 @@ Verb run_verb() {
       "run", "Memorise and localise in one go on a live camera or a recording",
       "Tells for each picture whether its place is known and where it is. With --learn, views "
       "of places that the memory does not know are added; a new memory begins with 32 views. "
+      "Where pictures have odometry and views positions, views of known places are kept true: "
+      "other "
+      "appearances of a place are added, up to --appearances, and what keeps failing is replaced "
+      "(panonav history, panonav undo). "
       "Of a live source the newest picture is taken and those between are dropped. --route tells "
       "where the robot is beside a recorded route, or records one with the poses of the "
       "recording, its odometry, or motion read from the pictures. Ends with the source, or on "

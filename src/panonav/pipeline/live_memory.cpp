@@ -109,11 +109,18 @@ struct LiveMemory::Implementation {
     if (options.learn) {
       memoriser.emplace(path, options.memoriser);
       if (!options.in_step) storer.emplace(*memoriser);
+      if (exists && can_be_kept_true()) learner.emplace(path, options.update);
     } else if (!exists) {
       throw FileError(without_passwords(path.string()),
                       "is not there, and nothing is to be learnt");
     }
     if (exists) recogniser = make_recogniser();
+  }
+
+  /// Other memories only grow.
+  [[nodiscard]] bool can_be_kept_true() {
+    return memoriser->file()->info().views_with_heading >=
+           static_cast<std::uint64_t>(ObservationModel::min_views);
   }
 
   [[nodiscard]] std::unique_ptr<PlaceRecogniser> make_recogniser() const {
@@ -149,6 +156,7 @@ struct LiveMemory::Implementation {
   LiveMemoryOptions options;
   std::optional<Memoriser> memoriser;  // the thread of `storer` uses it, where there is one
   std::optional<Storer> storer;
+  std::optional<MemoryLearner> learner;  // of the views that were there at first
   std::unique_ptr<PlaceRecogniser> recogniser;
   std::optional<Panorama> panorama;  // of the observation `answered`
   std::string answered;
@@ -178,13 +186,18 @@ LiveMemory::Answer LiveMemory::answer(const Observation& observation) {
     self.answered = observation.name;
     answer.place = self.recogniser->localise(unwrapped(observation, *self.panorama));
   }
+  bool is_placed_later = false;
+  if (self.learner && answer.place && observation.odometry) {
+    self.learner->see(observation, *self.panorama, *answer.place);
+    is_placed_later = self.learner->near_known_places();
+  }
   const bool due = !self.last_added_s || !observation.stamp_s ||
                    *observation.stamp_s - *self.last_added_s >= self.options.min_interval_s ||
                    *observation.stamp_s < *self.last_added_s;  // the clock was set back
   const bool stored = self.recogniser && self.recogniser->memory().find(observation.name);
   const bool full = self.storer && self.storer->waiting() >= max_waiting;
-  answer.is_new =
-      self.options.learn && due && !stored && !full && !(answer.place && answer.place->known);
+  answer.is_new = self.options.learn && due && !stored && !full && !is_placed_later &&
+                  !(answer.place && answer.place->known);
   return answer;
 }
 
@@ -231,11 +244,15 @@ std::size_t LiveMemory::learnt() const noexcept {
   return implementation_->learnt;
 }
 
-void LiveMemory::finish() {
+std::optional<MemoryLearner::Changes> LiveMemory::finish(const std::string& what) {
   auto& self = *implementation_;
   if (self.next.valid()) self.next.wait();
   if (self.storer) self.storer->finish();
+  std::optional<MemoryLearner::Changes> changes;
+  if (self.learner) changes = self.learner->finish(what);
+  self.learner.reset();
   if (self.learnt > 0) self.memoriser->finish();
+  return changes;
 }
 
 }  // namespace panonav

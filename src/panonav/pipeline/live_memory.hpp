@@ -7,13 +7,17 @@
 #include <optional>
 
 #include "panonav/pipeline/memoriser.hpp"
+#include "panonav/pipeline/memory_learner.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
 
 namespace panonav {
 
 struct LiveMemoryOptions {
-  /// Add the views of places that the memory does not know; without it the file is only read.
+  /// Add the views of places that the memory does not know, and keep those of known ones true
+  /// (`MemoryLearner`) where the memory has positions and headings and the observations odometry;
+  /// without it the file is only read.
   bool learn = false;
+  MemoryUpdateOptions update;
   /// Between two views that are added: until the memory has learnt from a view, those after it look
   /// as new as it did. Of observations with stamps.
   double min_interval_s = 0.5;
@@ -65,9 +69,10 @@ class LiveMemory {
   /// Views that can be found now, and those that were added.
   [[nodiscard]] std::size_t views() const noexcept;
   [[nodiscard]] std::size_t learnt() const noexcept;
-  /// Writes what still waits, and keeps what is learnt in the file. Nothing where nothing was
-  /// added. Throws as `learn`.
-  void finish();
+  /// Writes what still waits, changes what the run has shown to have changed, and keeps what is
+  /// learnt in the file. Nothing where nothing was added and no place was certain. `what`: the run,
+  /// for the history. Throws as `learn`. Gives what was kept true; empty where nothing could be.
+  std::optional<MemoryLearner::Changes> finish(const std::string& what = "learn");
 
  private:
   struct Implementation;

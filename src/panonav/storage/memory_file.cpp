@@ -160,14 +160,20 @@ void MemoryFile::change(const std::function<void()>& changes,
   transaction->commit();
 }
 
+std::vector<KeptChange> MemoryFile::history() const {
+  return implementation_->tables->history();
+}
+
 std::optional<std::string> MemoryFile::undoable() const {
-  return implementation_->tables->undoable();
+  const std::vector<KeptChange> kept = history();
+  if (kept.empty() || !kept.front().undoable) return std::nullopt;
+  return kept.front().what;
 }
 
 void MemoryFile::undo() {
   MemoryTables& tables = *implementation_->tables;
   const auto transaction = tables.transaction(MemoryTables::Kind::writing);
-  if (!tables.undoable()) {
+  if (!undoable()) {
     throw ContractError("undo", "not possible", "after a change that was kept for it");
   }
   tables.undo();
@@ -388,7 +394,7 @@ std::vector<MemoryFault> MemoryFile::verify() const {
         tables, [&](ViewId view) { return views.contains(view); }, check_part);
   });
   check_part([&] { verify_routes(tables, check_part); });
-  check_part([&] { static_cast<void>(undoable()); });
+  check_part([&] { static_cast<void>(history()); });
   return faults;
 }
 

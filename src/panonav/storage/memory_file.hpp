@@ -58,6 +58,15 @@ struct MemoryFault {
   friend bool operator==(const MemoryFault&, const MemoryFault&) = default;
 };
 
+/// A change of a memory that was kept so that it can be taken back.
+struct KeptChange {
+  std::string what;               ///< for people
+  std::optional<double> stamp_s;  ///< seconds since 1970-01-01 UTC; empty: an older version made it
+  std::uint64_t bytes = 0;        ///< that are kept for taking it back
+  bool undoable = false;          ///< false: too old, only its description is left
+  friend bool operator==(const KeptChange&, const KeptChange&) = default;
+};
+
 /// Counts and sizes of a memory file.
 struct MemoryFileInfo {
   std::uint64_t views = 0;
@@ -109,15 +118,25 @@ class MemoryFile {
 
   /// All that `changes` changes by the member functions below, in one transaction: all of it is on
   /// the disk when this returns, nothing of it when `changes` throws or the process ends before.
-  /// With `undo`, a description for people, what it replaced or dropped is kept in the file,
-  /// instead of what was kept before, so that `undo` brings it back. Throws FileError when that is
-  /// more than 200 MiB.
+  /// With `undo`, a description for people, what it replaced or dropped is kept in the file, above
+  /// what was kept before, so that `undo` brings it back. Of changes beyond the newest
+  /// `max_undo_levels`, and of those with which more than `max_history_bytes` would be kept, the
+  /// description alone is left, of those beyond `max_history` nothing; a server keeps
+  /// one. Throws FileError when the
+  /// change itself takes more than 200 MiB.
   void change(const std::function<void()>& changes,
               const std::optional<std::string>& undo = std::nullopt);
+  static constexpr std::size_t max_undo_levels = 100;
+  static constexpr std::uint64_t max_history_bytes = 64U << 20U;
+  static constexpr std::size_t max_history = 1000;
+  /// The changes that were kept for `undo`, the newest first. Those that were taken back are not in
+  /// it.
+  [[nodiscard]] std::vector<KeptChange> history() const;
   /// The description of the change that `undo` takes back; empty: there is none.
   [[nodiscard]] std::optional<std::string> undoable() const;
-  /// Takes back the last change that was kept for this, in one transaction; what was added since
-  /// stays. Throws ContractError when there is none, FileError when later changes are in the way.
+  /// Takes back the newest change that was kept for this, in one transaction; the one before it is
+  /// the newest then. What was added since stays. Throws ContractError when there is none,
+  /// FileError when later changes are in the way.
   void undo();
 
   /// Adds a view and returns once it is on the disk. Throws ContractError on another shape, an

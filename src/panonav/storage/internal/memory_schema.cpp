@@ -29,7 +29,7 @@ struct Table {
 
 // Links have a < b. Every checksum is XXH64 over the other fields of its row (docs/formats.md). The
 // table `log` comes first, so that new files have it on their second page.
-constexpr std::array<Table, 10> tables{{
+constexpr std::array<Table, 11> tables{{
     {"log",
      "CREATE TABLE log(id INTEGER PRIMARY KEY, before BLOB NOT NULL, now BLOB NOT NULL) STRICT", 5},
     {"undo",
@@ -40,6 +40,10 @@ constexpr std::array<Table, 10> tables{{
      "CREATE TABLE features(view INTEGER PRIMARY KEY, features BLOB NOT NULL, checksum INTEGER NOT "
      "NULL) STRICT",
      6},
+    {"history",
+     "CREATE TABLE history(id INTEGER PRIMARY KEY, what TEXT NOT NULL, stamp_s REAL, changes BLOB, "
+     "checksum INTEGER NOT NULL) STRICT",
+     7},
     {"links",
      "CREATE TABLE links(a INTEGER NOT NULL, b INTEGER NOT NULL, kind INTEGER NOT NULL, checksum "
      "INTEGER NOT NULL, PRIMARY KEY(a, b)) STRICT, WITHOUT ROWID",
@@ -172,6 +176,12 @@ void upgrade_schema(Database& database) {
     if (version < table.since) database.execute(table.sql);
   }
   if (version < 5) database.execute("INSERT INTO log VALUES(1, zeroblob(16), randomblob(16))");
+  // A row without a stamp has the same checksum in both.
+  if (version == 5 || version == 6) {
+    database.execute(
+        "INSERT INTO history(what, changes, checksum) SELECT what, changes, checksum FROM undo");
+    database.execute("DELETE FROM undo");
+  }
   database.execute(("PRAGMA user_version=" + std::to_string(memory_format_version)).c_str());
 }
 

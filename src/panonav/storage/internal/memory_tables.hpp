@@ -148,8 +148,9 @@ class MemoryTables {
 
   /// Within a writing transaction: runs `changes` and keeps what they replace or drop.
   virtual void keep_for_undo(const std::function<void()>& changes, const std::string& what) = 0;
-  [[nodiscard]] virtual std::optional<std::string> undoable() = 0;
-  /// Within a writing transaction; there is something to undo.
+  /// The newest first.
+  [[nodiscard]] virtual std::vector<KeptChange> history() = 0;
+  /// Within a writing transaction; takes back the newest, which can be undone.
   virtual void undo() = 0;
 
   /// Passes every part of the check of the tables themselves to `check`; nothing after it is safe

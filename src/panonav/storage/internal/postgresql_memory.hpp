@@ -67,7 +67,8 @@ class PostgresqlTables final : public MemoryTables {
   [[nodiscard]] std::vector<std::string> routes_with_blocks() override;
 
   void keep_for_undo(const std::function<void()>& changes, const std::string& what) override;
-  [[nodiscard]] std::optional<std::string> undoable() override;
+  /// One change at most.
+  [[nodiscard]] std::vector<KeptChange> history() override;
   void undo() override;
 
   [[nodiscard]] std::set<ViewId> verify_structure(const Check& check) override;

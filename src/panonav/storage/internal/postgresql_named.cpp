@@ -113,13 +113,19 @@ void PostgresqlTables::keep_for_undo(const std::function<void()>& changes,
       what);
 }
 
-std::optional<std::string> PostgresqlTables::undoable() {
-  const Rows rows = run("SELECT what FROM panonav.undo WHERE memory = $1");
-  return rows.size() == 0 ? std::nullopt : std::optional(std::string(rows.text(0, 0)));
+std::vector<KeptChange> PostgresqlTables::history() {
+  const Rows rows = run(
+      "SELECT what, (SELECT coalesce(sum(coalesce(length(before), 0) + coalesce(length(after), "
+      "0)), 0)::int8 FROM panonav.undo_rows WHERE memory = $1) FROM panonav.undo WHERE memory = "
+      "$1");
+  if (rows.size() == 0) return {};
+  return {{std::string(rows.text(0, 0)), std::nullopt,
+           static_cast<std::uint64_t>(rows.integer(0, 1)), true}};
 }
 
 void PostgresqlTables::undo() {
-  const std::string what = undoable().value_or("");
+  const auto kept = history();
+  const std::string what = kept.empty() ? "" : kept.front().what;
   const Rows rows = run("SELECT panonav.undo($1)");
   if (!rows.is_null(0, 0)) {
     throw FileError(path().native(), "cannot undo \"" + what + "\": the table " +

@@ -60,7 +60,7 @@ class SqliteTables final : public MemoryTables {
   [[nodiscard]] std::vector<std::string> routes_with_blocks() override;
 
   void keep_for_undo(const std::function<void()>& changes, const std::string& what) override;
-  [[nodiscard]] std::optional<std::string> undoable() override;
+  [[nodiscard]] std::vector<KeptChange> history() override;
   void undo() override;
 
   [[nodiscard]] std::set<ViewId> verify_structure(const Check& check) override;
@@ -73,6 +73,8 @@ class SqliteTables final : public MemoryTables {
   /// Whether a file of this version has the table.
   [[nodiscard]] bool has(BesideViews table);
   [[nodiscard]] std::vector<std::string> texts(const char* sql);
+  /// What the bounds of `MemoryFile::change` drop.
+  void shorten_history();
 
   std::filesystem::path path_;
   Database database_;

@@ -1,4 +1,4 @@
-// Taking the last change of an SQLite file back, by the session extension.
+// Taking the last changes of an SQLite file back, by the session extension.
 
 #define SQLITE_ENABLE_SESSION
 #define SQLITE_ENABLE_PREUPDATE_HOOK
@@ -6,10 +6,12 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <memory>
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "panonav/core/error.hpp"
 #include "panonav/storage/internal/memory_rows.hpp"
@@ -40,16 +42,39 @@ struct SqliteBytes {
   }
 };
 
-// The only row of the table, checked.
-bool find_undo(Database& database, Statement& row) {
+// Columns: id, what, stamp_s, changes, checksum. Versions 5 and 6 keep one change, without a stamp.
+std::string select_history(Database& database, const char* order) {
+  if (!has_undo_table(database)) return "";
+  return (has_history_table(database)
+              ? "SELECT id, what, stamp_s, changes, checksum FROM history ORDER BY id "
+              : "SELECT id, what, NULL, changes, checksum FROM undo ORDER BY id ") +
+         std::string(order);
+}
+
+std::optional<double> stamp_in(const Statement& row) {
+  if (row.is_null(2)) return std::nullopt;
+  return row.real(2);
+}
+
+// Empty also where they are kept no more.
+std::span<const std::uint8_t> changes_in(const Statement& row) {
+  if (row.is_null(3)) return {};
+  return row.blob(3);
+}
+
+// The next change, checked.
+bool step_checked(Database& database, Statement& row) {
   if (!row.step()) return false;
-  if (row.integer(2) != undo_checksum(row.text(0), row.blob(1))) {
-    database.fail_damaged("the change that can be undone does not match its checksum");
+  if (row.integer(4) != undo_checksum(row.text(1), stamp_in(row), changes_in(row))) {
+    database.fail_damaged("a change that can be undone does not match its checksum");
   }
   return true;
 }
 
-constexpr const char* select_undo = "SELECT what, changes, checksum FROM undo WHERE id = 1";
+double now_s() {
+  const auto since = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration<double>(since).count();
+}
 
 // Settings are notes on the views, which are checked when they are used: newer ones stay.
 int on_conflict(void* in_the_way, int, sqlite3_changeset_iter* change) {
@@ -84,25 +109,71 @@ void SqliteTables::keep_for_undo(const std::function<void()>& changes, const std
   made.data.reset(data);
   session.reset();
   require_undo_bytes(path_, made.size);
-  Statement keep(database_, "REPLACE INTO undo(id, what, changes, checksum) VALUES(1, ?, ?, ?)");
-  keep.bind(1, std::string_view(what))
-      .bind(2, made.bytes())
-      .bind(3, undo_checksum(what, made.bytes()));
-  if (keep.run() != 0) fail_damaged("table undo");
+  const double stamp_s = now_s();
+  {
+    Statement keep(database_,
+                   "INSERT INTO history(what, stamp_s, changes, checksum) VALUES(?, ?, ?, ?)");
+    keep.bind(1, std::string_view(what))
+        .bind(2, stamp_s)
+        .bind(3, made.bytes())
+        .bind(4, undo_checksum(what, stamp_s, made.bytes()));
+    if (keep.run() != 0) fail_damaged("table history");
+  }
+  shorten_history();
 }
 
-std::optional<std::string> SqliteTables::undoable() {
-  if (!has_undo_table(database_)) return std::nullopt;
-  Statement row(database_, select_undo);
-  if (!find_undo(database_, row)) return std::nullopt;
-  return std::string(row.text(0));
+void SqliteTables::shorten_history() {
+  struct Old {
+    std::int64_t id;
+    std::string what;
+    std::optional<double> stamp_s;
+  };
+  std::vector<Old> old;
+  std::vector<std::int64_t> gone;
+  {
+    Statement row(database_,
+                  "SELECT id, what, stamp_s, length(changes) FROM history ORDER BY id DESC");
+    std::uint64_t bytes = 0;
+    for (std::size_t level = 0; row.step(); ++level) {
+      const bool is_kept = !row.is_null(3);
+      bytes += is_kept ? static_cast<std::uint64_t>(row.integer(3)) : 0;
+      const bool fits = level == 0 || (level < MemoryFile::max_undo_levels &&
+                                       bytes <= MemoryFile::max_history_bytes);
+      if (level >= MemoryFile::max_history) {
+        gone.push_back(row.integer(0));
+      } else if (is_kept && !fits) {
+        old.push_back({row.integer(0), std::string(row.text(1)), stamp_in(row)});
+      }
+    }
+  }
+  Statement forget(database_, "UPDATE history SET changes = NULL, checksum = ? WHERE id = ?");
+  for (const Old& change : old) {
+    static_cast<void>(
+        forget.bind(1, undo_checksum(change.what, change.stamp_s, {})).bind(2, change.id).run());
+  }
+  Statement erase(database_, "DELETE FROM history WHERE id = ?");
+  for (const std::int64_t id : gone) static_cast<void>(erase.bind(1, id).run());
+}
+
+std::vector<KeptChange> SqliteTables::history() {
+  const std::string sql = select_history(database_, "DESC");
+  std::vector<KeptChange> changes;
+  if (sql.empty()) return changes;
+  Statement row(database_, sql.c_str());
+  while (step_checked(database_, row)) {
+    changes.push_back(
+        {std::string(row.text(1)), stamp_in(row), changes_in(row).size(), !row.is_null(3)});
+  }
+  return changes;
 }
 
 void SqliteTables::undo() {
+  std::int64_t id = 0;
   {
-    Statement row(database_, select_undo);
-    if (!find_undo(database_, row)) fail_damaged("table undo");
-    const auto changes = row.blob(1);
+    Statement row(database_, select_history(database_, "DESC LIMIT 1").c_str());
+    if (!step_checked(database_, row) || row.is_null(3)) fail_damaged("table history");
+    id = row.integer(0);
+    const auto changes = row.blob(3);
     SqliteBytes inverse;
     void* data = nullptr;
     int code = sqlite3changeset_invert(static_cast<int>(changes.size()), changes.data(),
@@ -114,13 +185,14 @@ void SqliteTables::undo() {
                                     &in_the_way);
     }
     if (code == SQLITE_ABORT) {
-      throw FileError(path_.string(), "cannot undo \"" + std::string(row.text(0)) +
+      throw FileError(path_.string(), "cannot undo \"" + std::string(row.text(1)) +
                                           "\": the table " + in_the_way +
                                           " has changed since where it was changed then");
     }
     if (code != SQLITE_OK) database_.fail(code);
   }
-  database_.execute("DELETE FROM undo");
+  Statement erase(database_, "DELETE FROM history WHERE id = ?");
+  static_cast<void>(erase.bind(1, id).run());
 }
 
 }  // namespace panonav
