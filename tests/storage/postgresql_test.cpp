@@ -132,6 +132,12 @@ TEST_F(MemoryOnServer, StatementsInNamesAreNames) {
   });
   EXPECT_TRUE(contains(taken, names[0])) << taken;
   EXPECT_EQ(file.names(), names);
+  // What the server cannot hold as text is refused, and nothing is left of it.
+  NewView wrong = random_view(random, small_header().shape, 4);
+  wrong.info.name = "\xff";
+  const std::string message = message_of<FileError>([&] { file.append(wrong); });
+  EXPECT_TRUE(contains(message, "invalid byte sequence")) << message;
+  EXPECT_EQ(message.find('\n'), std::string::npos);
   EXPECT_EQ(file.append(again[0]).value, names.size() + 1);
   EXPECT_TRUE(file.verify().empty());
 }

@@ -91,7 +91,6 @@ def same_answers(server, folder):
         answer("route", "record", folder / "drive", memory, "--name", "way")
         answer("route", "follow", memory, folder / "drive")
         answer("map", folder / "drive", mapped)
-        answer("track", mapped, folder / "drive")
         answer("list", memory)
         answer("info", memory)
         answer("rename", memory, "view_00002.png", "the 'door'")
