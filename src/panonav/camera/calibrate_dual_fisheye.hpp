@@ -16,7 +16,7 @@ namespace panonav {
 struct DualFisheyeKnowledge {
   /// How the circles lie in the picture, see `FisheyeLens::roll_rad`; to about 3 degrees.
   double left_roll_rad = 0.0;
-  double right_roll_rad = 0.0;
+  double right_roll_rad = 0.0;  ///< the same of the lens in the right half
   /// Azimuth of the left lens's axis: no picture shows where the robot's forward direction is.
   double left_azimuth_rad = 0.0;
   /// Field of view of one lens; empty: found, between 185 and 220 degrees.
@@ -27,8 +27,9 @@ struct DualFisheyeKnowledge {
   ColumnDirection direction = ColumnDirection::clockwise;  ///< see Camera
 };
 
+/// A camera found in pictures, and how well it fits them.
 struct DualFisheyeCalibration {
-  Camera camera;
+  Camera camera;              ///< with a DualFisheyeModel, valid; its axis of turns is the vertical
   int matches = 0;            ///< points found twice, outliers not counted
   double inlier_share = 0.0;  ///< of the textured places looked at; some 0.1 by chance
   double residual_rad = 0.0;  ///< standard deviation of a match
@@ -39,6 +40,7 @@ struct DualFisheyeCalibration {
   std::vector<double> turns_rad;  ///< of each picture against the first, in [-pi, pi)
 };
 
+/// Why no camera was found.
 struct DualFisheyeRefusal {
   std::string reason;  ///< one line: what is missing in the pictures
 };

@@ -16,8 +16,8 @@ namespace panonav {
 
 /// A point of the continuous image plane; the centre of pixel (u, v) lies at (u + 0.5, v + 0.5).
 struct PixelPoint {
-  double u_px = 0.0;
-  double v_px = 0.0;
+  double u_px = 0.0;  ///< from the left edge
+  double v_px = 0.0;  ///< from the upper edge
   friend bool operator==(const PixelPoint&, const PixelPoint&) = default;
 };
 
@@ -29,17 +29,22 @@ struct EquirectangularModel {
   friend bool operator==(const EquirectangularModel&, const EquirectangularModel&) = default;
 };
 
+/// One of the projection models, each defined in its own header; the only list of them.
 using CameraModel = std::variant<HyperboloidalModel, PolynomialModel, UnifiedModel,
                                  EquiangularModel, EquirectangularModel, DualFisheyeModel>;
 
-enum class ColumnDirection { clockwise, counter_clockwise };
+/// Which way azimuths run in a picture; what counts as its columns, see `Camera::direction`.
+enum class ColumnDirection {
+  clockwise,         ///< azimuths grow against the columns or the image angle
+  counter_clockwise  ///< azimuths grow with them
+};
 
 /// A camera that sees all azimuths: how its pixels and the directions in the robot frame belong
 /// together. The axis of a mirror is vertical. Invariant checked by `validate(const Camera&)`; the
 /// functions below expect a valid camera.
 struct Camera {
-  CameraModel model;
-  ImageSize image_size;
+  CameraModel model;     ///< how elevation, or direction, and place in the picture belong together
+  ImageSize image_size;  ///< of every picture of this camera, in pixels
   // Mirror cameras (all models but equirectangular and dual fisheye):
   PixelPoint centre;             ///< inside the image
   double rim_radius_px = 0.0;    ///< nothing is seen beyond
@@ -74,13 +79,14 @@ void validate(const Camera& camera);
 
 /// Where a direction is seen, and how much it counts there in a blended picture.
 struct WeightedPixel {
-  PixelPoint pixel;
+  PixelPoint pixel;     ///< where the direction is seen
   double weight = 1.0;  ///< shares of the lenses that see a direction; they add up to 1
 };
 /// As `project`, for each lens: two of a dual fisheye camera, in order, one of any other (the
 /// second is empty). `project` gives the one that counts most. See `blend_share`.
 [[nodiscard]] std::array<std::optional<WeightedPixel>, 2> project_all(const Camera& camera,
                                                                       const Direction3& direction);
+/// 2 for a dual fisheye camera, 1 for any other.
 [[nodiscard]] inline int lens_count(const Camera& camera) {
   return std::holds_alternative<DualFisheyeModel>(camera.model) ? 2 : 1;
 }
@@ -91,17 +97,17 @@ struct WeightedPixel {
 
 /// What a mirror or a lens covers of the picture.
 struct ImageCircle {
-  PixelPoint centre;
-  double inner_radius_px = 0.0;
-  double rim_radius_px = 0.0;
+  PixelPoint centre;             ///< in the picture
+  double inner_radius_px = 0.0;  ///< nothing is seen within; 0 for a lens
+  double rim_radius_px = 0.0;    ///< nothing is seen beyond
 };
 /// Of the mirror, or of that lens of a dual fisheye camera. Of an equirectangular one: all zero.
 [[nodiscard]] ImageCircle image_circle(const Camera& camera, int lens);
 
 /// Lowest and highest elevation that is seen at every azimuth, in radians.
 struct ElevationBand {
-  double bottom_rad = 0.0;
-  double top_rad = 0.0;
+  double bottom_rad = 0.0;  ///< lowest, in [-pi/2, pi/2]
+  double top_rad = 0.0;     ///< highest, above `bottom_rad`
   friend bool operator==(const ElevationBand&, const ElevationBand&) = default;
 };
 /// Where the frame cuts the mirror, the band ends where the cut begins. Of a dual fisheye camera:

@@ -11,16 +11,16 @@ namespace panonav {
 /// r = f (theta + k3 theta^3 + k5 theta^5) from the centre (Kannala, Brandt 2006, two odd terms).
 /// Valid where r grows with theta, from 0 to `max_angle_rad`.
 struct FisheyeLens {
-  double centre_u_px = 0.0;
-  double centre_v_px = 0.0;
-  double focal_length_px = 150.0;  ///< > 0, pixels for each radian at the centre
-  double k3 = 0.0;
-  double k5 = 0.0;
+  double centre_u_px = 0.0;        ///< of the optical axis, from the picture's left edge
+  double centre_v_px = 0.0;        ///< of the optical axis, from the picture's upper edge
+  double focal_length_px = 150.0;  ///< above 0, pixels for each radian at the centre
+  double k3 = 0.0;                 ///< radial distortion of third order, without unit
+  double k5 = 0.0;                 ///< radial distortion of fifth order, without unit
   /// Half of the field of view: nothing is seen beyond. In (0, pi].
   double max_angle_rad = 1.6580627893946132;
   /// Where the optical axis points in the robot frame.
   double azimuth_rad = 0.0;
-  double elevation_rad = 0.0;
+  double elevation_rad = 0.0;  ///< of the optical axis, above the horizon
   /// The turn of lens and sensor about the viewing direction, right-handed: the picture shows what
   /// is above turned by this angle counter-clockwise.
   double roll_rad = 0.0;
@@ -33,7 +33,7 @@ struct FisheyeLens {
 /// cameras deliver it live: lens 0 in the left half, lens 1 in the right one. Together they see
 /// all directions when each sees more than half of them.
 struct DualFisheyeModel {
-  std::array<FisheyeLens, 2> lenses;
+  std::array<FisheyeLens, 2> lenses;  ///< in the order of their halves of the picture
   /// Each lens's viewpoint lies half of this before the middle of the camera, along its own axis.
   /// Simulated pictures have this parallax; projection takes everything as far away.
   double baseline_m = 0.0;
@@ -52,8 +52,11 @@ void validate(const DualFisheyeModel& model);
 /// axis, y towards the left of its picture and z towards the top.
 class LensRotation {
  public:
+  /// Computes the rotation once, for many directions.
   explicit LensRotation(const FisheyeLens& lens);
+  /// A direction of the lens frame in the robot frame.
   [[nodiscard]] Direction3 robot_from_lens(const Direction3& d) const;
+  /// A direction of the robot frame in the lens frame.
   [[nodiscard]] Direction3 lens_from_robot(const Direction3& d) const;
 
  private:
@@ -63,7 +66,7 @@ class LensRotation {
 /// A direction as one lens sees it.
 struct LensPoint {
   double right_px = 0.0;  ///< from the lens's centre
-  double up_px = 0.0;
+  double up_px = 0.0;     ///< from the lens's centre, against v
   /// How far within the lens's field of view, > 0; 0 on its border.
   double margin_rad = 0.0;
 };

@@ -12,8 +12,8 @@ namespace panonav {
 
 /// A circle found in an image.
 struct FoundCircle {
-  PixelPoint centre;
-  double radius_px = 0.0;
+  PixelPoint centre;       ///< in the image, to a fraction of a pixel
+  double radius_px = 0.0;  ///< of the circle, > 0
   /// Part of the visible circumference, 0 to 1, that has an edge on the circle: within 0.75 px or
   /// 0.002 of the radius, whichever is more. About 0.3 for the best circle in textures without
   /// circles.
@@ -25,7 +25,7 @@ struct FoundCircle {
 
 /// What `find_mirror` found. Invariant: rim_radius_px > 0; inner_radius_px, if any, is below it.
 struct MirrorCircle {
-  ImageSize image_size;
+  ImageSize image_size;        ///< of the images that were searched
   PixelPoint centre;           ///< of the rim
   double rim_radius_px = 0.0;  ///< where the mirrored scene ends
   /// Radius about `centre` that covers the dark disc or the camera's own reflection in the middle;
@@ -39,6 +39,7 @@ struct MirrorCircle {
   friend bool operator==(const MirrorCircle&, const MirrorCircle&) = default;
 };
 
+/// Which circles `find_mirror` takes for a rim.
 struct MirrorSearchOptions {
   double min_rim = 0.2;           ///< smallest rim radius, in shorter sides of the image; (0, 2]
   double max_rim = 0.75;          ///< largest rim radius, in longer sides of the image; (0, 2]
@@ -64,10 +65,10 @@ void visit_options(MirrorSearchOptions& options, OptionVisitor& visitor);
 
 /// How far the per-image rims agree: standard deviation over the images that show the rim.
 struct MirrorAgreement {
-  int images = 0;  ///< that show the rim on their own
-  double centre_u_px = 0.0;
-  double centre_v_px = 0.0;
-  double rim_radius_px = 0.0;
+  int images = 0;              ///< that show the rim on their own
+  double centre_u_px = 0.0;    ///< of the centre's column
+  double centre_v_px = 0.0;    ///< of the centre's row
+  double rim_radius_px = 0.0;  ///< of the radius
 };
 /// Empty with fewer than two such images.
 [[nodiscard]] std::optional<MirrorAgreement> agreement(const MirrorCircle& mirror);

@@ -10,9 +10,9 @@ namespace panonav {
 /// looks up. Only the ratio of a and b changes the picture. Valid: distances from the centre in [0,
 /// focal_length_px * a / b), elevations in [-pi/2, atan(b / a)).
 struct HyperboloidalModel {
-  double a_mm = 28.095;            ///< > 0
-  double b_mm = 23.4125;           ///< > 0
-  double focal_length_px = 500.0;  ///< > 0, of the perspective camera
+  double a_mm = 28.095;            ///< above 0
+  double b_mm = 23.4125;           ///< above 0
+  double focal_length_px = 500.0;  ///< above 0, of the perspective camera
   friend bool operator==(const HyperboloidalModel&, const HyperboloidalModel&) = default;
 };
 

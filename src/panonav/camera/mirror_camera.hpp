@@ -14,8 +14,8 @@ struct MirrorKnowledge {
   CameraModel model;
   /// Overrides what was found; for when nothing was found.
   std::optional<double> inner_radius_px = std::nullopt;
-  ColumnDirection direction = ColumnDirection::clockwise;
-  double forward_angle_rad = 0.0;  ///< see Camera
+  ColumnDirection direction = ColumnDirection::clockwise;  ///< see Camera
+  double forward_angle_rad = 0.0;                          ///< see Camera
 };
 
 /// The camera of a mirror found in an image. Where no inner radius is known or found it is 0.
@@ -28,6 +28,7 @@ struct MirrorKnowledge {
 /// known. Throws ContractError unless the model sees that elevation and radius_px > 0.
 [[nodiscard]] HyperboloidalModel with_elevation_at(HyperboloidalModel model, double radius_px,
                                                    double elevation_rad);
+/// The same for a unified model. Throws as above.
 [[nodiscard]] UnifiedModel with_elevation_at(UnifiedModel model, double radius_px,
                                              double elevation_rad);
 

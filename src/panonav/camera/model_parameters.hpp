@@ -21,6 +21,7 @@ inline constexpr std::array<std::string_view, std::variant_size_v<CameraModel>> 
 /// parameters.
 inline constexpr std::array<std::string_view, 2> view_axis_names{"down", "up"};
 
+/// What files call the camera's model: one of `camera_model_names`.
 [[nodiscard]] inline std::string_view model_name(const CameraModel& model) {
   return camera_model_names[model.index()];
 }

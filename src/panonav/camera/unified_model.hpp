@@ -17,8 +17,8 @@ enum class ViewAxis {
 /// cos(psi) > -1 / xi, and r < f / sqrt(xi^2 - 1).
 struct UnifiedModel {
   double xi = 1.0;                 ///< >= 0
-  double focal_length_px = 300.0;  ///< > 0
-  ViewAxis axis = ViewAxis::down;
+  double focal_length_px = 300.0;  ///< above 0
+  ViewAxis axis = ViewAxis::down;  ///< which way the middle of the picture looks
   friend bool operator==(const UnifiedModel&, const UnifiedModel&) = default;
 };
 

@@ -11,10 +11,13 @@ namespace panonav {
 /// find with halved paths). The smallest member stands for its set. Cost: about constant a call.
 class DisjointSets {
  public:
+  /// Numbers 0 .. size - 1, each a set of its own. Cost: O(size).
   explicit DisjointSets(std::size_t size) : parent_(size) {
     std::iota(parent_.begin(), parent_.end(), std::size_t{0});
   }
 
+  /// The smallest member of the set of `i`, which must be below `size`; shortens the paths on its
+  /// way.
   [[nodiscard]] std::size_t find(std::size_t i) {
     while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
     return i;

@@ -11,7 +11,7 @@ namespace panonav {
 /// other, and an id is not an index: it stays the same when other things are removed.
 template <class Tag>
 struct Id {
-  std::uint32_t value = 0;
+  std::uint32_t value = 0;  ///< what files and messages show; ids are ordered by it
   friend constexpr auto operator<=>(Id, Id) = default;
 };
 
@@ -20,7 +20,9 @@ using ViewId = Id<struct ViewTag>;
 
 }  // namespace panonav
 
+/// Makes ids keys of unordered containers.
 template <class Tag>
 struct std::hash<panonav::Id<Tag>> {
+  /// The id's value.
   std::size_t operator()(panonav::Id<Tag> id) const noexcept { return id.value; }
 };

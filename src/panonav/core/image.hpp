@@ -7,9 +7,10 @@
 
 namespace panonav {
 
+/// Width and height of an image in pixels.
 struct ImageSize {
-  int width = 0;
-  int height = 0;
+  int width = 0;   ///< columns of pixels; 0: no image
+  int height = 0;  ///< rows of pixels; 0: no image
   friend bool operator==(const ImageSize&, const ImageSize&) = default;
 };
 
@@ -17,13 +18,17 @@ struct ImageSize {
 /// top, `stride` bytes from one row to the next. Pixel (u, v) covers [u, u+1) x [v, v+1) of the
 /// continuous image plane, so its centre lies at (u + 0.5, v + 0.5).
 struct ImageView {
+  /// The first channel of pixel (0, 0), at the upper left; null: no image.
   const std::uint8_t* data = nullptr;
-  int width = 0;
-  int height = 0;
-  int channels = 1;
-  std::ptrdiff_t stride = 0;
+  int width = 0;              ///< pixels of a row
+  int height = 0;             ///< rows
+  int channels = 1;           ///< bytes of a pixel: 1 grey, 3 RGB
+  std::ptrdiff_t stride = 0;  ///< bytes from a row to the next, >= width * channels
 
+  /// Width and height, without the channels.
   [[nodiscard]] ImageSize size() const noexcept { return {width, height}; }
+  /// A channel of pixel (u, v), 0 .. 255. The caller guarantees that all three are within the
+  /// image.
   [[nodiscard]] std::uint8_t at(int u, int v, int channel = 0) const noexcept {
     return data[v * stride + static_cast<std::ptrdiff_t>(u) * channels + channel];
   }
@@ -37,19 +42,27 @@ class Image {
   /// Throws ContractError unless pixels.size() == width * height * channels.
   Image(int width, int height, int channels, std::vector<std::uint8_t> pixels);
 
-  [[nodiscard]] int width() const noexcept { return width_; }
-  [[nodiscard]] int height() const noexcept { return height_; }
+  [[nodiscard]] int width() const noexcept { return width_; }    ///< Pixels of a row, >= 1.
+  [[nodiscard]] int height() const noexcept { return height_; }  ///< Rows, >= 1.
+  /// Bytes of a pixel: 1 grey, 3 RGB.
   [[nodiscard]] int channels() const noexcept { return channels_; }
+  /// Width and height, without the channels.
   [[nodiscard]] ImageSize size() const noexcept { return {width_, height_}; }
+  /// All width * height * channels bytes, row-major without gaps, channels interleaved.
   [[nodiscard]] std::span<const std::uint8_t> pixels() const& noexcept { return pixels_; }
+  /// The same, to be written.
   [[nodiscard]] std::span<std::uint8_t> pixels() & noexcept { return pixels_; }
   std::span<const std::uint8_t> pixels() const&& = delete;  // would dangle
+  /// The pixels as functions take them; valid as long as the image lives and is not assigned to.
   [[nodiscard]] ImageView view() const& noexcept;
   ImageView view() const&& = delete;  // would dangle
 
+  /// A channel of pixel (u, v), 0 .. 255. The caller guarantees that all three are within the
+  /// image.
   [[nodiscard]] std::uint8_t at(int u, int v, int channel = 0) const noexcept {
     return pixels_[offset(u, v, channel)];
   }
+  /// The same, to be written.
   [[nodiscard]] std::uint8_t& at(int u, int v, int channel = 0) noexcept {
     return pixels_[offset(u, v, channel)];
   }

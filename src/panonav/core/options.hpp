@@ -31,8 +31,11 @@ struct OptionInfo {
 class OptionVisitor {
  public:
   virtual ~OptionVisitor() = default;
+  /// An int. A visitor may change `value`; it checks `info`'s range itself.
   virtual void visit(const OptionInfo& info, int& value) = 0;
+  /// The same for a double, in the unit in which the member's name ends.
   virtual void visit(const OptionInfo& info, double& value) = 0;
+  /// The same for a bool, which has no range.
   virtual void visit(const OptionInfo& info, bool& value) = 0;
   /// `value` is an index into `choices`.
   virtual void visit(const OptionInfo& info, std::span<const std::string_view> choices,
@@ -167,6 +170,7 @@ constexpr auto option(std::string_view help, const std::array<std::string_view, 
   entry.choices = choices;
   return entry;
 }
+/// The entry of a member that holds one of some choices, which are named in the order of the enum.
 template <auto member, class... Names>
 constexpr auto choice(std::string_view help, Names... choices) {
   return option<member>(help, std::array<std::string_view, sizeof...(Names)>{choices...});
@@ -194,10 +198,13 @@ constexpr auto no_option(std::string_view /*reason*/) {
 template <class... Entries>
 class OptionTable {
  public:
+  /// The struct whose members the entries name.
   using Options = typename std::tuple_element_t<0, std::tuple<Entries...>>::Options;
 
+  /// The entries in the order in which help shows them.
   constexpr explicit OptionTable(const Entries&... entries) : entries_(entries...) {}
 
+  /// Hands each member to `visitor` in the order of the entries; members of nested structs in turn.
   void visit(Options& options, OptionVisitor& visitor) const {
     std::apply([&](const auto&... entry) { (entry.visit(options, visitor), ...); }, entries_);
   }

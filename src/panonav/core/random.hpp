@@ -11,11 +11,11 @@ namespace panonav {
 /// give each chunk of parallel work its own `stream`.
 class Random {
  public:
-  explicit Random(std::uint64_t seed);
+  explicit Random(std::uint64_t seed);  ///< Stream 0 of the seed.
   /// An engine that is independent of every other (seed, stream).
   Random(std::uint64_t seed, std::uint64_t stream);
 
-  std::uint64_t next();
+  std::uint64_t next();  ///< 64 random bits.
   /// [0, 1).
   double uniform();
   /// [low, high).
@@ -27,6 +27,7 @@ class Random {
   /// Two independent ones to 24 bits, at a third of the price: one number of the generator, and no
   /// value beyond 6.7 deviations.
   std::pair<double, double> normal_pair();
+  /// Normal distribution of this mean and standard deviation (>= 0), in the unit of both.
   double normal(double mean, double standard_deviation);
 
  private:

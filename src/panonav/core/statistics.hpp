@@ -12,7 +12,10 @@ namespace panonav {
 /// Linear interpolation between order statistics; `fraction` in [0, 1]. Throws ContractError on no
 /// values.
 [[nodiscard]] double quantile(std::span<const double> values, double fraction);
+/// The middle value; of an even number the mean of the two in the middle. Throws ContractError on
+/// no values. Cost: O(n log n).
 [[nodiscard]] double median(std::span<const double> values);
+/// Arithmetic mean. Throws ContractError on no values.
 [[nodiscard]] double mean(std::span<const double> values);
 
 /// The median; of an even number the larger of the two in the middle. Reorders `values`, of which
@@ -35,10 +38,11 @@ template <typename Value>
 /// values. Cost: O(n).
 [[nodiscard]] double order_statistic(std::vector<double> values, double fraction);
 
+/// A share of trials and how certain it is.
 struct Proportion {
-  double value = 0.0;
-  double low = 0.0;  ///< of the 95 % Wilson score interval
-  double high = 0.0;
+  double value = 0.0;  ///< successes / trials, 0 .. 1
+  double low = 0.0;    ///< of the 95 % Wilson score interval
+  double high = 0.0;   ///< of the same interval; exactly 1 where every trial succeeded
 };
 /// Throws ContractError unless 0 <= successes <= trials and trials >= 1.
 [[nodiscard]] Proportion success_rate(std::size_t successes, std::size_t trials);

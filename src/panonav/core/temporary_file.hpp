@@ -10,11 +10,13 @@ namespace panonav {
 /// with the object unless `keep` was called. Throws FileError on `target`.
 class TemporaryFile {
  public:
+  /// Creates the file at once, with the permissions that the process's umask leaves.
   explicit TemporaryFile(const std::filesystem::path& target);
   ~TemporaryFile();
   TemporaryFile(const TemporaryFile&) = delete;
   TemporaryFile& operator=(const TemporaryFile&) = delete;
 
+  /// Where the new file is, for renaming it to its target.
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
   /// Open for reading and writing, at the beginning.
   [[nodiscard]] int descriptor() const noexcept { return descriptor_; }

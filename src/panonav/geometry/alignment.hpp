@@ -9,18 +9,21 @@ namespace panonav {
 /// The best map of one point set onto another: to ~ scale * R(rotation) * from + translation, with
 /// a mirror image first (y -> -y) when `reflected`.
 struct Alignment {
+  /// Metres of `to` for each unit of `from`; 1 unless the scale was free.
   double scale = 1.0;
-  double rotation_rad = 0.0;
-  Point2 translation;
-  bool reflected = false;
-  double rms_m = 0.0;  ///< root mean square distance that remains
+  double rotation_rad = 0.0;  ///< counter-clockwise, in [-pi, pi]
+  Point2 translation;         ///< added after rotation and scale, in the frame of `to`
+  bool reflected = false;     ///< whether y changes its sign first
+  double rms_m = 0.0;         ///< root mean square distance that remains
 
+  /// A point of the frame of `from` in that of `to`.
   [[nodiscard]] Point2 apply(Point2 p_in_from) const;
 };
 
+/// What `align` may do beyond turning and moving.
 struct AlignmentOptions {
-  bool allow_scale = false;
-  bool allow_reflection = false;
+  bool allow_scale = false;       ///< the unit of length of `from` is free
+  bool allow_reflection = false;  ///< a mirror image is taken where it fits better
 };
 
 /// Least-squares alignment (Procrustes, Umeyama 1991). Throws ContractError unless both sets have

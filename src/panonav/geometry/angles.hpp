@@ -9,6 +9,7 @@ namespace panonav {
 
 /// The same angle in [-pi, pi). NaN and infinities give NaN.
 [[nodiscard]] double wrap_angle_far(double angle_rad);
+/// The same angle in [-pi, pi), fast where it lies there already. NaN and infinities give NaN.
 [[nodiscard]] inline double wrap_angle(double angle_rad) {
   // Most angles are already there, and the remainder is slow.
   if (angle_rad >= -std::numbers::pi && angle_rad < std::numbers::pi) return angle_rad;
@@ -18,9 +19,11 @@ namespace panonav {
 /// The smallest turn from `from_rad` to `to_rad`, in [-pi, pi).
 [[nodiscard]] double angle_difference(double to_rad, double from_rad);
 
+/// An angle of degrees in radians, not wrapped.
 [[nodiscard]] constexpr double radians(double degrees) {
   return degrees * 0.017453292519943295;
 }
+/// An angle of radians in degrees, not wrapped.
 [[nodiscard]] constexpr double degrees(double radians) {
   return radians * 57.29577951308232;
 }

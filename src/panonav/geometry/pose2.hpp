@@ -6,12 +6,14 @@
 
 namespace panonav {
 
+/// A point of the plane, in a frame that the name of the variable tells.
 struct Point2 {
-  double x_m = 0.0;
-  double y_m = 0.0;
+  double x_m = 0.0;  ///< forward, or along the frame's first axis
+  double y_m = 0.0;  ///< left, or along its second axis
   friend bool operator==(const Point2&, const Point2&) = default;
 };
 
+/// Euclidean distance of two points of one frame, in metres.
 [[nodiscard]] inline double distance(Point2 a, Point2 b) {
   return std::hypot(a.x_m - b.x_m, a.y_m - b.y_m);
 }
@@ -19,14 +21,15 @@ struct Point2 {
 /// Position and heading in the plane; x forward, y left, heading counter-clockwise (REP 103). As a
 /// transform, `a_from_b` is the pose of frame b in frame a.
 struct Pose2 {
-  double x_m = 0.0;
-  double y_m = 0.0;
+  double x_m = 0.0;          ///< position along the frame's x axis
+  double y_m = 0.0;          ///< position along its y axis
   double heading_rad = 0.0;  ///< in [-pi, pi) for every pose that panonav makes
 
-  [[nodiscard]] Point2 position() const { return {x_m, y_m}; }
+  [[nodiscard]] Point2 position() const { return {x_m, y_m}; }  ///< The pose without its heading.
   friend bool operator==(const Pose2&, const Pose2&) = default;
 };
 
+/// Whether none of the three numbers is NaN or infinite.
 [[nodiscard]] inline bool is_finite(const Pose2& pose) {
   return std::isfinite(pose.x_m) && std::isfinite(pose.y_m) && std::isfinite(pose.heading_rad);
 }
@@ -58,12 +61,15 @@ struct Pose2 {
 
 /// A direction in space: x forward, y left, z up. Not necessarily of unit length.
 struct Direction3 {
-  double x = 1.0;
-  double y = 0.0;
-  double z = 0.0;
+  double x = 1.0;  ///< forward
+  double y = 0.0;  ///< left
+  double z = 0.0;  ///< up
 
+  /// Counter-clockwise from x, seen from above, in [-pi, pi]; 0 straight up and down.
   [[nodiscard]] double azimuth_rad() const { return std::atan2(y, x); }
+  /// Above the horizon, in [-pi/2, pi/2].
   [[nodiscard]] double elevation_rad() const { return std::atan2(z, std::hypot(x, y)); }
+  /// The unit direction of an azimuth and an elevation.
   [[nodiscard]] static Direction3 from_angles(double azimuth_rad, double elevation_rad) {
     return {std::cos(elevation_rad) * std::cos(azimuth_rad),
             std::cos(elevation_rad) * std::sin(azimuth_rad), std::sin(elevation_rad)};

@@ -15,8 +15,8 @@ namespace panonav {
 
 /// A circle in the plane; of all points of a set, or of none (radius 0 at the origin).
 struct Circle {
-  Point2 centre;
-  double radius_m = 0.0;
+  Point2 centre;          ///< in the frame of the points
+  double radius_m = 0.0;  ///< 0 for one point
 };
 
 /// The smallest circle that covers all points. It never grows when points are taken away. Cost O(n)
@@ -53,6 +53,7 @@ class VoronoiCells {
   std::span<const std::size_t> site_of() const&& = delete;  // would dangle
   /// Corners counter-clockwise. Throws ContractError when there is no such site.
   [[nodiscard]] std::vector<Point2> cell(std::size_t site) const;
+  /// Area of that cell, 0 where it is empty. Throws as `cell`.
   [[nodiscard]] double area_m2(std::size_t site) const;
 
  private:

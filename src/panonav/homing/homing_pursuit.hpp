@@ -19,13 +19,15 @@ enum class PursuitStrategy {
   recovering,
 };
 
+/// How a run home goes, and when it ends.
 struct HomingPursuitOptions {
+  /// Which frequencies count at which stage.
   PursuitStrategy strategy = PursuitStrategy::recovering;
   /// Highest frequencies of the stages of coarse_to_fine [S06 figure 13]; the first two count for
   /// `recovering`, too. Where the views have fewer, all that they have.
   int coarse = 2;
-  int middle = 4;
-  int fine = 10;
+  int middle = 4;                   ///< of the second stage, >= 1
+  int fine = 10;                    ///< of the third stage, >= 1
   double typical_distance_m = 3.0;  ///< R_typ, of the things around [S06 section 3]
   double max_step_m = 0.3;          ///< l_max [S06 section 3]
   /// Homing stops when the vector is shorter, in units of R: the root of S06's epsilon.
@@ -36,15 +38,16 @@ struct HomingPursuitOptions {
   /// Homing also stops when the views have not become more similar for this many steps: the robot
   /// runs in circles or along an obstacle.
   int patience = 10;
-  int max_steps = 60;
+  int max_steps = 60;  ///< most steps of a run, >= 1
   /// The robot has arrived when the views differ by no more than this where homing stops, by
   /// `image_difference` [S06 section 4.3].
   double arrived_difference = 0.08;
 };
 void visit_options(HomingPursuitOptions& options, OptionVisitor& visitor);
 
+/// How far a run home has come.
 enum class PursuitState {
-  moving,
+  moving,       ///< another step is made
   arrived,      ///< homing stopped, and the place looks like home
   wrong_place,  ///< homing stopped, and the place does not look like home
   exhausted,    ///< the most steps were made
@@ -52,7 +55,7 @@ enum class PursuitState {
 
 /// The next motion of the robot after a view.
 struct PursuitDecision {
-  PursuitState state = PursuitState::moving;
+  PursuitState state = PursuitState::moving;  ///< whether to go on
   double turn_rad = 0.0;    ///< direction in which to go, in the current robot frame
   double advance_m = 0.0;   ///< how far; 0 unless moving
   HomeVector vector;        ///< on which the decision rests
@@ -78,8 +81,9 @@ class HomingPursuit {
   /// `home_vector`. After a decision that stops, further ones do too.
   [[nodiscard]] PursuitDecision decide(const HomingView& seen);
 
+  /// The view at home, as it was given.
   [[nodiscard]] const HomingView& home() const noexcept { return home_; }
-  [[nodiscard]] int steps() const noexcept { return steps_; }
+  [[nodiscard]] int steps() const noexcept { return steps_; }  ///< Decisions to move so far.
 
  private:
   [[nodiscard]] HomingView tilted_as_at_home(const HomingView& seen) const;

@@ -15,8 +15,8 @@ namespace panonav {
 /// A view and where it was taken. The heading is the truth that home vectors are judged by; rules
 /// never see it.
 struct PlacedHomingView {
-  Pose2 pose;
-  HomingView view;
+  Pose2 pose;       ///< in the frame of the recording's truth
+  HomingView view;  ///< as the rule compares it
 };
 
 /// The home vector to the view number `goal` of one set from the view number `place` of another.
@@ -34,8 +34,8 @@ void visit_options(HomingSurveyOptions& options, OptionVisitor& visitor);
 
 /// What a rule does at every place for every goal.
 struct HomingSurvey {
-  std::vector<Pose2> goals;
-  std::vector<Pose2> places;
+  std::vector<Pose2> goals;   ///< where the home views were taken
+  std::vector<Pose2> places;  ///< where the current views were taken, and where runs may stand
   /// For each goal one number per place: the place to which the step leads, the place itself where
   /// the run stops.
   std::vector<std::uint32_t> next;
@@ -43,9 +43,11 @@ struct HomingSurvey {
   /// 0 for a vector of length 0; NaN where place and goal are the same.
   std::vector<float> homeward;
 
+  /// The part of `next` for one goal: a number for each place.
   [[nodiscard]] std::span<const std::uint32_t> next_of(std::size_t goal) const {
     return std::span(next).subspan(goal * places.size(), places.size());
   }
+  /// The part of `homeward` for one goal: a cosine for each place.
   [[nodiscard]] std::span<const float> homeward_of(std::size_t goal) const {
     return std::span(homeward).subspan(goal * places.size(), places.size());
   }
@@ -72,8 +74,8 @@ using SurveyProgress = std::function<void(double fraction)>;
 /// The average homeward component over the pairs of a range of distances [S06 eq. 48].
 struct HomewardBin {
   double distance_m = 0.0;  ///< middle of the bin
-  std::size_t pairs = 0;
-  double component = 0.0;  ///< mean cosine, -1 .. 1; NaN without pairs
+  std::size_t pairs = 0;    ///< pairs of a place and a goal in the bin
+  double component = 0.0;   ///< mean cosine, -1 .. 1; NaN without pairs
 };
 
 /// Bin i holds the distances within half a bin of i `bin_m`; so places on a grid of this spacing

@@ -10,7 +10,7 @@ namespace panonav {
 
 /// A camera as `camera.toml` holds it (docs/formats.md).
 struct CameraFile {
-  Camera camera;
+  Camera camera;              ///< valid, as `validate(const Camera&)` asks
   std::optional<Image> mask;  ///< grey, of the camera's size; 0 where the robot itself is seen
 };
 

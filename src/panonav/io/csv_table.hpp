@@ -16,8 +16,11 @@ class CsvTable {
   /// than the header (with its line), a column name that stands twice.
   [[nodiscard]] static CsvTable read(const std::filesystem::path& path);
 
+  /// Lines that count, the header not among them.
   [[nodiscard]] std::size_t rows() const noexcept { return cells_.size(); }
+  /// Names of the columns, in the order of the header.
   [[nodiscard]] const std::vector<std::string>& columns() const noexcept { return columns_; }
+  /// Whether the header names the column.
   [[nodiscard]] bool has(std::string_view column) const noexcept {
     return index(column).has_value();
   }
@@ -25,6 +28,7 @@ class CsvTable {
   [[nodiscard]] const std::string& text(std::size_t row, std::string_view column) const;
   /// Throws FileError that names line, column and value unless it is a finite number.
   [[nodiscard]] double number(std::size_t row, std::string_view column) const;
+  /// Throws FileError: the field of this row is `found`, and what is allowed instead.
   [[noreturn]] void fail(std::size_t row, std::string_view column, std::string_view found,
                          std::string_view allowed) const;
 

@@ -34,13 +34,14 @@ class PictureStore {
 struct DatasetEntry {
   std::string file;            ///< as the data set names it, relative to its folder; unique
   std::filesystem::path path;  ///< where it lies: its own file, or that of all pictures
+  /// When it was taken, in seconds on the recording's clock.
   std::optional<double> stamp_s;
   std::optional<ReferencePose> pose;  ///< in the world frame
   std::optional<Pose2> odometry;      ///< in the odometry frame
   std::optional<Tilt> tilt;           ///< as an inertial sensor measured it
   /// Holds the picture; empty: `path` is the picture's own file.
   std::shared_ptr<const PictureStore> store;
-  std::size_t store_index = 0;
+  std::size_t store_index = 0;  ///< number of the picture in `store`
   friend bool operator==(const DatasetEntry&, const DatasetEntry&) = default;
 };
 
@@ -52,9 +53,9 @@ struct DatasetEntry {
 /// A recording: pictures in order, and how they become panoramic cylinders. Pictures are read when
 /// they are needed (PanoramaReader).
 struct Dataset {
-  std::filesystem::path folder;
-  PictureSource source;
-  std::vector<DatasetEntry> entries;
+  std::filesystem::path folder;       ///< that `file` names are relative to
+  PictureSource source;               ///< how all pictures lie
+  std::vector<DatasetEntry> entries;  ///< in the order in which they were taken
   /// Of a folder of pictures: what lies in it and was left out, sorted; folders end in "/".
   std::vector<std::string> left_out;
 };
@@ -69,9 +70,10 @@ struct Dataset {
 struct PictureSelection {
   int every = 1;                  ///< each n-th of those that the times leave
   std::optional<double> every_s;  ///< the first, then the next one that is at least this much later
-  std::optional<double> from_s;
-  std::optional<double> to_s;  ///< this moment included
+  std::optional<double> from_s;   ///< this moment included; empty: from the first
+  std::optional<double> to_s;     ///< this moment included
 
+  /// Whether pictures need stamps to be selected.
   [[nodiscard]] bool by_time() const noexcept { return every_s || from_s || to_s; }
 };
 
@@ -84,6 +86,7 @@ struct PictureSelection {
 /// one before that of its predecessor, and when nothing is left.
 void select_pictures(Dataset& dataset, const PictureSelection& selection);
 
+/// How a folder is searched for pictures.
 struct PictureFolderOptions {
   bool recursive = false;  ///< pictures of the folders within count, too; links are not followed
 };

@@ -13,7 +13,7 @@ namespace panonav {
 /// What a picture may cost. Pictures that are larger are refused before the memory is taken, those
 /// with too many scans before the time is.
 struct ImageLimits {
-  int side_px = 32768;
+  int side_px = 32768;               ///< the longest side, in pixels
   std::int64_t area_px = 134217728;  ///< 16384 x 8192
   /// Of a JPEG: pixels that all its scans pass over, each scan counted as 65536 more. A progressive
   /// picture comes in about ten scans, but a small file can ask for thousands.
@@ -28,7 +28,11 @@ struct ImageLimits {
 /// bytes.
 [[nodiscard]] Image read_image(const std::filesystem::path& path, const ImageLimits& limits = {});
 
-enum class ImageFormat { png, jpeg };
+/// A format of picture files.
+enum class ImageFormat {
+  png,  ///< lossless
+  jpeg  ///< with losses
+};
 
 /// By the first bytes. Throws FileError, which names `name`, when they are of neither.
 [[nodiscard]] ImageFormat image_format(std::span<const std::uint8_t> bytes, std::string_view name);

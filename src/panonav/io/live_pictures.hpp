@@ -18,8 +18,9 @@ namespace panonav {
 /// rtsp://, rtmp://, http://, https://, tcp:// or udp://.
 [[nodiscard]] bool is_live(const std::string& address);
 
+/// A picture as it came, and when.
 struct LivePicture {
-  Image picture;
+  Image picture;                      ///< decoded and upright
   std::vector<std::uint8_t> encoded;  ///< the JPEG it was decoded from; empty where it was none
   /// When it arrived, seconds since 1970-01-01 UTC; of a camera: when it was taken.
   double stamp_s = 0.0;
@@ -28,12 +29,13 @@ struct LivePicture {
   std::chrono::steady_clock::duration decoding{};  ///< how long it took, where we do it
 };
 
+/// How a live source is read.
 struct LiveOptions {
   /// Of a camera: wanted width and height; it may give the nearest that it has. Empty: as it is
   /// set.
   std::optional<ImageSize> size;
   double reopen_after_s = 1.0;  ///< until a source that broke off is opened again
-  ImageLimits limits;
+  ImageLimits limits;           ///< of each picture; those beyond count as damaged
 };
 
 /// Pictures of a source that does not wait. A thread takes them as they come, and `next` gives the
@@ -55,12 +57,14 @@ class LivePictures {
   /// `next` gives nothing more. Any thread may call.
   void stop() noexcept;
 
+  /// What did not reach the caller.
   struct Counts {
-    std::uint64_t dropped = 0;  ///< since the first `next`
-    std::uint64_t damaged = 0;
-    std::uint64_t interruptions = 0;
+    std::uint64_t dropped = 0;        ///< since the first `next`
+    std::uint64_t damaged = 0;        ///< pictures that could not be decoded
+    std::uint64_t interruptions = 0;  ///< times that the source broke off and was opened again
     friend bool operator==(const Counts&, const Counts&) = default;
   };
+  /// What was lost so far. Any thread may call.
   [[nodiscard]] Counts counts() const;
 
  private:

@@ -11,10 +11,16 @@
 
 namespace panonav {
 
-enum class McapCompression { none, lz4, zstd };
+/// How chunks are packed.
+enum class McapCompression {
+  none,  ///< as they are
+  lz4,   ///< fast, larger
+  zstd   ///< slower, smaller
+};
 
+/// How an MCAP file is written.
 struct McapWriterOptions {
-  McapCompression compression = McapCompression::zstd;
+  McapCompression compression = McapCompression::zstd;  ///< of each chunk
   std::size_t chunk_bytes = 1U << 20U;  ///< a chunk ends with the message that reaches this
   std::string profile = "ros2";         ///< of the file's header; empty: none
 };
@@ -28,9 +34,10 @@ struct McapWriterOptions {
 /// stays readable, and nothing more can be written then. Not for several threads at a time.
 class McapWriter {
  public:
+  /// Creates the file, or empties the one that is there, and writes its header.
   explicit McapWriter(const std::filesystem::path& path, const McapWriterOptions& options = {});
-  /// Finishes the file as `close` does, but says nothing when that fails.
-  ~McapWriter();
+  ~McapWriter();  ///< Finishes the file as `close` does, but says nothing when that fails.
+  /// What is left of the other may only be destroyed or assigned to.
   McapWriter(McapWriter&&) noexcept;
   McapWriter& operator=(McapWriter&&) noexcept;
 
@@ -49,6 +56,7 @@ class McapWriter {
   /// A file within the file.
   void attach(std::string_view name, std::string_view media_type, std::int64_t log_time_ns,
               std::span<const std::uint8_t> data);
+  /// Names and values that stand in the file beside the messages.
   void add_metadata(std::string_view name, const std::map<std::string, std::string>& metadata);
   /// Writes the messages in memory as a chunk of their own, so that a reader finds them.
   void flush();

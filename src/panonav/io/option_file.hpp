@@ -26,6 +26,7 @@ class OptionFile {
   /// wrong type, a value out of range, an option under its name and its former name. Where the file
   /// says a former name, the file is as if it said the new one, and `warnings` says so.
   void apply(std::string_view section, const std::function<void(OptionVisitor&)>& visit);
+  /// The same for a struct of options: the members that its table shows.
   template <class Options>
   requires requires(Options& options, OptionVisitor& visitor) { visit_options(options, visitor); }
   void apply(std::string_view section, Options& options) {

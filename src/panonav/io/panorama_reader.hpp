@@ -22,6 +22,7 @@ class PanoramaReader {
   /// ContractError on a source that is not valid.
   PanoramaReader(PictureSource source, PanoramaShape shape);
 
+  /// How the pictures lie, as it was given.
   [[nodiscard]] const PictureSource& source() const noexcept { return source_; }
   /// The table that turns mirror pictures into panoramas where that is all there is to do: null for
   /// other pictures and where a mask hides a part of the mirror.

@@ -23,7 +23,9 @@ struct RecordingTopics {
   std::optional<std::pair<std::string, std::string>> odometry_frames;
 };
 
+/// A recording of topics as a data set.
 struct RecordedDataset {
+  /// Ready to be used; its pictures are read from the recording when they are needed.
   Dataset dataset;
   /// What was left out, guessed or missing, a line each.
   std::vector<std::string> warnings;
@@ -62,16 +64,17 @@ struct RecordedDataset {
 
 /// One topic as `describe_recording` knows it.
 struct TopicSummary {
-  RecordedTopic topic;
+  RecordedTopic topic;               ///< its name, type and number of messages
   std::optional<TimeSpan> time;      ///< log times of its first and last message
   std::optional<double> rate_hz;     ///< mean, of two messages or more
   std::optional<std::string> shows;  ///< of pictures: the first one's size and encoding, or format
 };
 
+/// What is in a recording.
 struct RecordingSummary {
   std::vector<TopicSummary> topics;  ///< by name
-  std::optional<TimeSpan> time;
-  std::vector<std::string> warnings;
+  std::optional<TimeSpan> time;      ///< from the first message to the last; empty without messages
+  std::vector<std::string> warnings;  ///< what was damaged or left out, a line each
 };
 
 /// What is in a recording, without decoding a picture. Throws FileError.

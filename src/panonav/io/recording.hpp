@@ -13,7 +13,11 @@
 namespace panonav {
 
 /// How the bytes of a message are laid out.
-enum class MessageEncoding { ros1, cdr, other };
+enum class MessageEncoding {
+  ros1,  ///< of ROS 1 bags
+  cdr,   ///< of ROS 2, little or big endian (XCDR1)
+  other  ///< that `read_message` does not take
+};
 
 /// A topic of a recording: all channels (MCAP) or connections (ROS 1) of one name, type and
 /// encoding. A topic that changes its type is two.
@@ -21,8 +25,8 @@ struct RecordedTopic {
   std::string name;  ///< "/camera/image/compressed"
   /// "sensor_msgs/CompressedImage"; ROS 2's "sensor_msgs/msg/CompressedImage" is written so, too.
   std::string type;
-  MessageEncoding encoding = MessageEncoding::other;
-  std::uint64_t messages = 0;
+  MessageEncoding encoding = MessageEncoding::other;  ///< how its messages are laid out
+  std::uint64_t messages = 0;                         ///< how many the recording has
 };
 
 /// Where a message lies in its recording.
@@ -30,15 +34,15 @@ struct MessagePlace {
   std::int64_t time_ns = 0;  ///< when it was recorded (log time)
   std::uint32_t topic = 0;   ///< index into `Recording::topics()`
   std::uint32_t file = 0;    ///< these three mean something to the recording alone
-  std::uint64_t block = 0;
-  std::uint64_t offset = 0;
+  std::uint64_t block = 0;   ///< number of a chunk in its file; 0 where there are none
+  std::uint64_t offset = 0;  ///< of the message within it, or its row
   friend bool operator==(const MessagePlace&, const MessagePlace&) = default;
 };
 
 /// Both ends belong to it.
 struct TimeSpan {
-  std::int64_t begin_ns = 0;
-  std::int64_t end_ns = 0;
+  std::int64_t begin_ns = 0;  ///< nanoseconds, on the recording's clock
+  std::int64_t end_ns = 0;    ///< the same, >= `begin_ns`
   friend bool operator==(const TimeSpan&, const TimeSpan&) = default;
 };
 

@@ -16,6 +16,7 @@ struct TomlField;
 /// The fields of a TOML table in the order of the file.
 using TomlTable = std::vector<TomlField>;
 
+/// What stands to the right of a field's name.
 struct TomlValue {
   /// Dates and times are monostate: nothing here uses them.
   std::variant<std::monostate, bool, std::int64_t, double, std::string, std::vector<TomlValue>,
@@ -24,9 +25,10 @@ struct TomlValue {
   std::string shown;  ///< as an error message shows it: one line, not long
 };
 
+/// A field of a table.
 struct TomlField {
-  std::string name;
-  TomlValue value;
+  std::string name;  ///< without its table's name
+  TomlValue value;   ///< a number, a text, a list, a table and so on
 };
 
 /// Parses the file. Throws FileError with the line: missing, larger than 1 MB, not TOML, or TOML
@@ -46,18 +48,23 @@ class TomlFields {
 
   /// Empty when the field is absent; FileError when it is of another type.
   std::optional<double> number(std::string_view field);
+  /// A whole number; reals are refused.
   std::optional<std::int64_t> integer(std::string_view field);
-  std::optional<bool> boolean(std::string_view field);
-  std::optional<std::string> text(std::string_view field);
+  std::optional<bool> boolean(std::string_view field);      ///< true or false.
+  std::optional<std::string> text(std::string_view field);  ///< A text in quotation marks.
+  /// A list of finite numbers; whole ones are taken as reals.
   std::optional<std::vector<double>> numbers(std::string_view field);
+  /// A table within this one; its own `finish` is the caller's to call.
   std::optional<TomlFields> section(std::string_view field);
   /// The same, FileError when absent.
   double required_number(std::string_view field);
+  /// The same of a text; `allowed` stands in the message.
   std::string required_text(std::string_view field, std::string_view allowed);
   /// Index into `choices`; empty when absent.
   std::optional<std::size_t> choice(std::string_view field,
                                     std::span<const std::string_view> choices);
 
+  /// Throws FileError: the field of this table is `found`, and what is allowed instead.
   [[noreturn]] void fail(std::string_view field, std::string_view found,
                          std::string_view allowed) const;
   /// Throws FileError when the table has a field that nobody asked for.

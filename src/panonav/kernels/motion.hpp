@@ -16,15 +16,18 @@ void normal_pairs(std::span<const std::uint64_t> bits, std::span<float> first,
 
 /// Poses in a plane, coordinate by coordinate.
 struct PoseColumns {
-  std::span<double> x_m, y_m, heading_rad;
+  std::span<double> x_m,  ///< along the frame's x axis
+      y_m,                ///< along its y axis
+      heading_rad;        ///< counter-clockwise, not wrapped
 };
 
 /// Steps, one for each pose, in the frame of the robot before it.
 struct StepColumns {
-  std::span<const double> forward_m, left_m;
+  std::span<const double> forward_m,       ///< along the robot's heading
+      left_m;                              ///< to the left of it
   std::span<const double> turn_error_rad;  ///< what the turn is more than `turn_rad`
-  double turn_rad;
-  double share_before;  ///< of the error of the turn, made before the travel
+  double turn_rad;                         ///< what each heading turns by before its error is added
+  double share_before;                     ///< of the error of the turn, made before the travel
 };
 
 /// Moves each pose by its step; headings are not wrapped. Spans of one size; throws ContractError

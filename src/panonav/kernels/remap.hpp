@@ -13,10 +13,10 @@ namespace panonav::kernels {
 
 /// A rectangle of an 8-bit image of one channel.
 struct Pixels {
-  const std::uint8_t* data = nullptr;
-  int width = 0;
-  int height = 0;
-  std::ptrdiff_t stride = 0;
+  const std::uint8_t* data = nullptr;  ///< the pixel at the upper left
+  int width = 0;                       ///< pixels of a row, one byte each
+  int height = 0;                      ///< rows
+  std::ptrdiff_t stride = 0;           ///< bytes from a row to the next, >= width
 };
 
 /// Half the width and height (odd ones are rounded down): each new pixel is the mean of 2 x 2 old

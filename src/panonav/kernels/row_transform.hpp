@@ -21,7 +21,8 @@ class RowTransform {
   /// Throws ContractError unless columns >= 4 and 1 <= components <= columns / 2.
   RowTransform(int columns, int components);
 
-  [[nodiscard]] int columns() const noexcept { return columns_; }
+  [[nodiscard]] int columns() const noexcept { return columns_; }  ///< Values of a row.
+  /// Frequencies k = 0 .. components - 1 that are computed of each row.
   [[nodiscard]] int components() const noexcept { return components_; }
 
   /// `values` holds whole rows one after the other. Component k of row y goes to index k * stride +

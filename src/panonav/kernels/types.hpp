@@ -9,7 +9,12 @@ namespace panonav::kernels {
 
 /// Instruction sets for which kernels have bodies. `avx2` means AVX2 and FMA; `avx512` means F, BW,
 /// DQ and VL.
-enum class Instructions { scalar, avx2, avx512, neon };
+enum class Instructions {
+  scalar,  ///< C++ alone, on every processor; the others give what their headers promise
+  avx2,    ///< x86-64 of 2013 and later
+  avx512,  ///< x86-64 servers and newer desktops
+  neon     ///< ARM of 64 bit
+};
 
 /// A query as `sketch_bounds` and `sketch_bounds_at` compare it. Sketches consist of groups of 8
 /// bytes.
@@ -24,9 +29,11 @@ struct SketchQuery {
 };
 
 /// Sizes of what `match_columns` compares.
+/// Columns of the query.
 inline constexpr int matched_query_columns = 32;
+/// Columns of the reference; also the number of turns.
 inline constexpr int matched_reference_columns = 128;
-inline constexpr int matched_bands = 16;
+inline constexpr int matched_bands = 16;  ///< Bytes of a column: bands of elevation.
 
 /// Descriptors of 256 bits that `nearest_descriptors` takes of a view.
 inline constexpr int max_descriptors = 256;
@@ -34,46 +41,61 @@ inline constexpr int max_descriptors = 256;
 /// Bearings of features that two views share, an array for each number. Tangents are those of the
 /// elevations; `sine` and `cosine` belong to the azimuth in the query minus that in the reference.
 struct MatchedBearings {
-  const float *query_sine, *query_cosine, *query_tangent;
-  const float *reference_sine, *reference_cosine, *reference_tangent;
-  const float *sine, *cosine;
-  size_t count;
+  const float *query_sine,      ///< of the azimuth in the query
+      *query_cosine,            ///< of the same
+      *query_tangent;           ///< of the elevation in the query
+  const float *reference_sine,  ///< of the azimuth in the reference
+      *reference_cosine,        ///< of the same
+      *reference_tangent;       ///< of the elevation in the reference
+  const float *sine,            ///< of the difference of azimuth
+      *cosine;                  ///< of the same
+  size_t count;                 ///< matched pairs: values in each array
 };
 
 /// A turn between two views, and its half.
 struct ViewTurn {
-  float sine, cosine, half_sine, half_cosine;
+  float sine,       ///< of the turn
+      cosine,       ///< of the turn
+      half_sine,    ///< of half the turn
+      half_cosine;  ///< of half the turn
 };
 
 /// Directions of motion of which the opposite ones are tried as well.
 inline constexpr int motion_axes = 16;
+/// Unit vectors along the axes.
 struct MotionAxes {
-  float cosine[motion_axes], sine[motion_axes];
+  float cosine[motion_axes],  ///< along x, forward at angle 0
+      sine[motion_axes];      ///< along y
 };
 
 /// How far a bearing may be off, below a right angle, and how many times as far as a landmark the
 /// views may be apart.
 struct BearingTolerance {
-  float sine, cosine, max_ratio;
+  float sine,     ///< of the largest error of a bearing
+      cosine,     ///< of the same
+      max_ratio;  ///< distance of the views over that of a landmark
 };
 
+/// References around a place that the kernel compares at a time; unused lanes have similarity 0.
 inline constexpr int similarity_lanes = 12;
 
 /// What reference views around a place tell of a view, side by side. A lane without a reference has
 /// similarity 0, the logarithm of which is minus infinity, and lies far away.
 struct SimilarityLanes {
-  float x_m[similarity_lanes];
-  float y_m[similarity_lanes];
+  float x_m[similarity_lanes];                   ///< position of each reference
+  float y_m[similarity_lanes];                   ///< the same, along y
   float log_similarity[similarity_lanes];        ///< to the view
   float heading_rad[similarity_lanes];           ///< that the reference tells of the view
   float other_log_similarity[similarity_lanes];  ///< at the other heading that fits
+  /// The heading at which `other_log_similarity` holds.
   float other_heading_rad[similarity_lanes];
   float per_square_turn[similarity_lanes];  ///< <= 0; 0: the heading does not count
 };
 
 /// How similarity falls with distance: exp(-sqrt(distance^2 + blur) * per_metre).
 struct SimilarityFall {
-  float per_metre;
+  float per_metre;  ///< above 0, the fall of the logarithm for each metre
+  /// Added to the square of each distance, so that similarity falls little near a reference.
   float blur_square_m2;
 };
 

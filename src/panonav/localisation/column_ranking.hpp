@@ -12,8 +12,8 @@ namespace panonav {
 
 /// A view that the search found, compared column by column.
 struct RankedMatch {
-  Match match;
-  ColumnMatch columns;
+  Match match;          ///< as the search found it, by dissimilarity
+  ColumnMatch columns;  ///< the turn at which the columns differ least
   /// Of local features (`put_verified_first`); empty where none were compared.
   std::optional<int> verified_features = std::nullopt;
 
@@ -43,6 +43,7 @@ class ColumnRanking {
 
   /// Of one view of the memory, over all rows.
   [[nodiscard]] ColumnProfiles profiles(ViewId view) const;
+  /// The memory of the views that it compares.
   [[nodiscard]] const VisualMemory& memory() const noexcept { return *memory_; }
   /// Compared; 0: all.
   [[nodiscard]] int components() const noexcept { return components_; }

@@ -13,9 +13,13 @@ namespace panonav {
 /// The local features of a view of the memory; empty where it has none.
 using FeatureSource = std::function<std::optional<LocalFeatures>(ViewId)>;
 
+/// Which of the two a query's local features are wanted of.
+enum class Handedness {
+  as_seen,  ///< the view as it was taken
+  mirrored  ///< its mirror image, which shows a place that does not exist
+};
 /// Makes the local features of a query where they are needed, as it was seen or of its mirror image
 /// (`mirrored`); empty where elevations are unknown.
-enum class Handedness { as_seen, mirrored };
 using QueryFeatures = std::function<std::optional<LocalFeatures>(Handedness)>;
 
 /// Matches that are compared by local features: enough that the right one is among them in a memory
@@ -30,11 +34,11 @@ void put_verified_first(const LocalFeatures& query, const FeatureSource& feature
 
 /// What leaving out views of a memory in turn says of its local features.
 struct FeatureTrial {
-  int sampled_views = 0;
-  int columns_right = 0;  ///< best match within 1.5 times the distance of the nearest view
-  int features_right = 0;
-  int gained = 0;  ///< right by features and not by columns
-  int lost = 0;    ///< the reverse
+  int sampled_views = 0;   ///< left out in turn, at most 100
+  int columns_right = 0;   ///< best match within 1.5 times the distance of the nearest view
+  int features_right = 0;  ///< the same with features put first
+  int gained = 0;          ///< right by features and not by columns
+  int lost = 0;            ///< the reverse
   /// The sign test: had features been no better, as many gains among the changes would have come
   /// about in at most one of 20 cases [McNemar 1947].
   [[nodiscard]] bool tell_more() const;

@@ -19,6 +19,7 @@ class ReferenceAreas {
   /// Cost: the Voronoi cells of all posed views; some microseconds each.
   explicit ReferenceAreas(const VisualMemory& memory);
 
+  /// Distance of the posed views, see `VoronoiCells::spacing_m`.
   [[nodiscard]] double spacing_m() const noexcept { return cells_.spacing_m(); }
   /// The cell of a view, corners counter-clockwise; empty when the view had no pose.
   [[nodiscard]] std::vector<Point2> cell(ViewId view) const;
@@ -48,7 +49,7 @@ void visit_options(WantedAccuracy& accuracy, OptionVisitor& visitor);
 /// What is known of the place after a number of components has been compared. Every level's
 /// candidates, area and radius are at most those of the level before.
 struct LocalisationLevel {
-  int components = 0;
+  int components = 0;             ///< compared so far
   std::vector<Match> candidates;  ///< ascending (partial dissimilarity, view)
   std::optional<double> area_m2;  ///< of the candidates' cells; empty when a candidate has no pose
   std::optional<Circle> region;   ///< circle that covers the candidates' cells

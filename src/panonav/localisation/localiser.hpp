@@ -19,7 +19,7 @@ namespace panonav {
 
 /// A reference view that the query resembles.
 struct LocalisedMatch {
-  ViewId view;
+  ViewId view;                      ///< an id of the memory
   std::uint32_t dissimilarity = 0;  ///< integer L1 over packed magnitudes, as the search gives it
   double column_difference = 0.0;   ///< column by column, after turning (`ColumnMatch`)
   /// Local features that agree with one turn and one direction of motion; empty where none were
@@ -31,7 +31,7 @@ struct LocalisedMatch {
 
 /// Where the robot is, as far as it can be told from one view.
 struct Localisation {
-  PlaceEvidence evidence;
+  PlaceEvidence evidence;  ///< what `known_probability` was computed of
   /// That the place is one of the memory's (`place_probability`).
   double known_probability = 0.0;
   /// The probability is at least 0.5. The matches are listed all the same.
@@ -53,6 +53,7 @@ struct Localisation {
   std::uint64_t views_compared = 0;  ///< column by column
 };
 
+/// How much a localisation compares and lists.
 struct LocaliserOptions {
   int top = 10;        ///< matches listed
   int components = 0;  ///< Fourier components compared, 0 for all
@@ -84,9 +85,12 @@ class Localiser {
     features_ = std::move(features);
     rank_by_features_ = rank;
   }
+  /// Whether features decide between the best matches.
   [[nodiscard]] bool ranks_by_features() const noexcept { return features_ && rank_by_features_; }
 
+  /// Learnt at construction, or as given.
   [[nodiscard]] const PlaceModel& place_model() const noexcept { return place_model_; }
+  /// Learnt at construction, or as given.
   [[nodiscard]] const PositionModel& position_model() const noexcept { return position_model_; }
 
   /// Topological localisation. The exact search finds the views of least dissimilarity; comparing

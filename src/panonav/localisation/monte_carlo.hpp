@@ -24,20 +24,23 @@ enum class ParticleInjection {
   explained,    ///< as many as the view is better explained elsewhere than where the particles are
 };
 
+/// How many particles there are, and how they are weighed and renewed.
 struct MonteCarloOptions {
-  int min_particles = 200;
-  int max_particles = 5000;
+  int min_particles = 200;      ///< fewest, >= 1, also in one narrow mode
+  int max_particles = 5000;     ///< most, when the robot may be anywhere
   double kld_error = 0.05;      ///< allowed between the particles' distribution and the true one
   double resample_below = 0.5;  ///< effective sample size, share of the particles
   bool compass = true;          ///< the visual compass weighs headings too
+  /// How particles come to where the robot was carried.
   ParticleInjection injection = ParticleInjection::explained;
   double injection_share = 0.1;  ///< of a topological injection [M03 section 4.1]
   int injection_number = 50;     ///< of a uniform injection [M03 figure 8]
   int reranked_views = 1000;  ///< compared column by column when no near view explains the picture
-  int seed = 1;
+  int seed = 1;               ///< of all random choices, >= 0
 };
 void visit_options(MonteCarloOptions& options, OptionVisitor& visitor);
 
+/// What a filter can say of where the robot is.
 enum class LocalisationState {
   localised,  ///< one mode, no wider than the references' spacing can tell, and it explains the
               ///< views
@@ -48,27 +51,28 @@ enum class LocalisationState {
 /// "localised", "ambiguous", "lost".
 [[nodiscard]] std::string_view name_of(LocalisationState state);
 
+/// What is known after a picture.
 struct MonteCarloEstimate {
-  LocalisationState state = LocalisationState::lost;
+  LocalisationState state = LocalisationState::lost;  ///< localised, ambiguous or lost
   /// Heaviest first; all that hold at least 1 % of the weight. Covariance and spread of the
   /// position are those of its error: of the particles, and of what they take for independent, the
   /// errors of successive views and the wrong scale of travel (docs/decisions.md).
   std::vector<PoseMode> modes;
   /// Mean of the heaviest mode; empty when lost.
   std::optional<Pose2> pose;
-  double spread_m = 0.0;  ///< root mean square distance of all particles from their mean
-  int particles = 0;
+  double spread_m = 0.0;             ///< root mean square distance of all particles from their mean
+  int particles = 0;                 ///< as many as KLD sampling asks for
   double effective_particles = 0.0;  ///< before resampling
-  bool resampled = false;
-  int injected = 0;
+  bool resampled = false;            ///< whether light particles were replaced by heavy ones
+  int injected = 0;                  ///< particles that were replaced by new ones
   /// The minimum difference (`ColumnMatch`) of the view to the references near the particles, and
   /// to those anywhere; empty when none was compared.
   std::optional<double> difference_here;
-  std::optional<double> difference_anywhere;
+  std::optional<double> difference_anywhere;  ///< to those anywhere
   /// Log-likelihood of the view relative to that of a view that nothing explains: where the
   /// particles were, and anywhere in the memory (only with `ParticleInjection::explained`).
   double log_here = 0.0;
-  double log_there = 0.0;
+  double log_there = 0.0;  ///< anywhere in the memory
   /// Belief that the robot is in the memorised area, 0 .. 1; lost below one half.
   double inside = 0.0;
   /// That the robot is at the heaviest mode: `inside` times the mode's weight. Of what is said with
@@ -94,6 +98,7 @@ class MonteCarloLocaliser {
   MonteCarloLocaliser(std::shared_ptr<const ColumnRanking> ranking, const ObservationModel& model,
                       const MonteCarloOptions& options = {}, const OdometryNoise& odometry = {});
   ~MonteCarloLocaliser();
+  /// What is left of the other may only be destroyed or assigned to.
   MonteCarloLocaliser(MonteCarloLocaliser&&) noexcept;
   MonteCarloLocaliser& operator=(MonteCarloLocaliser&&) noexcept;
 
@@ -112,7 +117,9 @@ class MonteCarloLocaliser {
   /// What is known now, without a picture.
   [[nodiscard]] MonteCarloEstimate estimate() const;
 
+  /// The hypotheses after the last step.
   [[nodiscard]] const Particles& particles() const noexcept;
+  /// How alike this memory's views are at a distance.
   [[nodiscard]] const ObservationModel& model() const noexcept;
 
  private:

@@ -7,6 +7,7 @@
 
 namespace panonav {
 
+/// How many views a model is learnt from.
 struct ObservationModelOptions {
   int sampled_views = 100;    ///< that are left out in turn; all of smaller memories
   int compared_views = 1000;  ///< with which each is compared; all of smaller memories
@@ -36,7 +37,7 @@ struct ObservationModel {
   double explained_difference = 0.5;     ///< a view of the memory's places differs by less from the
                                          ///< best reference (`PlaceModel::threshold`)
   double neighbouring_difference = 0.4;  ///< expected between references one spacing apart
-  int sampled_views = 0;
+  int sampled_views = 0;                 ///< that it was learnt from
   friend bool operator==(const ObservationModel&, const ObservationModel&) = default;
 };
 

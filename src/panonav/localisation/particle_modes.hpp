@@ -11,23 +11,32 @@ namespace panonav {
 /// Hypotheses of where the robot is, column by column as kernels take them. Invariant: columns of
 /// one size. In a filter the weights sum to 1.
 struct Particles {
-  std::vector<double> x_m, y_m, heading_rad;
-  std::vector<double> weight;
+  std::vector<double> x_m,     ///< in the frame of the memory's positions
+      y_m,                     ///< in the frame of the memory's positions
+      heading_rad;             ///< in [-pi, pi)
+  std::vector<double> weight;  ///< >= 0
 
+  /// Number of particles.
   [[nodiscard]] std::size_t size() const noexcept { return weight.size(); }
+  /// Whether there is none.
   [[nodiscard]] bool empty() const noexcept { return weight.empty(); }
+  /// Of particle i, which the caller guarantees to be there.
   [[nodiscard]] Point2 position(std::size_t i) const { return {x_m[i], y_m[i]}; }
+  /// Of particle i, which the caller guarantees to be there.
   [[nodiscard]] Pose2 pose(std::size_t i) const { return {x_m[i], y_m[i], heading_rad[i]}; }
+  /// Replaces particle i, which the caller guarantees to be there.
   void set(std::size_t i, const Pose2& pose, double its_weight) {
     x_m[i] = pose.x_m;
     y_m[i] = pose.y_m;
     heading_rad[i] = pose.heading_rad;
     weight[i] = its_weight;
   }
+  /// Appends a particle.
   void add(const Pose2& pose, double its_weight) {
     resize(size() + 1);
     set(size() - 1, pose, its_weight);
   }
+  /// Keeps the first `count`; where there are fewer, the new ones are all zeros.
   void resize(std::size_t count) {
     for (auto* column : {&x_m, &y_m, &heading_rad, &weight}) column->resize(count);
   }
@@ -35,12 +44,12 @@ struct Particles {
 
 /// Particles that lie together.
 struct PoseMode {
-  double weight = 0.0;
-  Pose2 mean;
+  double weight = 0.0;  ///< sum over its particles
+  Pose2 mean;           ///< weighted; the heading is the circular mean
   /// Of x, y (m) and heading (rad), row by row.
   std::array<double, 9> covariance{};
-  double spread_m = 0.0;  ///< root mean square distance of the particles from the mean
-  double heading_spread_rad = 0.0;
+  double spread_m = 0.0;            ///< root mean square distance of the particles from the mean
+  double heading_spread_rad = 0.0;  ///< the same of the headings
 };
 
 /// Bins in which particles are counted and gathered.
@@ -49,6 +58,7 @@ struct PoseBins {
   int headings = 24;     ///< sectors of the circle; 1: headings do not tell modes apart
 };
 
+/// The modes of a set of particles, and which particle belongs to which.
 struct ParticleModes {
   std::vector<PoseMode> modes;    ///< heaviest first
   std::vector<int> mode_of;       ///< of each particle; -1: in no mode that was kept

@@ -13,6 +13,7 @@
 
 namespace panonav {
 
+/// How many views a model is learnt from.
 struct PlaceModelOptions {
   int sampled_views = 40;     ///< that are compared with others; all of smaller memories
   int compared_views = 1000;  ///< with which each is compared; all of smaller memories
@@ -37,9 +38,9 @@ struct PlaceModel {
   /// Fewest views to learn from.
   static constexpr int min_views = 8;
 
-  double threshold = unlearnt_threshold;
-  bool learnt = false;  ///< false: fewer than `min_views` views
-  int sampled_views = 0;
+  double threshold = unlearnt_threshold;  ///< differences up to it count as explained
+  bool learnt = false;                    ///< false: fewer than `min_views` views
+  int sampled_views = 0;                  ///< that it was learnt from
   double neighbouring = 0.0;  ///< median difference of a view to the most similar one of all others
   double arbitrary = 0.0;     ///< median difference between two views
   double mirrored = 0.0;      ///< median difference of a mirrored view to the most similar one
@@ -102,6 +103,7 @@ struct PlaceEvidence {
 /// little contrast differ little; a large one does. Views and components count within what was
 /// learnt from.
 inline constexpr int place_features = 6;
+/// The evidence as regression takes it: entry 0 is 1, the others as above.
 [[nodiscard]] std::array<double, place_features> features_of(
     const PlaceEvidence& evidence) noexcept;
 
@@ -121,6 +123,8 @@ inline constexpr int place_features = 6;
 /// odds by columns alone and the logarithms of the verified features' shares of chance and of what
 /// neighbours share, all counts increased by 1.
 inline constexpr int doubtful_features = 4;
+/// The evidence as regression takes it: entry 0 is 1, the others as above. Without features their
+/// counts are 0.
 [[nodiscard]] std::array<double, doubtful_features> doubtful_features_of(
     const PlaceEvidence& evidence) noexcept;
 

@@ -10,6 +10,7 @@
 
 namespace panonav {
 
+/// How many views a model is learnt from.
 struct PositionModelOptions {
   int sampled_views = 200;  ///< of larger memories only so many views are used for learning
   int seed = 1;             ///< of the draw
@@ -25,10 +26,10 @@ struct PositionModel {
   /// left out. Further references change positions by less than their error.
   static constexpr int candidates = 16;
 
-  bool learnt = false;  ///< false: fewer than `min_views` posed views; the nearest view's
-                        ///< position is the answer
-  int components = 0;   ///< over which views were compared; 0: all
-  int sampled_views = 0;
+  bool learnt = false;           ///< false: fewer than `min_views` posed views; the nearest view's
+                                 ///< position is the answer
+  int components = 0;            ///< over which views were compared; 0: all
+  int sampled_views = 0;         ///< that were left out in turn
   double neighbourhood_m = 0.0;  ///< references farther than this from the nearest one take no part
   double exponent =
       1.5;  ///< of the variogram: half the mean square distance ~ difference^(2 exponent)
@@ -44,6 +45,7 @@ struct PositionModel {
   /// than 3 spacings from it), the wrong one of two places that look alike may have been taken;
   /// empty where that hardly happens. Then the radius is at least the other number.
   std::optional<double> ambiguous_from;
+  /// The least radius from the ratio `ambiguous_from` on.
   double ambiguous_radius_m = 0.0;
   double median_error_m = 0.0;  ///< of the views left out
   double error95_m = 0.0;       ///< 95 % of the views left out were nearer
@@ -63,13 +65,13 @@ struct PositionModel {
 
 /// A reference view's part in an interpolated position.
 struct PositionShare {
-  ViewId view;
+  ViewId view;          ///< a posed view of the memory
   double weight = 0.0;  ///< may be negative; all sum to 1
 };
 
 /// A position between reference views, finer than their spacing [M04 footnote 1].
 struct PositionEstimate {
-  Point2 position;
+  Point2 position;  ///< in the frame of the memory's positions
   /// The true position lies within it in 95 % of the cases; empty when nothing could be learnt.
   std::optional<double> radius_m;
   std::vector<PositionShare> shares;  ///< nearest first

@@ -9,8 +9,8 @@ namespace panonav {
 /// One sample of the curve, from a pair of views: their dissimilarity and their distance in the
 /// arrangement so far.
 struct DissimilarityAtDistance {
-  double dissimilarity = 0.0;
-  double distance = 0.0;
+  double dissimilarity = 0.0;  ///< of the two views, >= 0
+  double distance = 0.0;       ///< of their places in the arrangement, >= 0
 };
 
 /// Distance between two places read from the dissimilarity of their views, with its error [M04
@@ -29,22 +29,25 @@ class DissimilarityCurve {
   /// finite and >= 0. Cost: n log n.
   DissimilarityCurve(std::span<const DissimilarityAtDistance> pairs, double level);
 
+  /// Read from the curve; beyond its last knot the distance there.
   [[nodiscard]] double distance(double dissimilarity) const;
   /// E of [M04 eq. 5]: root mean square error of a distance read as `distance`; rising with it.
   [[nodiscard]] double error(double distance) const;
   /// x_1 of [M04 eq. 5]: the largest distance that can be read. Views above `max_dissimilarity`
   /// are unrelated.
   [[nodiscard]] double range() const noexcept { return range_; }
+  /// Dissimilarity at `range`.
   [[nodiscard]] double max_dissimilarity() const noexcept { return max_dissimilarity_; }
   /// K of [M04 eq. 5]: stiffness of a spring of this rest length, 1 .. 0 and 0.1 at `range`.
   [[nodiscard]] double stiffness(double distance) const;
 
   /// For pictures: dissimilarity, distance and error at the knots.
   struct Knot {
-    double dissimilarity = 0.0;
-    double distance = 0.0;
-    double error = 0.0;
+    double dissimilarity = 0.0;  ///< where the curve is told
+    double distance = 0.0;       ///< mean of pairs that differ so
+    double error = 0.0;          ///< root mean square, of such distances
   };
+  /// Ascending by dissimilarity; straight lines join them.
   [[nodiscard]] std::span<const Knot> knots() const& noexcept { return knots_; }
   std::span<const Knot> knots() const&& = delete;  // would dangle
 

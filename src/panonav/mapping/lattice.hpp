@@ -15,6 +15,7 @@
 
 namespace panonav {
 
+/// How the arrangement is made.
 struct LatticeOptions {
   int neighbours = 12;  ///< springs that each view gets
   int components = 0;   ///< of the signatures; 0 takes all
@@ -26,12 +27,13 @@ void visit_options(LatticeOptions& options, OptionVisitor& visitor);
 
 /// The coarse motion of a robot from one view to another [M04 section 3.4].
 struct CoarseMotion {
-  ViewId from;
-  ViewId to;
-  Pose2 step;                            ///< from_from_to, metres
-  double distance_deviation_m = 0.06;    ///< > 0
-  double direction_deviation_rad = 0.2;  ///< > 0, of the direction of travel in the frame `from`
-  double turn_deviation_rad = 0.2;       ///< > 0
+  ViewId from;                         ///< where the motion begins
+  ViewId to;                           ///< where it ends
+  Pose2 step;                          ///< from_from_to, metres
+  double distance_deviation_m = 0.06;  ///< above 0
+  double direction_deviation_rad =
+      0.2;                          ///< above 0, of the direction of travel in the frame `from`
+  double turn_deviation_rad = 0.2;  ///< above 0
 };
 
 /// Uncertainty of a robot's motion; the defaults are those of wheels that slip.
@@ -49,19 +51,20 @@ void visit_options(CoarseMotionOptions& options, OptionVisitor& visitor);
 
 /// A view in the arrangement.
 struct LatticeNode {
-  ViewId view;
+  ViewId view;                ///< an id of the memory
   Pose2 pose;                 ///< in its component's frame; heading 0 without phases
   std::size_t component = 0;  ///< index of its group
 };
 
+/// A pair of views with a distance that their dissimilarity tells.
 struct LatticeSpring {
-  std::size_t a = 0;  ///< nodes, a < b
-  std::size_t b = 0;
-  double dissimilarity = 0.0;
-  double length = 0.0;     ///< rest length, read from the dissimilarity
-  double stiffness = 1.0;  ///< K of [M04 eq. 5]
-  double weight = 1.0;     ///< robust weight, 1 .. 0: near 0 it is an outlier
-  std::optional<PhaseReading> phases;
+  std::size_t a = 0;                   ///< nodes, a < b
+  std::size_t b = 0;                   ///< the other node
+  double dissimilarity = 0.0;          ///< of the two views, over the components asked for
+  double length = 0.0;                 ///< rest length, read from the dissimilarity
+  double stiffness = 1.0;              ///< K of [M04 eq. 5]
+  double weight = 1.0;                 ///< robust weight, 1 .. 0: near 0 it is an outlier
+  std::optional<PhaseReading> phases;  ///< what their phases tell; empty without phases
 };
 
 /// Standard deviations of springs, estimated from the arrangement itself; lengths in its unit.
@@ -71,13 +74,13 @@ struct SpringErrors {
   double turn_rad = 0.1;       ///< of a turn in which both views agree
   /// How long the unit of the lengths that phases tell is, and how far these are off, as a share.
   double phase_unit = 1.0;
-  double phase_length = 0.25;
+  double phase_length = 0.25;  ///< standard deviation of such a length, as a share of it
 };
 
 /// A connected component: views that springs join. Each component has its own frame, and nothing is
 /// known of their relative poses.
 struct LatticeComponent {
-  std::size_t views = 0;
+  std::size_t views = 0;  ///< nodes of the component
   /// False: it may as well be the mirror image.
   bool handedness_known = false;
 };
@@ -87,16 +90,16 @@ struct Lattice {
   std::vector<LatticeNode> nodes;            ///< one for each view of the memory, in its order
   std::vector<LatticeSpring> springs;        ///< ascending (a, b)
   std::vector<LatticeComponent> components;  ///< the largest first
-  DissimilarityCurve curve{1.0};
-  SpringErrors errors;
+  DissimilarityCurve curve{1.0};             ///< of the last round
+  SpringErrors errors;                       ///< of the last round
   /// Pairs of views whose relative pose was read, or whose dissimilarity, without phases; those
   /// that are no springs were rejected.
   std::size_t candidates = 0;
   /// True: metres, from the coarse motion. False: the unit is the median distance of a view to its
   /// nearest one.
   bool metric = false;
-  double energy = 0.0;
-  int iterations = 0;
+  double energy = 0.0;  ///< sum over springs of weight times squared strain in deviations
+  int iterations = 0;   ///< of the solver, over all rounds
 };
 
 /// Hears how an arrangement unfolds, after each step: the poses of all views in the memory's order,

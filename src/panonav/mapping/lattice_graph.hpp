@@ -10,8 +10,8 @@ namespace panonav {
 
 /// An undirected edge between two nodes.
 struct GraphEdge {
-  std::size_t a = 0;
-  std::size_t b = 0;
+  std::size_t a = 0;    ///< one node
+  std::size_t b = 0;    ///< the other
   double length = 1.0;  ///< >= 0
 };
 
@@ -21,12 +21,15 @@ class LatticeGraph {
   /// Throws ContractError on a node that is not below `nodes` or a length below 0.
   LatticeGraph(std::size_t nodes, std::span<const GraphEdge> edges);
 
+  /// What an edge leads to.
   struct Neighbour {
-    std::size_t node;
+    std::size_t node;  ///< at the other end of the edge
     std::size_t edge;  ///< its place among the edges given
-    double length;
+    double length;     ///< of the edge
   };
+  /// Number of nodes.
   [[nodiscard]] std::size_t size() const noexcept { return begins_.size() - 1; }
+  /// Ends of the edges at a node, which the caller guarantees to be there.
   [[nodiscard]] std::span<const Neighbour> neighbours(std::size_t node) const {
     return std::span(neighbours_).subspan(begins_[node], begins_[node + 1] - begins_[node]);
   }

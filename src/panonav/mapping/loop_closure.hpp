@@ -45,23 +45,24 @@ void visit_options(LoopClosureOptions& options, OptionVisitor& visitor);
 
 /// A node of the map for the search for closures.
 struct PassedNode {
-  ViewId view;
+  ViewId view;                ///< an id of the memory
   double way_m = 0.0;         ///< along the way of the robot from its first view to here
   std::size_t component = 0;  ///< its connected component, in whose frame its pose is
 };
 
 /// Two nodes that see the same place.
 struct LoopClosure {
-  std::size_t earlier = 0;
-  std::size_t later = 0;
-  Pose2 earlier_from_later;
-  double residual = 0.0;
+  std::size_t earlier = 0;   ///< place among the nodes given
+  std::size_t later = 0;     ///< place among the nodes given, after `earlier`
+  Pose2 earlier_from_later;  ///< pose of the later node in the frame of the earlier one, metres
+  double residual = 0.0;     ///< share of the energy of both views left unexplained
   friend bool operator==(const LoopClosure&, const LoopClosure&) = default;
 };
 
 /// Where the finder looks for the other node of a closure.
+/// Among which nodes the finder looks.
 enum class ClosureScope {
-  everywhere,
+  everywhere,        ///< all nodes of the map
   other_components,  ///< not in the connected component of the latest node
 };
 

@@ -34,6 +34,7 @@ struct ClosureCount {
   std::size_t wrong = 0;    ///< farther
   std::size_t unknown = 0;  ///< the truth of a view is not known
 };
+/// Counts the edges of kind closure by the true distance of their views, which `truth` tells.
 [[nodiscard]] ClosureCount count_closures(const TopologicalMap& map,
                                           const std::function<std::optional<Point2>(ViewId)>& truth,
                                           double right_within_m);

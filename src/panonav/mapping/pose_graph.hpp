@@ -12,19 +12,20 @@ namespace panonav {
 
 /// A measured motion between two nodes of a map.
 struct PoseEdge {
-  std::size_t a = 0;
-  std::size_t b = 0;
-  Pose2 a_from_b;
+  std::size_t a = 0;                    ///< place of a node among those given
+  std::size_t b = 0;                    ///< place of another node
+  Pose2 a_from_b;                       ///< as measured
   double position_deviation_m = 0.1;    ///< standard deviation of x and of y, > 0
-  double heading_deviation_rad = 0.05;  ///< > 0
+  double heading_deviation_rad = 0.05;  ///< above 0
   /// The edge may be an outlier, as a loop closure may: its weight falls where the others
   /// contradict it.
   bool doubtful = false;
   friend bool operator==(const PoseEdge&, const PoseEdge&) = default;
 };
 
+/// When the optimisation ends, and how far edges are believed.
 struct PoseGraphOptions {
-  int max_iterations = 40;
+  int max_iterations = 40;  ///< steps of the solver, >= 1
   /// The optimisation has converged when no position changes by more than this.
   double settled_m = 1e-3;
   /// An edge that may be an outlier has half its weight at this many standard deviations.
@@ -32,9 +33,10 @@ struct PoseGraphOptions {
 };
 void visit_options(PoseGraphOptions& options, OptionVisitor& visitor);
 
+/// How an optimisation went.
 struct PoseGraphReport {
-  int iterations = 0;
-  bool settled = true;
+  int iterations = 0;                ///< steps that were made
+  bool settled = true;               ///< false: `max_iterations` were not enough
   double cost = 0.0;                 ///< half the weighted sum of squares in the end
   std::vector<double> edge_weights;  ///< one per edge, 0 .. 1; 1 for edges that are not doubtful
 };

@@ -29,7 +29,7 @@ void visit_options(SessionAlignmentOptions& options, OptionVisitor& visitor);
 
 /// How the maps of two sessions lie to each other.
 struct SessionAlignment {
-  Pose2 first_from_second;
+  Pose2 first_from_second;  ///< takes a pose of the second map into the frame of the first
   /// Places that lead to this frame: `earlier` is a node of the first session, `later` one of the
   /// second, by their numbers there.
   std::vector<LoopClosure> matches;
@@ -38,8 +38,8 @@ struct SessionAlignment {
   /// Places of the second session that come to lie beside a view of the first, at least half a
   /// metre apart, and how many of them are matched there.
   int expected_places = 0;
-  int confirmed_places = 0;
-  std::size_t refuted = 0;  ///< matches that lead elsewhere
+  int confirmed_places = 0;  ///< of these, with a match there
+  std::size_t refuted = 0;   ///< matches that lead elsewhere
 };
 
 /// Metres for each unit of length that the views of the map's edges give; empty where none of the

@@ -28,13 +28,14 @@ void visit_options(SparseMemoryOptions& options, OptionVisitor& visitor);
 
 /// A view that is dropped, and the one that stands for it.
 struct RedundantView {
-  ViewId view;
-  ViewId kept;
+  ViewId view;              ///< that the selection drops
+  ViewId kept;              ///< that stays in the memory
   double difference = 0.0;  ///< of the two views
   bool outdated = false;    ///< dropped because of a newer view at its place
   friend bool operator==(const RedundantView&, const RedundantView&) = default;
 };
 
+/// What a memory keeps and what it drops.
 struct SparseSelection {
   std::vector<ViewId> kept;              ///< ascending
   std::vector<RedundantView> redundant;  ///< ascending by view
@@ -59,17 +60,17 @@ struct SparseSelection {
 /// What dropping views costs: each dropped view is asked for among the kept ones, and among all
 /// others as before.
 struct SparseLoss {
-  std::size_t asked = 0;
+  std::size_t asked = 0;           ///< dropped views that were searched
   double median_difference = 0.0;  ///< to the view that stands for it; 0 when nothing is dropped
   /// Distance to the reference found first; empty where fewer than two dropped views have a
   /// position.
   struct Positions {
-    double median_before_m = 0.0;
-    double p95_before_m = 0.0;
-    double median_after_m = 0.0;
-    double p95_after_m = 0.0;
+    double median_before_m = 0.0;  ///< where all other views are searched
+    double p95_before_m = 0.0;     ///< the same; 95 % are at most this
+    double median_after_m = 0.0;   ///< where the kept views are searched
+    double p95_after_m = 0.0;      ///< the same; 95 % are at most this
   };
-  std::optional<Positions> positions;
+  std::optional<Positions> positions;  ///< where positions are known
 };
 
 /// Asks for at most `max_asked` dropped views, evenly spread. Throws ContractError unless

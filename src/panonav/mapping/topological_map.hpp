@@ -16,7 +16,7 @@ namespace panonav {
 
 /// A node of the map: a view and its pose.
 struct MapNode {
-  ViewId view;
+  ViewId view;                ///< an id of the memory
   Pose2 pose;                 ///< in the frame of its connected component
   std::size_t component = 0;  ///< its connected component; components have no common frame
   friend bool operator==(const MapNode&, const MapNode&) = default;
@@ -24,10 +24,10 @@ struct MapNode {
 
 /// Two nodes and the motion between them.
 struct MapEdge {
-  ViewId a;
-  ViewId b;
-  Pose2 a_from_b;
-  LinkKind kind = LinkKind::sequence;
+  ViewId a;                            ///< one node, by its view
+  ViewId b;                            ///< the other
+  Pose2 a_from_b;                      ///< pose of b in the frame of a, metres
+  LinkKind kind = LinkKind::sequence;  ///< why they are joined
   double weight = 1.0;  ///< 0 .. 1; small for a closure that the rest of the map contradicts
   friend bool operator==(const MapEdge&, const MapEdge&) = default;
 };
@@ -35,7 +35,7 @@ struct MapEdge {
 /// A map of places [F11 section 4] with closed loops.
 struct TopologicalMap {
   std::vector<MapNode> nodes;  ///< ascending by view
-  std::vector<MapEdge> edges;
+  std::vector<MapEdge> edges;  ///< each joins two nodes of the map
   friend bool operator==(const TopologicalMap&, const TopologicalMap&) = default;
 };
 
@@ -50,11 +50,12 @@ void renumber_components(TopologicalMap& map);
 /// The number of connected components.
 [[nodiscard]] std::size_t number_of_components(const TopologicalMap& map);
 
+/// What becomes a node, and how nodes are joined.
 struct MappingOptions {
   /// A view becomes a node when it differs from the last node by more (`image_difference`, 0 .. 1):
   /// capture by threshold, as in F11's second set. 0 keeps every view.
   double capture_difference = 0.0;
-  bool close_loops = true;
+  bool close_loops = true;  ///< whether places passed before are looked for
   /// Where neither views nor wheels give a step, it is taken as this long, straight ahead and as
   /// uncertain as it is long: for recordings whose pictures are far apart. 0: a new connected
   /// component begins.
@@ -106,7 +107,7 @@ class TopologicalMapper {
   /// Optimises what is not optimised yet.
   void finish();
 
-  [[nodiscard]] std::size_t size() const noexcept { return poses_.size(); }
+  [[nodiscard]] std::size_t size() const noexcept { return poses_.size(); }  ///< Number of nodes.
   /// Of each node, in the frame of its connected component.
   [[nodiscard]] std::span<const Pose2> poses() const noexcept { return poses_; }
   /// Components are numbered in the order of their first nodes.

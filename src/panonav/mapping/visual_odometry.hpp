@@ -24,8 +24,9 @@ enum class StepRule {
   home_vector,
 };
 
+/// How a step is read from two views.
 struct VisualOdometryOptions {
-  StepRule rule = StepRule::home_vector;
+  StepRule rule = StepRule::home_vector;  ///< published, or our own
   /// Metres for each unit of length that the views give: the distance R of things around for
   /// `home_vector`, the distance of signatures 1 apart for `published`. See `length_scale_m`.
   double scale_m = 1.5;
@@ -34,7 +35,7 @@ struct VisualOdometryOptions {
   double camera_height_m = 0.0;
   /// Of `published`: components compared for the distance (k1) and for the turn (k2); 0 takes all.
   int distance_components = 0;
-  int turn_components = 0;
+  int turn_components = 0;  ///< For the turn.
   /// Times that the solution of `home_vector` is refined.
   int iterations = 1;
   /// Turn and direction of `home_vector` are refined by the flow over azimuth (`refine_flow`),
@@ -49,8 +50,8 @@ void visit_options(VisualOdometryOptions& options, OptionVisitor& visitor);
 
 /// A view as visual odometry compares it.
 struct OdometryView {
-  FourierSignature signature;
-  HomingView coefficients;
+  FourierSignature signature;  ///< of the view, for the distance and the compass
+  HomingView coefficients;     ///< the same as homing takes it
 
   /// Throws ContractError unless there are three components or more.
   explicit OdometryView(FourierSignature view);
@@ -58,7 +59,7 @@ struct OdometryView {
 
 /// The motion between two views.
 struct VisualStep {
-  Pose2 before_from_after;
+  Pose2 before_from_after;       ///< pose of the second view in the frame of the first, metres
   double length_in_views = 0.0;  ///< before it is multiplied by the scale
   double correlation = 0.0;      ///< of the views at the turn found, -1 .. 1
   double residual = 1.0;         ///< share of the energy of the views left unexplained, 0 .. 1
@@ -73,8 +74,8 @@ struct VisualStep {
 
 /// A step whose length is known from elsewhere, such as wheels.
 struct KnownLength {
-  double length_in_views = 0.0;
-  double length_m = 0.0;
+  double length_in_views = 0.0;  ///< as `VisualStep` tells it, > 0
+  double length_m = 0.0;         ///< of the same step, by the other source
 };
 
 /// The scale from known steps: the median of their ratios, which is robust against single wrong
@@ -98,6 +99,7 @@ class VisualOdometry {
   [[nodiscard]] double scale_m() const;
   /// start_from_robot.
   [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }
+  /// Views at which no step was believed, the first one not counted.
   [[nodiscard]] int breaks() const noexcept { return breaks_; }
 
  private:

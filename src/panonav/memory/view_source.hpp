@@ -20,6 +20,7 @@ class ViewSource {
 /// A part of a memory that is held whole. The memory must outlive it.
 class MemoryViewSource final : public ViewSource {
  public:
+  /// Keeps a reference to the memory; copies nothing.
   explicit MemoryViewSource(const VisualMemory& memory);
   [[nodiscard]] std::span<const ViewId> views() const override { return memory_->views(); }
   /// Copies the signatures.

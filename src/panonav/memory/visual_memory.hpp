@@ -17,38 +17,45 @@ namespace panonav {
 
 /// Where a reference view was taken. Some recordings know positions but no headings.
 struct ReferencePose {
-  double x_m = 0.0;
-  double y_m = 0.0;
-  std::optional<double> heading_rad;
-  [[nodiscard]] Point2 position() const { return {x_m, y_m}; }
+  double x_m = 0.0;                   ///< in the frame of the memory's positions
+  double y_m = 0.0;                   ///< in the frame of the memory's positions
+  std::optional<double> heading_rad;  ///< in the same frame, in [-pi, pi); empty: unknown
+  [[nodiscard]] Point2 position() const { return {x_m, y_m}; }  ///< The pose without its heading.
   friend bool operator==(const ReferencePose&, const ReferencePose&) = default;
 };
 
 /// What a memory knows of a view besides its signature.
 struct ReferenceInfo {
-  std::string name;  ///< unique within a memory; usually the image's file name
-  std::optional<ReferencePose> pose;
-  std::optional<double> stamp_s;
+  std::string name;                   ///< unique within a memory; usually the image's file name
+  std::optional<ReferencePose> pose;  ///< empty: unknown
+  std::optional<double> stamp_s;      ///< when the picture was taken, in seconds; empty: unknown
   friend bool operator==(const ReferenceInfo&, const ReferenceInfo&) = default;
 };
 
-enum class LinkKind { sequence, neighbour, closure };
+/// Why two views are linked.
+enum class LinkKind {
+  sequence,   ///< taken one after the other
+  neighbour,  ///< beside each other in an arrangement by similarity
+  closure     ///< the same place passed at another time
+};
 
 /// Two views between which a robot can move.
 struct Link {
-  ViewId a;
-  ViewId b;
-  LinkKind kind = LinkKind::sequence;
+  ViewId a;                            ///< one view
+  ViewId b;                            ///< the other; links have no direction
+  LinkKind kind = LinkKind::sequence;  ///< of several kinds the one that was told last
   friend bool operator==(const Link&, const Link&) = default;
 };
 
+/// A view that a search found.
 struct Match {
-  ViewId view;
+  ViewId view;  ///< an id of the memory
   std::uint32_t dissimilarity =
       0;  ///< integer L1 of packed magnitudes over the components asked for
   friend bool operator==(const Match&, const Match&) = default;
 };
 
+/// How many views a search finds, and what it compares.
 struct SearchOptions {
   int top = 10;        ///< matches wanted, >= 1
   int components = 0;  ///< 1 .. the memory's; 0 takes all
@@ -60,6 +67,7 @@ struct SearchMask {
   std::span<const std::uint8_t> allowed_rows;  ///< one entry per row, 0: the row does not count
 };
 
+/// What a search found, and what it cost.
 struct SearchResult {
   std::vector<Match> matches;       ///< ascending (dissimilarity, view)
   std::uint64_t bytes_read = 0;     ///< signature and index bytes that the search touched
@@ -70,7 +78,7 @@ struct SearchResult {
 /// One level of hierarchical localisation [M04 section 2.3]: the views that may still be the place
 /// when `components` components have been compared.
 struct HierarchyLevel {
-  int components = 0;
+  int components = 0;  ///< compared at this level, m of [M04]
   /// Ascending (partial dissimilarity, view); nested in the level before.
   std::vector<Match> candidates;
   std::uint64_t bytes_read = 0;  ///< by all levels so far
@@ -85,15 +93,19 @@ class VisualMemory {
   /// `full_scale`: magnitude that is packed as 255. Throws ContractError.
   VisualMemory(SignatureShape shape, float full_scale, std::optional<ElevationBand> elevations);
   ~VisualMemory();
+  /// What is left of the other may only be destroyed or assigned to.
   VisualMemory(VisualMemory&&) noexcept;
   VisualMemory& operator=(VisualMemory&&) noexcept;
+  /// Copies all views and links.
   VisualMemory(const VisualMemory&);
   VisualMemory& operator=(const VisualMemory&);
 
-  [[nodiscard]] SignatureShape shape() const noexcept;
-  [[nodiscard]] float full_scale() const noexcept;
+  [[nodiscard]] SignatureShape shape() const noexcept;  ///< Rows and components of every view.
+  [[nodiscard]] float full_scale() const noexcept;      ///< Magnitude that is packed as 255.
+  /// Of the signatures' rows, the same for every view; empty: unknown.
   [[nodiscard]] const std::optional<ElevationBand>& elevations() const noexcept;
-  [[nodiscard]] std::size_t size() const noexcept;
+  [[nodiscard]] std::size_t size() const noexcept;  ///< Number of views.
+  /// Whether there is no view.
   [[nodiscard]] bool empty() const noexcept { return size() == 0; }
 
   /// Throws ContractError on another shape, an empty or known name, or a pose that is not finite;
@@ -108,19 +120,27 @@ class VisualMemory {
 
   /// Ascending.
   [[nodiscard]] std::span<const ViewId> views() const noexcept;
+  /// Whether the memory has this view. Cost: O(log n).
   [[nodiscard]] bool contains(ViewId view) const noexcept;
+  /// The view of that name; empty when there is none.
   [[nodiscard]] std::optional<ViewId> find(std::string_view name) const;
   /// These throw ContractError when there is no such view.
   [[nodiscard]] const ReferenceInfo& info(ViewId view) const;
+  /// Replaces what is known of the pose; empty: it is unknown. Throws also on a pose that is not
+  /// finite.
   void set_pose(ViewId view, std::optional<ReferencePose> pose);
-  [[nodiscard]] PackedSignature packed(ViewId view) const;
+  [[nodiscard]] PackedSignature packed(ViewId view) const;  ///< A copy of the view's bytes.
+  /// The view with magnitudes and phases as real numbers, to the precision of the packed form.
   [[nodiscard]] FourierSignature signature(ViewId view) const;
 
   /// Throws ContractError unless both views exist and differ. A second link of the same two views
   /// replaces the first.
   void link(const Link& link);
+  /// Drops the link of the two views, in whichever order; nothing happens where there is none.
   void unlink(ViewId a, ViewId b);
-  [[nodiscard]] std::span<const Link> links() const noexcept;
+  [[nodiscard]] std::span<const Link> links() const noexcept;  ///< All links, each once.
+  /// The views that a link joins with this one, ascending. Throws ContractError when there is no
+  /// such view.
   [[nodiscard]] std::vector<ViewId> neighbours(ViewId view) const;
 
   /// The nearest views by integer L1 over packed magnitudes: exactly what a full scan finds, ties

@@ -28,6 +28,7 @@ enum class DriveKind {
 /// The defaults are the order of size of small wheeled robots on flat floors without slip; measure
 /// your own.
 struct OdometryNoise {
+  /// Which errors there are: those of wheels, or of a platform that moves sideways.
   DriveKind drive = DriveKind::differential;
   /// Standard deviation of travel after 1 m (m); of each of x and y for a holonomic robot.
   double translation_from_translation = 0.03;
@@ -57,16 +58,17 @@ class StepSampler {
   /// microseconds.
   [[nodiscard]] Pose2 move(const Pose2& world_from_robot, Random& random) const;
 
-  /// The same in its parts, for many poses at once: the step with its heading in [-pi, pi),
+  /// The same in its parts, for many poses at once: the step with its heading in [-pi, pi).
   [[nodiscard]] const Pose2& step() const noexcept { return step_; }
+  /// Whether its travel errors are alike in x and y.
   [[nodiscard]] bool holonomic() const noexcept { return holonomic_; }
-  /// Standard deviations of its travel (m; of each of x and y for a holonomic drive) and turn
-  /// (rad),
+  /// Standard deviation of its travel (m); of each of x and y for a holonomic drive.
   [[nodiscard]] double translation_deviation_m() const noexcept { return translation_deviation_m_; }
+  /// Standard deviation of its turn (rad).
   [[nodiscard]] double rotation_deviation_rad() const noexcept { return rotation_deviation_rad_; }
-  /// the error of travel and turn that normal deviates of mean 0 and deviation 1 stand for (the
+  /// The error of travel and turn that normal deviates of mean 0 and deviation 1 stand for (the
   /// third for a holonomic drive only), in the frame of the robot before the step, which the error
-  /// of the turn turns first by this share of itself.
+  /// of the turn turns first by `share_before` of itself.
   [[nodiscard]] Pose2 error_of(double first, double second, double third) const noexcept {
     if (holonomic_) {
       return {first * translation_deviation_m_, second * translation_deviation_m_,
@@ -75,6 +77,7 @@ class StepSampler {
     const double travel_m = first * translation_deviation_m_;
     return {travel_m * cos_middle_, travel_m * sin_middle_, second * rotation_deviation_rad_};
   }
+  /// 0 for a holonomic drive, 1/2 for wheels, whose travel points along the middle of the turn.
   [[nodiscard]] double share_before() const noexcept { return holonomic_ ? 0.0 : 0.5; }
 
  private:
@@ -97,6 +100,7 @@ class SimulatedOdometry {
 
   /// The robot truly moved by `step`; returns odometry_from_robot afterwards.
   Pose2 advance(const Pose2& step);
+  /// Where the odometry believes the robot to be: odometry_from_robot.
   [[nodiscard]] const Pose2& pose() const noexcept { return odometry_from_robot_; }
 
  private:

@@ -11,6 +11,7 @@ namespace panonav {
 
 /// Length of the polyline through the positions; 0 for fewer than two.
 [[nodiscard]] double path_length_m(std::span<const Pose2> path);
+/// The same for positions alone.
 [[nodiscard]] double path_length_m(std::span<const Point2> path);
 
 /// Poses every `spacing_m` along the polyline through the positions, starting with the first;
@@ -20,12 +21,13 @@ namespace panonav {
 
 /// A place of a regular grid: column i along x, row j along y.
 struct GridPosition {
-  int i = 0;
-  int j = 0;
-  Point2 position;
+  int i = 0;        ///< column along x, from 0
+  int j = 0;        ///< row along y, from 0
+  Point2 position;  ///< in the frame of the rectangle's corners
   friend bool operator==(const GridPosition&, const GridPosition&) = default;
 };
 
+/// In which order `grid_positions` goes through the rows.
 enum class GridOrder {
   raster,  ///< every row from low x to high x
   zigzag,  ///< every second row backwards, as a robot would drive it [M04 section 4]
@@ -39,9 +41,10 @@ enum class GridOrder {
 /// Says whether a robot may stand at a place.
 using FreePredicate = std::function<bool(Point2)>;
 
+/// How `random_walk` goes.
 struct RandomWalkOptions {
   int poses = 100;                  ///< >= 1
-  double step_m = 0.1;              ///< > 0
+  double step_m = 0.1;              ///< above 0
   double turn_deviation_rad = 0.2;  ///< standard deviation of the turn at each step, >= 0
 };
 

@@ -31,7 +31,9 @@ class SimulatedBase {
   /// Somebody carries it there; its odometry does not know.
   void carry_to(const Pose2& pose) noexcept { pose_ = pose; }
 
+  /// Where the robot truly is, in the frame of the start pose.
   [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }
+  /// Where its wheels say that it is: odometry_from_robot, zero at the start.
   [[nodiscard]] const Pose2& odometry() const noexcept { return odometry_.pose(); }
 
  private:

@@ -27,13 +27,14 @@ void visit_options(SteeringOptions& options, OptionVisitor& visitor);
 /// farther the goal is off to the side, and not at all beyond `on_spot_rad`. Throws OptionError.
 [[nodiscard]] Pose2 steer_to(const Pose2& robot, Point2 goal, const SteeringOptions& options = {});
 
+/// How closely `PathFollower` keeps to a path.
 struct PathFollowerOptions {
   double look_ahead_m = 0.3;  ///< the robot steers to a place of the path at most so far ahead
   /// That place is so near that the straight line to it leaves the path by no more than this.
   /// Corners are not cut where there may be no room.
   double max_cut_m = 0.02;
-  double arrived_m = 0.02;  ///< so near to the end of the path the robot has arrived
-  SteeringOptions steering;
+  double arrived_m = 0.02;   ///< so near to the end of the path the robot has arrived
+  SteeringOptions steering;  ///< how each step towards the place ahead is made
   friend bool operator==(const PathFollowerOptions&, const PathFollowerOptions&) = default;
 };
 void visit_options(PathFollowerOptions& options, OptionVisitor& visitor);
@@ -58,6 +59,7 @@ class PathFollower {
   [[nodiscard]] double along_m() const noexcept { return along_m_; }
   /// The robot's place on the path.
   [[nodiscard]] Point2 place() const { return place_at(along_m_); }
+  /// Length of the whole path, in metres.
   [[nodiscard]] double length_m() const noexcept { return way_m_.back(); }
 
  private:

@@ -9,9 +9,10 @@
 
 namespace panonav {
 
+/// Where a robot was at a time.
 struct StampedPose {
-  double stamp_s = 0.0;
-  Pose2 pose;
+  double stamp_s = 0.0;  ///< seconds, on a clock that the trajectory's source defines
+  Pose2 pose;            ///< in the trajectory's frame
   friend bool operator==(const StampedPose&, const StampedPose&) = default;
 };
 
@@ -26,9 +27,11 @@ class Trajectory {
   /// Throws ContractError that names the first offending pose.
   explicit Trajectory(std::vector<StampedPose> poses);
 
+  /// In ascending order of their stamps.
   [[nodiscard]] std::span<const StampedPose> poses() const& noexcept { return poses_; }
-  std::span<const StampedPose> poses() const&& = delete;  // would dangle
-  [[nodiscard]] std::size_t size() const noexcept { return poses_.size(); }
+  std::span<const StampedPose> poses() const&& = delete;                     // would dangle
+  [[nodiscard]] std::size_t size() const noexcept { return poses_.size(); }  ///< Number of poses.
+  /// Whether there is no pose.
   [[nodiscard]] bool empty() const noexcept { return poses_.empty(); }
 
   /// Throws ContractError unless the pose is finite and later than the last one.

@@ -8,9 +8,9 @@ namespace panonav {
 
 /// Speeds of a robot in its own frame: x forward, y left, turning counter-clockwise.
 struct Velocity {
-  double forward_m_s = 0.0;
-  double left_m_s = 0.0;  ///< 0 for a differential drive
-  double turn_rad_s = 0.0;
+  double forward_m_s = 0.0;  ///< along the heading, below 0 backwards
+  double left_m_s = 0.0;     ///< 0 for a differential drive
+  double turn_rad_s = 0.0;   ///< counter-clockwise seen from above
   friend bool operator==(const Velocity&, const Velocity&) = default;
 };
 
@@ -19,15 +19,16 @@ struct Velocity {
 class RobotBase {
  public:
   virtual ~RobotBase() = default;
+  /// Drives so from now on, instead of as before.
   virtual void command(const Velocity& velocity) = 0;
 };
 
 /// What a base can do, and how commands to it are made.
 struct BaseOptions {
-  DriveKind drive = DriveKind::differential;
-  double speed_m_s = 0.3;       ///< highest, > 0
-  double turn_rad_s = 1.0;      ///< highest, > 0
-  double period_s = 0.1;        ///< time for which a command holds, > 0
+  DriveKind drive = DriveKind::differential;  ///< wheels, or a platform that moves sideways
+  double speed_m_s = 0.3;                     ///< highest, > 0
+  double turn_rad_s = 1.0;                    ///< highest, > 0
+  double period_s = 0.1;                      ///< time for which a command holds, > 0
   double on_spot_rad = 0.7854;  ///< a differential drive turns on the spot for larger angles
 };
 void visit_options(BaseOptions& options, OptionVisitor& visitor);

@@ -14,9 +14,10 @@
 
 namespace panonav {
 
+/// How areas are made, and how plans lead over them.
 struct PlannerOptions {
-  FieldOptions field;
-  SubAreaOptions areas;
+  FieldOptions field;    ///< of the directions within an area
+  SubAreaOptions areas;  ///< of the areas' size
   /// Gates that count between two areas at most, spread over their border; more make ways through
   /// wide borders shorter and planning slower. 0: all, and every way is a shortest one.
   int gates_per_border = 4;
@@ -34,20 +35,26 @@ class AreaPlanner {
   /// With areas made before. Throws ContractError when they are not those of this graph.
   AreaPlanner(NavigationGraph graph, SubAreas areas, const PlannerOptions& options = {});
 
+  /// As it was given.
   [[nodiscard]] const NavigationGraph& graph() const noexcept { return graph_; }
+  /// Made at construction, or as given.
   [[nodiscard]] const SubAreas& areas() const noexcept { return areas_; }
   /// Gates that count, of all borders.
   [[nodiscard]] std::size_t gates() const noexcept;
 
   /// Throws ContractError when the view is not in the graph.
   void set_goal(ViewId goal);
+  /// The view that plans lead to; empty before the first `set_goal`.
   [[nodiscard]] std::optional<ViewId> goal() const;
 
   /// Edges that cannot be used now. Throws ContractError on one that there is not. Cost: the
   /// ways between gates of the areas at both ends are found anew, and the plan over areas.
   void close(std::span<const std::size_t> edges);
+  /// All edges may be used again. Cost: as `close`, for the areas of the edges that were closed.
   void open_all();
+  /// Whether an edge, by its number, cannot be used now.
   [[nodiscard]] bool is_closed(std::size_t edge) const { return closed_.at(edge) != 0; }
+  /// Number of edges that cannot be used now.
   [[nodiscard]] std::size_t closed() const noexcept;
 
   /// Guides towards the goal by place in the area; none is reachable without a goal. Throws

@@ -28,7 +28,7 @@ struct SeenView {
 
 /// A reference that looks like the robot's view.
 struct FoundView {
-  std::size_t node = 0;
+  std::size_t node = 0;             ///< of the navigation graph
   std::uint32_t dissimilarity = 0;  ///< as the memory has it, over the components compared
   double difference = 0.0;          ///< by `image_difference`: magnitudes and phases
 };

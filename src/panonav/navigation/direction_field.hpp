@@ -13,6 +13,7 @@
 
 namespace panonav {
 
+/// How far ahead a direction looks.
 struct FieldOptions {
   /// So many edges ahead count for a direction, where the way does not bend away.
   int links_ahead = 3;
@@ -31,6 +32,7 @@ struct Guide {
   /// unreachable, and where nothing tells.
   std::optional<double> direction_rad;
 
+  /// Whether a way leads to the goal from here.
   [[nodiscard]] bool reachable() const noexcept {
     return way < std::numeric_limits<double>::infinity();
   }
@@ -38,8 +40,8 @@ struct Guide {
 
 /// A node from which ways are counted, and the way that is left from there.
 struct SearchRoot {
-  std::size_t node = 0;
-  double way = 0.0;
+  std::size_t node = 0;  ///< of the area that is searched
+  double way = 0.0;      ///< from the root to the goal, >= 0
   std::size_t next = 0;  ///< beyond the root; the root itself where the goal is
   std::size_t edge = 0;  ///< that leads there
 };

@@ -12,33 +12,35 @@
 
 namespace panonav {
 
+/// Which references count as lying on a route, and how a robot is followed along it.
 struct KnownRouteOptions {
   /// References and robots lie no farther beside the route. A search tries places up to 0.5 m
   /// beside it; a robot at a reference may be a little farther off than that.
   double beside_m = 0.4;
-  RouteTrackerOptions tracker;
-  RouteFitOptions fit;
+  RouteTrackerOptions tracker;  ///< of the robot on the route
+  RouteFitOptions fit;          ///< of its scanlines
 };
 void visit_options(KnownRouteOptions& options, OptionVisitor& visitor);
 
 /// A reference view and its pose in a route's frame.
 struct RouteView {
-  ViewId view;
-  Pose2 pose;
+  ViewId view;  ///< an id of the memory
+  Pose2 pose;   ///< in the route's frame
 };
 
 /// A recorded route together with the references of the memory that lie on it, so that plans over
 /// the memory may lead along it. Made by `known_route`; cost of a copy: that of the tracker.
 struct KnownRoute {
+  /// A view that lies on the route.
   struct Reference {
-    ViewId view;
+    ViewId view;  ///< an id of the memory
     /// Ways along the route to where it passes the view, ascending: one for each time.
     std::vector<double> along_m;
     friend bool operator==(const Reference&, const Reference&) = default;
   };
-  RouteTracker tracker;
+  RouteTracker tracker;               ///< holds the route; copied for each run along it
   std::vector<Reference> references;  ///< on the route, ascending by view
-  double beside_m = 0.0;
+  double beside_m = 0.0;              ///< as of the options
 
   /// Distances along the route at which it passes the view; empty when it does not.
   [[nodiscard]] std::span<const double> along_m(ViewId view) const;
@@ -56,6 +58,7 @@ struct RouteStretch {
   double from_m = 0.0;   ///< along the route
   double to_m = 0.0;     ///< likewise; less than `from_m`: against the direction of its recording
   std::size_t last = 0;  ///< of the way's views the one at its end
+  /// Way along the route from its beginning to its end, whichever direction it is driven in.
   [[nodiscard]] double length_m() const noexcept;
 };
 

@@ -17,8 +17,8 @@ namespace panonav {
 
 /// Two reference views between which a robot can move, both ways.
 struct NavigationEdge {
-  ViewId a;
-  ViewId b;
+  ViewId a;  ///< one end
+  ViewId b;  ///< the other
   /// What the way costs, > 0; in whatever unit the graph has.
   double length = 1.0;
   /// How b lies to a, in the graph's unit. Empty: nothing tells. At the same place, x and y are 0:
@@ -41,11 +41,14 @@ class NavigationGraph {
     std::size_t node = 0;  ///< where it leads
     std::size_t edge = 0;  ///< its number
   };
-  [[nodiscard]] std::size_t size() const noexcept { return views_.size(); }
+  [[nodiscard]] std::size_t size() const noexcept { return views_.size(); }  ///< Number of nodes.
+  /// Of all nodes, ascending.
   [[nodiscard]] std::span<const ViewId> views() const noexcept { return views_; }
+  /// Of one node. Throws std::out_of_range on a number that is none.
   [[nodiscard]] ViewId view(std::size_t node) const { return views_.at(node); }
   /// Empty when there is no such view.
   [[nodiscard]] std::optional<std::size_t> node_of(ViewId view) const;
+  /// Each once; edges are numbered in this order.
   [[nodiscard]] std::span<const NavigationEdge> edges() const noexcept { return edges_; }
   /// Ascending by node.
   [[nodiscard]] std::span<const Exit> exits(std::size_t node) const {

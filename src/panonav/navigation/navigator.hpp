@@ -18,6 +18,7 @@
 
 namespace panonav {
 
+/// How a robot is led over the memory, and when it counts as blocked or lost.
 struct NavigatorOptions {
   double step_m =
       0.25;            ///< longest way between two observations; about half the references' spacing
@@ -46,8 +47,9 @@ struct NavigatorOptions {
 };
 void visit_options(NavigatorOptions& options, OptionVisitor& visitor);
 
+/// How far a run to a goal has come.
 enum class NavigationState {
-  moving,
+  moving,       ///< the run goes on
   arrived,      ///< the views say that this is the goal
   blocked,      ///< the robot cannot get on, though there is a way in the memory
   lost,         ///< what the robot sees is nowhere in the memory, or not where it should be
@@ -70,6 +72,7 @@ enum class NavigationEvent {
   route,          ///< a leg along a recorded route begins
   route_left,     ///< it did not come to its end
 };
+/// In lower case with underscores, as logs and JSON have it: "relocalised", "entered_area", ...
 [[nodiscard]] std::string_view name_of(NavigationEvent event);
 
 /// What a robot tells besides its view.
@@ -91,10 +94,10 @@ struct RobotReport {
 
 /// One decision with its reasons: the log entry of an observation.
 struct NavigationDecision {
-  int step = 0;  ///< counts from 1
-  NavigationState state = NavigationState::moving;
-  double direction_rad = 0.0;     ///< in which to go, in the current robot frame
-  double advance_m = 0.0;         ///< how far; 0 unless moving
+  int step = 0;                                     ///< counts from 1
+  NavigationState state = NavigationState::moving;  ///< after this observation
+  double direction_rad = 0.0;                       ///< in which to go, in the current robot frame
+  double advance_m = 0.0;                           ///< how far; 0 unless moving
   bool homing = false;            ///< the last stretch, by the home vector to the goal itself
   bool on_route = false;          ///< a leg along a recorded route, by the horizon scanline
   std::optional<ViewId> nearest;  ///< the place
@@ -109,7 +112,7 @@ struct NavigationDecision {
   int components = 0;  ///< of the signatures, by which references were compared
   /// Of the loaded area's signatures and index, by this observation, `probability` not included.
   std::uint64_t bytes_read = 0;
-  std::vector<NavigationEvent> events;
+  std::vector<NavigationEvent> events;  ///< in the order in which they happened
 };
 /// A line for a log.
 [[nodiscard]] std::string describe(const NavigationDecision& decision);
@@ -130,6 +133,7 @@ class Navigator {
   /// ContractError when the graph is empty.
   Navigator(const ViewSource& source, AreaPlanner planner, const NavigatorOptions& options = {});
   ~Navigator();
+  /// What is left of the other may only be destroyed or assigned to.
   Navigator(Navigator&& other) noexcept;
   Navigator& operator=(Navigator&& other) noexcept;
 
@@ -140,7 +144,7 @@ class Navigator {
   /// Recorded routes to go along, which must outlive *this; none at first, and `RobotReport::line`
   /// is not looked at.
   void set_routes(std::span<const KnownRoute> routes);
-  [[nodiscard]] std::span<const KnownRoute> routes() const noexcept;
+  [[nodiscard]] std::span<const KnownRoute> routes() const noexcept;  ///< As they were set.
 
   /// The robot may be anywhere: the next observation is searched for in the whole memory.
   void forget_place();
@@ -151,6 +155,7 @@ class Navigator {
   [[nodiscard]] NavigationDecision observe(const FourierSignature& view,
                                            const RobotReport& report = {});
 
+  /// What plans are made by, with its graph, its areas and the edges that are closed now.
   [[nodiscard]] const AreaPlanner& planner() const noexcept;
   /// Views in memory now: of an area and its surroundings, and what is loaded ahead of the next.
   [[nodiscard]] std::size_t loaded_views() const noexcept;

@@ -9,6 +9,7 @@
 
 namespace panonav {
 
+/// How large areas are, and how carefully they are cut.
 struct SubAreaOptions {
   int views_per_area = 200;  ///< aimed at
   /// Steps of relaxation by which each cut is sought.

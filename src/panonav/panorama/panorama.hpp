@@ -22,7 +22,9 @@ class Panorama {
   Panorama(int rows, int columns, std::optional<ElevationBand> elevations,
            std::vector<float> values);
 
+  /// Values of a column, from the highest elevation to the lowest.
   [[nodiscard]] int rows() const noexcept { return rows_; }
+  /// Values of a row: azimuths of a full turn.
   [[nodiscard]] int columns() const noexcept { return columns_; }
   /// Empty: unknown, every row is then treated as on the horizon.
   [[nodiscard]] const std::optional<ElevationBand>& elevations() const noexcept {
@@ -34,16 +36,21 @@ class Panorama {
   [[nodiscard]] std::optional<int> horizon_row() const noexcept;
   [[nodiscard]] double azimuth_rad(int column) const noexcept;  ///< in [-pi, pi)
 
+  /// All rows * columns values, row after row.
   [[nodiscard]] std::span<const float> values() const& noexcept { return values_; }
+  /// The same, to be written; the caller keeps them finite.
   [[nodiscard]] std::span<float> values() & noexcept { return values_; }
   std::span<const float> values() const&& = delete;  // would dangle
+  /// Row y, all azimuths. The caller guarantees 0 <= y < rows.
   [[nodiscard]] std::span<const float> row(int y) const& noexcept {
     return std::span(values_).subspan(static_cast<std::size_t>(y) * columns_, columns_);
   }
   std::span<const float> row(int y) const&& = delete;  // would dangle
+  /// One value. The caller guarantees that row and column are within the panorama.
   [[nodiscard]] float at(int y, int column) const noexcept {
     return values_[static_cast<std::size_t>(y) * columns_ + column];
   }
+  /// The same, to be written.
   [[nodiscard]] float& at(int y, int column) noexcept {
     return values_[static_cast<std::size_t>(y) * columns_ + column];
   }

@@ -25,8 +25,8 @@ struct PictureLayout {
 
 /// Rows and columns wanted; 0 keeps the size of the picture (of the part that is kept).
 struct PanoramaShape {
-  int rows = 0;
-  int columns = 0;
+  int rows = 0;     ///< 0, or >= 1
+  int columns = 0;  ///< 0, or >= 4
   friend bool operator==(const PanoramaShape&, const PanoramaShape&) = default;
 };
 

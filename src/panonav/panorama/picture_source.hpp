@@ -17,7 +17,7 @@ enum class PictureKind {
 
 /// How the pictures of a recording become panoramic cylinders: all that is known of the camera.
 struct PictureSource {
-  PictureKind kind = PictureKind::panorama;
+  PictureKind kind = PictureKind::panorama;  ///< which of the other members count
   /// Panorama and equirectangular: the layout of columns and rows. Mirror: only `kept_elevations`
   /// is used, the band that is unwarped (empty: all that the camera sees at every azimuth).
   PictureLayout layout;

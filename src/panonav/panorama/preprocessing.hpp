@@ -14,7 +14,7 @@ struct PreprocessingOptions {
   /// Rows at the upper and lower edge that are set to 0 and ignored: a mirror's rim, the robot's
   /// body.
   int masked_rows_top = 0;
-  int masked_rows_bottom = 0;
+  int masked_rows_bottom = 0;  ///< the same at the lower edge
   /// Replaces each value by the length of the gradient of grey there (central differences, per row
   /// and column). Less sensitive to light that changes slowly over the view, more to noise and to
   /// the distance moved.

@@ -7,8 +7,8 @@ namespace panonav {
 /// Tilt of the camera's axis against the vertical: first about the robot's x axis (positive lowers
 /// the right side), then about its y axis (positive lowers the front), right-handed [REP 103].
 struct Tilt {
-  double roll_rad = 0.0;
-  double pitch_rad = 0.0;
+  double roll_rad = 0.0;   ///< about x, at most `max_tilt_rad` either way
+  double pitch_rad = 0.0;  ///< about y, at most `max_tilt_rad` either way
   friend bool operator==(const Tilt&, const Tilt&) = default;
 };
 

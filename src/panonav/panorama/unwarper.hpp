@@ -49,22 +49,24 @@ void visit_options(UnwarperOptions& options, OptionVisitor& visitor);
 /// Workspace.
 class Unwarper {
  public:
-  static constexpr int rows_per_block = 4;
+  static constexpr int rows_per_block = 4;  ///< Rows that `unwrap_blocks` hands over at a time.
 
   /// Buffers that are reused from image to image; what they hold between calls does not matter.
   struct Workspace {
-    std::vector<std::uint8_t> halved;
-    std::vector<std::uint16_t> pairs;
-    std::vector<float> block;
+    std::vector<std::uint8_t> halved;  ///< images of half the size and less
+    std::vector<std::uint16_t> pairs;  ///< pixels beside those below, see `kernels::pair_rows`
+    std::vector<float> block;          ///< values of `rows_per_block` rows
   };
 
   /// Throws ContractError on a camera, size or band that is not valid, or when the camera sees
   /// nothing of the band. Cost: some 50 ms for 80 x 512.
   explicit Unwarper(const Camera& camera, const UnwarperOptions& options = {});
 
+  /// The camera whose images it takes.
   [[nodiscard]] const Camera& camera() const noexcept { return camera_; }
-  [[nodiscard]] int rows() const noexcept { return rows_; }
-  [[nodiscard]] int columns() const noexcept { return columns_; }
+  [[nodiscard]] int rows() const noexcept { return rows_; }        ///< Rows of its panoramas.
+  [[nodiscard]] int columns() const noexcept { return columns_; }  ///< Columns of its panoramas.
+  /// Of its panoramas: the wanted band, or all that the camera sees at every azimuth.
   [[nodiscard]] const ElevationBand& elevations() const noexcept { return elevations_; }
   /// False where the value is taken from a neighbour, because the camera does not see that
   /// direction.
@@ -75,6 +77,7 @@ class Unwarper {
 
   /// Throws ContractError unless the image has the camera's size; colour becomes grey.
   [[nodiscard]] Panorama unwrap(ImageView image) const;
+  /// The same with buffers of the caller, which spare their allocation from the second image on.
   [[nodiscard]] Panorama unwrap(ImageView image, Workspace& workspace) const;
 
   /// The same values, handed over in blocks of `rows_per_block` rows (the last may be smaller) from

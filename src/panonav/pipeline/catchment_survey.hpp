@@ -16,10 +16,11 @@ namespace panonav {
 
 /// The views of a recording, in its order.
 struct RecordedViews {
-  std::vector<std::string> files;
+  std::vector<std::string> files;  ///< of the pictures, as the data set names them
+  /// As the data set has them, before the robot was turned; empty: unknown.
   std::vector<std::optional<ReferencePose>> poses;
   std::vector<double> turned_rad;  ///< by which the robot was turned before the view was taken
-  std::vector<HomingView> views;
+  std::vector<HomingView> views;   ///< of the pictures as the robot, turned, sees them
 };
 
 /// Hears on the caller's thread of the work that goes on: its name, how many of its steps were done
@@ -35,11 +36,11 @@ using WorkProgress =
 
 /// What is asked of two recordings.
 struct CatchmentSettings {
-  FourierHomingOptions homing;
+  FourierHomingOptions homing;  ///< of all home vectors
   /// Highest frequency of each stage of a run, which goes on with the next where one stops [S06
   /// section 5]; empty: one stage, as `homing` says. Averages are always those of `homing`.
   std::vector<int> stages;
-  HomingSurveyOptions run;
+  HomingSurveyOptions run;              ///< steps and obstacles; what was not given is learnt
   bool typical_distance_given = false;  ///< else learnt from the pairs
   bool longest_step_given = false;      ///< else twice the spacing, as [S06 section 4.4]
   bool obstacle_given = false;          ///< else 0.8 of the spacing
@@ -49,7 +50,7 @@ struct CatchmentSettings {
 
 /// Pairs of a range of distances.
 struct CatchmentBin {
-  HomewardBin homeward;
+  HomewardBin homeward;  ///< pairs of these distances and their mean cosine
   /// Circular standard deviation of the error of the heading; NaN without pairs.
   double orientation_error_rad = 0.0;
 };
@@ -58,15 +59,18 @@ struct CatchmentBin {
 struct CatchmentResult {
   double spacing_m = 0.0;           ///< of the places
   double typical_distance_m = 0.0;  ///< metres that a home vector of length 1 is worth
-  HomingSurveyOptions run;
-  HomingSurvey survey;
-  std::size_t pairs = 0;  ///< at different places, up to the distance asked for
+  HomingSurveyOptions run;          ///< as the runs were made, with what was learnt
+  HomingSurvey survey;              ///< of `homing` alone, without stages
+  std::size_t pairs = 0;            ///< at different places, up to the distance asked for
+  /// Mean cosine between home vector and true direction over these pairs [S06 eq. 48]; NaN without
+  /// pairs.
   double component = 0.0;
+  /// Circular standard deviation of the error of the heading over these pairs.
   double orientation_error_rad = 0.0;
   std::vector<CatchmentBin> bins;  ///< of all distances
   std::vector<float> final_m;      ///< where runs end: goal after goal, one per place
-  std::vector<double> accepted_m;
-  std::vector<double> areas;  ///< mean number of places from which runs end so near
+  std::vector<double> accepted_m;  ///< distances of `areas`: 0 to 5 spacings
+  std::vector<double> areas;       ///< mean number of places from which runs end so near
 };
 
 /// All pairs: views of `goals` as homes, views of `places` as current ones, which the recording

@@ -17,8 +17,8 @@ namespace panonav {
 
 /// How observations become views to home with where no memory says it.
 struct HomingViewOptions {
-  SignatureOptions signature;
-  PreprocessingOptions preprocessing;
+  SignatureOptions signature;          ///< size of the cylinders, and components
+  PreprocessingOptions preprocessing;  ///< steps before the transform
   /// One row, the mean of the rows within 5 degrees of the horizon (all rows where elevations are
   /// not known), as [S06] has it; else all rows.
   bool horizon = false;
@@ -37,7 +37,10 @@ class HomingEncoder {
   /// Throws ContractError (FileError where the observation has a file) on a picture that is too
   /// small for the components wanted or that the masks cover; else as `ViewEncoder::panorama`.
   [[nodiscard]] Panorama panorama(const Observation& observation) const;
+  /// What homing compares of a panorama that `panorama` made.
   [[nodiscard]] HomingView view(const Panorama& panorama) const;
+  /// The same of a signature that is at hand: all of its rows or the horizon alone, as the encoder
+  /// was made.
   [[nodiscard]] HomingView view(const FourierSignature& signature) const;
 
  private:
@@ -99,8 +102,11 @@ class HomingGuide {
   /// rows than the goal.
   [[nodiscard]] WayHome home(const Observation& observation) const;
 
+  /// What makes views of observations.
   [[nodiscard]] const HomingEncoder& encoder() const noexcept { return encoder_; }
+  /// What messages call the goal: the name of its view or observation.
   [[nodiscard]] const std::string& goal_name() const noexcept { return goal_name_; }
+  /// The goal's view, with which observations are compared.
   [[nodiscard]] const HomingView& goal() const noexcept { return goal_; }
 
  private:

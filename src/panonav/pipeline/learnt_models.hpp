@@ -13,8 +13,8 @@ namespace panonav {
 /// What localisation and tracking learn of a memory before they answer, with the default options of
 /// learning and over all components.
 struct LearntModels {
-  PlaceModel place;
-  PositionModel position;
+  PlaceModel place;        ///< for whether a place is known
+  PositionModel position;  ///< for positions between references
   double spacing_m = 0.0;  ///< of references with headings (`NeighbourSupport`)
   /// Empty for a memory with too few views with a position, or all of them in one place.
   std::optional<ObservationModel> observation;

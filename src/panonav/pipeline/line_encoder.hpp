@@ -15,7 +15,7 @@ namespace panonav {
 /// What a route says of its lines beyond their bytes: how pictures became lines, and where the
 /// poses came from. Kept in the memory beside it.
 struct RouteSource {
-  HorizonScanlineOptions line;
+  HorizonScanlineOptions line;  ///< columns and band of the lines
   /// First and last row that show the horizon, counted from 0 at the top; for panoramas whose
   /// elevations are not known.
   std::optional<std::pair<int, int>> horizon_rows;
@@ -27,6 +27,7 @@ struct RouteSource {
 /// `remember_route_source` wrote.
 [[nodiscard]] RouteSource route_source(const MemoryFile& memory, const std::string& name,
                                        int columns);
+/// Keeps it in the memory, under the route's name. Throws FileError.
 void remember_route_source(MemoryFile& memory, const std::string& name, const RouteSource& source);
 
 /// From observations to horizon scanlines, as a route has them. Several threads may use one.

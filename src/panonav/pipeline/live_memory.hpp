@@ -12,6 +12,7 @@
 
 namespace panonav {
 
+/// How a live memory answers and learns.
 struct LiveMemoryOptions {
   /// Add the views of places that the memory does not know, and keep those of known ones true
   /// (`MemoryLearner`) where the memory has positions and headings and the observations odometry;
@@ -26,7 +27,7 @@ struct LiveMemoryOptions {
   /// stand back for them.
   bool in_step = false;
   MemoriserOptions memoriser;  ///< of views that are added; its source serves for both
-  LocaliserOptions localiser;
+  LocaliserOptions localiser;  ///< of the answers
 };
 
 /// Memorises and localises in one go, for robots that come to new places:
@@ -41,9 +42,11 @@ class LiveMemory {
   /// be learnt.
   explicit LiveMemory(std::filesystem::path memory, const LiveMemoryOptions& options = {});
   ~LiveMemory();
+  /// What is left of the other may only be destroyed or assigned to.
   LiveMemory(LiveMemory&&) noexcept;
   LiveMemory& operator=(LiveMemory&&) noexcept;
 
+  /// What an observation tells.
   struct Answer {
     /// Empty as long as there is no memory to ask: a new one begins with
     /// `Memoriser::scale_views` views.
@@ -59,7 +62,7 @@ class LiveMemory {
   /// soon after: while `max_waiting` views wait for a slow disk, no observation is new. Throws as
   /// `Memoriser::add`, also about views of earlier calls.
   void learn(Observation observation);
-  static constexpr std::size_t max_waiting = 8;
+  static constexpr std::size_t max_waiting = 8;  ///< Views that wait for the disk at most.
   /// Of the observation that was answered last, until it is learnt; empty as long as there is no
   /// memory to ask.
   [[nodiscard]] const std::optional<Panorama>& panorama() const noexcept;
@@ -68,6 +71,7 @@ class LiveMemory {
   [[nodiscard]] const PlaceRecogniser* recogniser() const noexcept;
   /// Views that can be found now, and those that were added.
   [[nodiscard]] std::size_t views() const noexcept;
+  /// Views that were added since the start, those that wait included.
   [[nodiscard]] std::size_t learnt() const noexcept;
   /// Writes what still waits, changes what the run has shown to have changed, and keeps what is
   /// learnt in the file. Nothing where nothing was added and no place was certain. `what`: the run,

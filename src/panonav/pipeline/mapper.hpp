@@ -21,16 +21,16 @@ inline constexpr const char* map_name = "map";
 
 /// How a map is made of observations.
 struct MapperOptions {
-  MappingOptions mapping;
-  VisualOdometryOptions odometry;
-  LoopClosureOptions closure;
-  PoseGraphOptions graph;
-  bool thumbnails = true;  ///< keep small pictures of the views
+  MappingOptions mapping;          ///< what becomes a node, and how nodes are joined
+  VisualOdometryOptions odometry;  ///< how steps are read from views
+  LoopClosureOptions closure;      ///< which loop closures are believed
+  PoseGraphOptions graph;          ///< how the whole is optimised
+  bool thumbnails = true;          ///< keep small pictures of the views
 };
 
 /// What a `Mapper` made of its observations.
 struct MappedRun {
-  TopologicalMap map;
+  TopologicalMap map;                     ///< all nodes and edges
   std::vector<std::size_t> observations;  ///< by node: its number, counted from 0
   std::size_t skipped = 0;                ///< observations that differed too little from a node
   double scale_m = 0.0;                   ///< metres for each unit of length of the views
@@ -47,10 +47,10 @@ class Mapper {
  public:
   /// An observation on its way into the map.
   struct EncodedView {
-    FourierSignature signature;
-    ReferenceInfo info;
-    std::optional<Pose2> odometry;
-    std::vector<std::uint8_t> thumbnail;
+    FourierSignature signature;           ///< not packed, for the odometry
+    ReferenceInfo info;                   ///< name, pose and stamp, as the memory keeps them
+    std::optional<Pose2> odometry;        ///< absolute, in its own frame; empty: unknown
+    std::vector<std::uint8_t> thumbnail;  ///< a PNG; empty where none is kept
   };
 
   /// The memory's own camera takes the pictures. Throws FileError as `MemoryFile::open`,
@@ -68,6 +68,7 @@ class Mapper {
   [[nodiscard]] EncodedView encode(const Observation& observation) const;
   /// The next observation; whether it became a node. Throws as `encode`, FileError.
   bool add(EncodedView seen);
+  /// The same of an observation that is encoded here.
   bool add(const Observation& observation) { return add(encode(observation)); }
 
   /// All of a recording, then `finish`. Calls `mapped` after each picture. Throws as `add`, and
@@ -82,7 +83,9 @@ class Mapper {
 
   /// As far as it is made, for people to look at: `finish` still moves nodes. Cost: a copy.
   [[nodiscard]] TopologicalMap map_so_far() const { return mapper_.map(); }
+  /// The file that views are appended to.
   [[nodiscard]] const MemoryFile& memory() const noexcept { return file_; }
+  /// What makes views of pictures.
   [[nodiscard]] const ViewEncoder& encoder() const noexcept { return encoder_; }
 
  private:

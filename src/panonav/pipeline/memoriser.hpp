@@ -14,6 +14,7 @@
 
 namespace panonav {
 
+/// How observations are memorised, and what a new file is like.
 struct MemoriserOptions {
   /// How pictures lie. Empty: as those of the file; a new file needs it.
   std::optional<PictureSource> source;
@@ -69,18 +70,20 @@ class Memoriser {
   /// refused are stored.
   void add(std::vector<Observation> observations, Executor& executor);
 
+  /// What became of the observations.
   struct Counts {
-    std::size_t appended = 0;
+    std::size_t appended = 0;      ///< views that the file got
     std::size_t known_before = 0;  ///< observations whose views were there
   };
   /// Writes what still waits for a new file's full scale, and keeps in the file what is learnt of
   /// its views (`keep_models`). More may be added afterwards. Throws FileError; ContractError when
   /// nothing was ever added.
   Counts finish();
-  Counts finish(Executor& executor);
+  Counts finish(Executor& executor);  ///< The same on all threads.
 
   /// Null as long as a new file waits for its full scale, as `encoder()`.
   [[nodiscard]] MemoryFile* file() noexcept { return file_ ? &*file_ : nullptr; }
+  /// What makes views of pictures; null as `file()`.
   [[nodiscard]] const ViewEncoder* encoder() const noexcept {
     return encoder_ ? &*encoder_ : nullptr;
   }

@@ -18,8 +18,8 @@ struct MemoryExport {
   /// Whether poses, headings and stamps are in the data set. A data set has them for all of its
   /// pictures or for none; where some views have none they are in views.csv alone.
   bool positions = false;
-  bool headings = false;
-  bool stamps = false;
+  bool headings = false;  ///< see `positions`; not without them
+  bool stamps = false;    ///< see `positions`
   bool enlarged = false;  ///< thumbnails are smaller than the panoramas that the memory compares
 };
 

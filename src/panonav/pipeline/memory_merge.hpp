@@ -10,9 +10,10 @@
 
 namespace panonav {
 
+/// When two memories are joined, and how their maps give way.
 struct MemoryMergeOptions {
-  SessionAlignmentOptions alignment;
-  PoseGraphOptions graph;
+  SessionAlignmentOptions alignment;  ///< when places are taken to be in common
+  PoseGraphOptions graph;             ///< how the joined map is optimised
 };
 
 /// What `merge_memories` made.

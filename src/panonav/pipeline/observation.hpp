@@ -22,8 +22,10 @@ namespace panonav {
 /// at a time.
 struct Observation {
   // NOLINTNEXTLINE(google-explicit-constructor): a picture alone is an observation
+  /// A picture as the camera delivered it, and nothing else known.
   Observation(Image seen) : picture(std::move(seen)) {}
   // NOLINTNEXTLINE(google-explicit-constructor)
+  /// A panoramic cylinder, and nothing else known.
   Observation(Panorama seen) : picture(std::move(seen)) {}
 
   /// As the camera delivered it, or a panoramic cylinder already.
@@ -33,7 +35,7 @@ struct Observation {
   std::string name;  ///< of the view that a memory keeps; messages name it
   /// Where the picture was read from; then errors about it are FileErrors that name the file.
   std::filesystem::path file;
-  std::optional<double> stamp_s;
+  std::optional<double> stamp_s;  ///< when it was taken, seconds; ascending where times count
   /// Absolute, in the frame of the odometry, which drifts against the world.
   std::optional<Pose2> odometry;
   /// In the world frame, where a survey or a simulation knows it. Memories keep it; no estimate of

@@ -68,8 +68,9 @@ class ObservationSource {
 /// held.
 class DatasetObservations final : public ObservationSource {
  public:
-  static constexpr std::size_t decoded_ahead = 16;
+  static constexpr std::size_t decoded_ahead = 16;  ///< pictures held at most
 
+  /// All entries of a data set, in its order.
   DatasetObservations(Dataset dataset, Executor& executor);
 
   [[nodiscard]] const PictureSource& pictures() const noexcept override { return dataset_.source; }
@@ -93,16 +94,19 @@ class DatasetObservations final : public ObservationSource {
 /// ("2026-11-23T05:06:07.123456Z").
 class LiveObservations final : public ObservationSource {
  public:
+  /// Opens the source. Throws as `LivePictures`.
   LiveObservations(const std::string& address, PictureSource pictures,
                    const LiveOptions& options = {})
       : pictures_(std::move(pictures)), live_(address, options) {}
 
   [[nodiscard]] const PictureSource& pictures() const noexcept override { return pictures_; }
   [[nodiscard]] std::optional<Observation> next() override;
+  /// The source itself, to stop it and for its counts.
   [[nodiscard]] LivePictures& live() noexcept { return live_; }
+  /// When a picture came, and what it cost.
   struct Timing {
-    std::chrono::steady_clock::time_point arrived{};
-    std::chrono::steady_clock::duration decoding{};
+    std::chrono::steady_clock::time_point arrived{};  ///< by the clock that is never set
+    std::chrono::steady_clock::duration decoding{};   ///< how long decoding took, where we do it
   };
   /// Of the last picture of `next`.
   [[nodiscard]] const Timing& timing() const noexcept { return timing_; }

@@ -17,8 +17,8 @@ namespace panonav {
 
 /// A view of the memory that a picture resembles.
 struct PlaceMatch {
-  std::string name;  ///< of the view
-  ViewId view;
+  std::string name;                 ///< of the view
+  ViewId view;                      ///< its id in the memory
   std::uint32_t dissimilarity = 0;  ///< integer L1 over packed magnitudes
   double column_difference = 0.0;   ///< after turning (`ColumnMatch`)
   /// Local features that agree with one turn and one direction of motion; empty where they do not
@@ -28,19 +28,21 @@ struct PlaceMatch {
   std::optional<double> heading_rad;
 };
 
+/// Where the robot is, in the frame of the memory's positions.
 struct PlacePosition {
-  double x_m = 0.0;
-  double y_m = 0.0;
+  double x_m = 0.0;  ///< along the frame's x axis
+  double y_m = 0.0;  ///< along its y axis
   /// The true position lies within it in 95 % of the cases; empty when nothing could be learnt.
   std::optional<double> radius_m;
 };
 
 /// What one picture tells of where it was taken; see `Localisation` for what each means.
 struct Place {
-  double known_probability = 0.0;   ///< that the place is one of the memory's
-  bool known = false;               ///< at least 0.5 probable
-  std::vector<PlaceMatch> matches;  ///< the best first; listed for unknown places, too
-  std::optional<PlacePosition> position;
+  double known_probability = 0.0;         ///< that the place is one of the memory's
+  bool known = false;                     ///< at least 0.5 probable
+  std::vector<PlaceMatch> matches;        ///< the best first; listed for unknown places, too
+  std::optional<PlacePosition> position;  ///< between references; empty for an unknown place
+  /// Of the robot, in the same frame; empty for an unknown place.
   std::optional<double> heading_rad;
   int components = 0;            ///< compared
   std::uint64_t bytes_read = 0;  ///< by the search
@@ -48,8 +50,9 @@ struct Place {
   std::vector<LocalisationLevel> areas;
 };
 
+/// What a recogniser compares and tells.
 struct PlaceRecogniserOptions {
-  LocaliserOptions localiser;
+  LocaliserOptions localiser;  ///< how many views are compared and listed
   /// How pictures lie; empty: as those that the memory was made from.
   std::optional<PictureSource> source;
   /// Also tell the area where the robot may be, component by component.
@@ -70,8 +73,10 @@ class PlaceRecogniser {
   /// that do not fit it.
   explicit PlaceRecogniser(const std::filesystem::path& memory,
                            const PlaceRecogniserOptions& options = {});
+  /// The same of a file that is open.
   explicit PlaceRecogniser(const MemoryFile& file, const PlaceRecogniserOptions& options = {});
   ~PlaceRecogniser();
+  /// What is left of the other may only be destroyed or assigned to.
   PlaceRecogniser(PlaceRecogniser&&) noexcept;
   PlaceRecogniser& operator=(PlaceRecogniser&&) noexcept;
 
@@ -85,8 +90,9 @@ class PlaceRecogniser {
   /// ContractError as `VisualMemory::append`.
   void append(const ReferenceInfo& info, const PackedSignature& signature);
 
-  [[nodiscard]] const VisualMemory& memory() const noexcept;
-  [[nodiscard]] const ViewEncoder& encoder() const noexcept;
+  [[nodiscard]] const VisualMemory& memory() const noexcept;  ///< The views that are held.
+  [[nodiscard]] const ViewEncoder& encoder() const noexcept;  ///< What makes queries of pictures.
+  /// What compares views; `localise` gives its answers by name.
   [[nodiscard]] const Localiser& localiser() const noexcept;
 
  private:

@@ -10,12 +10,12 @@ namespace panonav {
 
 /// What a conversion took along of its pictures.
 struct RecordingConversion {
-  std::size_t pictures = 0;
-  bool stamps = false;  ///< false: a recording got one second from picture to picture
-  bool odometry = false;
-  bool positions = false;
-  bool headings = false;
-  bool tilts = false;
+  std::size_t pictures = 0;  ///< that were written
+  bool stamps = false;       ///< false: a recording got one second from picture to picture
+  bool odometry = false;     ///< every picture has it, as for those below
+  bool positions = false;    ///< of the ground truth
+  bool headings = false;     ///< of the ground truth; true only with `positions`
+  bool tilts = false;        ///< of an inertial sensor
 };
 
 /// Writes the data set, or what another recording or a video became, as an MCAP file of ROS 2

@@ -27,16 +27,18 @@ enum class GraphOrigin {
 };
 /// "map", "lattice", "links", "arrangement".
 [[nodiscard]] std::string_view name_of(GraphOrigin origin);
+/// The origin of that name; empty where there is none.
 [[nodiscard]] std::optional<GraphOrigin> graph_origin(std::string_view name);
 
+/// How a robot is sent to a goal.
 struct RobotNavigatorOptions {
-  NavigatorOptions navigator;
-  PlannerOptions planner;
+  NavigatorOptions navigator;        ///< how it decides
+  PlannerOptions planner;            ///< how it plans
   BaseOptions base;                  ///< what velocity commands are made for
   std::optional<GraphOrigin> edges;  ///< empty: the first that the memory has
   /// A recorded route of the memory to go along where the way leads along it.
   std::optional<std::string> route;
-  KnownRouteOptions known_route;
+  KnownRouteOptions known_route;  ///< how the route is followed
 };
 
 /// What a robot is to do after an observation.
@@ -71,16 +73,20 @@ class RobotNavigator {
   /// `Navigator::observe`.
   [[nodiscard]] NavigationStep step(const Observation& observation, RobotReport report = {});
 
+  /// What the edges were taken from.
   [[nodiscard]] GraphOrigin origin() const noexcept { return origin_; }
-  [[nodiscard]] ViewId goal() const noexcept { return goal_; }
+  [[nodiscard]] ViewId goal() const noexcept { return goal_; }  ///< The goal's id in the memory.
+  /// The views and the edges between them.
   [[nodiscard]] const NavigationGraph& graph() const noexcept { return planner().graph(); }
   /// Knows the way, and which edges are blocked.
   [[nodiscard]] const AreaPlanner& planner() const noexcept { return navigator_->planner(); }
+  /// The file that views are read from.
   [[nodiscard]] const MemoryFile& memory() const noexcept { return views_.file(); }
   /// What the memory knows of a view besides its signature; read from the file.
   [[nodiscard]] ReferenceInfo info(ViewId view) const;
   /// For programs that observe and drive themselves.
   [[nodiscard]] Navigator& navigator() noexcept { return *navigator_; }
+  /// What makes queries of pictures.
   [[nodiscard]] const ViewEncoder& encoder() const noexcept { return encoder_; }
   /// How lines are taken along its route; null without one.
   [[nodiscard]] const RouteSource* route() const noexcept {

@@ -10,27 +10,29 @@
 
 namespace panonav {
 
+/// How a route is repeated.
 struct RouteDriverOptions {
-  RouteFollowerOptions follower;
-  PathFollowerOptions path;
-  BaseOptions base;
+  RouteFollowerOptions follower;  ///< how the robot is found on it
+  PathFollowerOptions path;       ///< how closely its path is kept
+  BaseOptions base;               ///< what velocities are made for
   /// Where along the route the robot was when somebody else drove it last: of several places that a
   /// route passes it goes on at the one next to it. Empty: at the first.
   std::optional<double> resume_m;
 };
 
+/// How far a repeated route has come.
 enum class RouteDriveState {
   searching,  ///< the robot stands: no line has told yet where it is
-  driving,
-  arrived,  ///< at the end of the route
-  lost,     ///< not found on the route, or not for so long that odometry alone is no guide
+  driving,    ///< the robot is on its way to the end of the route
+  arrived,    ///< at the end of the route
+  lost,       ///< not found on the route, or not for so long that odometry alone is no guide
 };
 /// "searching", "driving", "arrived", "lost".
 [[nodiscard]] std::string_view name_of(RouteDriveState state);
 
 /// What a robot is to do after an observation, and where it is beside the route.
 struct RouteDriveStep {
-  RouteDriveState state = RouteDriveState::searching;
+  RouteDriveState state = RouteDriveState::searching;  ///< after this observation
   Velocity velocity;                   ///< for the next period of the base; 0 unless driving
   std::optional<TrackedRouteFix> fix;  ///< empty: odometry carries the robot on
   double along_m = 0.0;                ///< way along the route
@@ -58,6 +60,7 @@ class RouteDriver {
   [[nodiscard]] RouteDriveStep step(const Observation& observation,
                                     const std::optional<Pose2>& other_estimate = std::nullopt);
 
+  /// What finds the robot beside the route.
   [[nodiscard]] const RouteFollower& follower() const noexcept { return follower_; }
 
  private:

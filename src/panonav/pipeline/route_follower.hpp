@@ -13,11 +13,12 @@
 
 namespace panonav {
 
+/// Which route is followed, and how the robot is found on it.
 struct RouteFollowerOptions {
   std::optional<std::string> name;  ///< of the route; empty: the only one that there is
-  RouteTrackerOptions tracker;
-  RouteFitOptions fit;
-  bool use_odometry = true;  ///< where observations have it; else each one alone
+  RouteTrackerOptions tracker;      ///< where it is looked for, and when a fit is believed
+  RouteFitOptions fit;              ///< how lines are fitted
+  bool use_odometry = true;         ///< where observations have it; else each one alone
 };
 
 /// Where the robot is beside the route.
@@ -45,13 +46,19 @@ class RouteFollower {
   [[nodiscard]] std::vector<float> encode(const Observation& observation) const {
     return encoder_.line(observation);
   }
+  /// The next line, as `encode` gave it, with the odometry of its observation where it had one.
   [[nodiscard]] RouteStep step(std::vector<float> line, const std::optional<Pose2>& odometry);
+  /// The next observation. Throws as `encode`.
   [[nodiscard]] RouteStep step(const Observation& observation) {
     return step(encode(observation), observation.odometry);
   }
 
-  [[nodiscard]] const std::string& name() const noexcept { return name_; }
+  [[nodiscard]] const std::string& name() const noexcept {
+    return name_;
+  }  ///< What the memory calls the route.
+  /// How its lines were taken, and where its poses came from.
   [[nodiscard]] const RouteSource& source() const noexcept { return source_; }
+  /// What follows the robot, with what it knows of it now.
   [[nodiscard]] const RouteTracker& tracker() const noexcept { return tracker_; }
 
  private:

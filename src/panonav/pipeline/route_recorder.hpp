@@ -18,6 +18,7 @@
 
 namespace panonav {
 
+/// Which route is recorded, and how.
 struct RouteRecorderOptions {
   std::string name = "route";  ///< of the route; it grows if it is there
   double every_m = 0.1;        ///< way between lines, >= 0
@@ -31,9 +32,10 @@ struct RouteRecorderOptions {
 
 /// What a memory file has of a route, and what a recorder added to it.
 struct RecordedRoute {
-  RoutePanorama route;
+  RoutePanorama route;       ///< all of its lines, those of earlier drives included
   std::size_t appended = 0;  ///< lines
   std::uint64_t bytes = 0;   ///< of the route's lines and poses as they are kept
+  /// Bytes for each kilometre of the route; 0 for a route without length.
   [[nodiscard]] double bytes_per_km() const;
 };
 
@@ -44,8 +46,8 @@ class RouteRecorder {
  public:
   /// A line on its way into the route.
   struct EncodedLine {
-    Pose2 pose;
-    std::vector<float> line;
+    Pose2 pose;               ///< in the route's frame
+    std::vector<float> line;  ///< as `horizon_scanline` gives it
   };
 
   /// The memory's own camera takes the pictures. Throws as the other.
@@ -78,7 +80,9 @@ class RouteRecorder {
   /// What was added is on the disk. Throws FileError; ContractError when nothing ever was added.
   RecordedRoute finish();
 
+  /// The file that the route is in.
   [[nodiscard]] const MemoryFile& memory() const noexcept { return file_; }
+  /// How its lines are taken, and where its poses come from.
   [[nodiscard]] const RouteSource& source() const noexcept { return source_; }
 
  private:

@@ -17,17 +17,21 @@ namespace panonav {
 [[nodiscard]] ros::PoseWithCovarianceStamped pose_message(const RunMoment& moment,
                                                           std::int64_t stamp_ns,
                                                           const std::string& frame);
+/// Several poses, each level, such as particles or directions.
 [[nodiscard]] ros::PoseArray poses_message(const std::vector<Pose2>& poses, std::int64_t stamp_ns,
                                            const std::string& frame);
+/// The state of the moment, its level 0 where it is sure and 1 otherwise, with all its values.
 [[nodiscard]] ros::DiagnosticArray diagnostics_message(const RunMoment& moment,
                                                        std::int64_t stamp_ns);
 
 /// x, y, z and one more value of each point, as float32. A message of it is there as long as this
 /// is and nothing is added.
 struct PointValues {
-  std::vector<float> values;
+  std::vector<float> values;  ///< four for each point
 
+  /// Appends a point at z = 0 with its fourth value.
   void add(const Point2& point, double value);
+  /// A cloud of the fields x, y, z and `fourth`.
   [[nodiscard]] ros::PointCloud2 message(std::int64_t stamp_ns, const std::string& frame,
                                          const std::string& fourth) const;
 };

@@ -10,9 +10,10 @@
 
 namespace panonav {
 
+/// How a robot is followed.
 struct TrackerOptions {
-  MonteCarloOptions filter;
-  OdometryNoise odometry;
+  MonteCarloOptions filter;  ///< how particles are drawn and weighed
+  OdometryNoise odometry;    ///< errors of the robot's wheels
   /// How pictures lie; empty: as those that the memory was made from.
   std::optional<PictureSource> source;
 };
@@ -30,13 +31,16 @@ class Tracker {
   /// The robot starts anywhere in the memorised area. Throws FileError on a file that is missing or
   /// damaged, or whose views do not know enough positions to learn from; OptionError.
   explicit Tracker(const std::filesystem::path& memory, const TrackerOptions& options = {});
+  /// The same of a file that is open.
   explicit Tracker(const MemoryFile& file, const TrackerOptions& options = {});
   ~Tracker();
+  /// What is left of the other may only be destroyed or assigned to.
   Tracker(Tracker&&) noexcept;
   Tracker& operator=(Tracker&&) noexcept;
 
   /// As `MonteCarloLocaliser`: forgets what is known of the robot.
   void start_anywhere(std::optional<double> heading_rad = std::nullopt);
+  /// Around a known pose, in the frame of the memory's positions.
   void start_at(const Pose2& pose, double deviation_m, double heading_deviation_rad);
 
   /// Moves by the odometry, where the observation has one, and takes the picture into account.
@@ -48,8 +52,9 @@ class Tracker {
   /// the one before; the first says nothing yet.
   void move_to(const Pose2& odometry);
 
-  [[nodiscard]] const VisualMemory& memory() const noexcept;
-  [[nodiscard]] const ViewEncoder& encoder() const noexcept;
+  [[nodiscard]] const VisualMemory& memory() const noexcept;  ///< The views that are held.
+  [[nodiscard]] const ViewEncoder& encoder() const noexcept;  ///< What makes queries of pictures.
+  /// The filter, with its particles and its observation model.
   [[nodiscard]] const MonteCarloLocaliser& localiser() const noexcept;
 
  private:

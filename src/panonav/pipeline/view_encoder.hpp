@@ -21,9 +21,9 @@ namespace panonav {
 /// The cylinders' size that a user wants; 0: 80 x 512 [M04 section 2.1] for mirror and 360 degree
 /// pictures, the picture's own for ready-made panoramas.
 struct SignatureOptions {
-  int rows = 0;
-  int columns = 0;
-  int components = 15;
+  int rows = 0;         ///< 0, or >= 1
+  int columns = 0;      ///< 0, or >= 4
+  int components = 15;  ///< 1 .. half the columns
 };
 void visit_options(SignatureOptions& options, OptionVisitor& visitor);
 
@@ -35,15 +35,18 @@ class ViewEncoder {
   /// ContractError when the elevations of the pictures are not the memory's.
   ViewEncoder(const MemoryHeader& header, const PictureSource& source);
   ~ViewEncoder();
+  /// What is left of the other may only be destroyed or assigned to.
   ViewEncoder(ViewEncoder&&) noexcept;
   ViewEncoder& operator=(ViewEncoder&&) noexcept;
 
+  /// As it was given: what all views of the memory have in common.
   [[nodiscard]] const MemoryHeader& header() const noexcept { return header_; }
 
   /// The panoramic cylinder. Throws ContractError (FileError where the observation has a file) on a
   /// picture of another size or band than the memory's, and on a tilt (`Observation::tilt`) that
   /// cannot be compensated.
   [[nodiscard]] Panorama panorama(const Observation& observation) const;
+  /// The same of a picture alone.
   [[nodiscard]] Panorama panorama(ImageView picture, const Tilt& tilt = {}) const;
   /// Throws FileError on a picture that is missing, damaged or of another size than the memory's.
   [[nodiscard]] Panorama read(const DatasetEntry& entry) const;
@@ -52,10 +55,15 @@ class ViewEncoder {
   /// because it is needed for something else: the same bits. Mirror pictures of a level robot go
   /// through the fused `SignatureExtractor` without a panorama. Throws as `panorama`.
   [[nodiscard]] FourierSignature signature(const Observation& observation) const;
+  /// Of a picture as the camera delivers it, of a level robot.
   [[nodiscard]] FourierSignature signature(ImageView picture) const;
+  /// Of a panorama of the memory's shape.
   [[nodiscard]] FourierSignature signature(const Panorama& panorama) const;
+  /// The signature with the memory's full scale.
   [[nodiscard]] PackedSignature packed(const Observation& observation) const;
+  /// The same of a picture of a level robot.
   [[nodiscard]] PackedSignature packed(ImageView picture) const;
+  /// The same of a panorama of the memory's shape.
   [[nodiscard]] PackedSignature packed(const Panorama& panorama) const;
 
   /// Of a panorama of the memory's shape; empty where elevations are unknown.

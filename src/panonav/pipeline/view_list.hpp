@@ -12,9 +12,9 @@ namespace panonav {
 
 /// What a memory file knows of a view besides its signature.
 struct ViewRecord {
-  ViewId view;
-  ReferenceInfo info;
-  std::size_t links = 0;
+  ViewId view;             ///< its id in the file
+  ReferenceInfo info;      ///< name, pose and stamp
+  std::size_t links = 0;   ///< to other views of the file
   bool thumbnail = false;  ///< a picture is stored with it
   /// The connected component of the file's map (that called `map`, else its first) that it belongs
   /// to; empty without a map, and for views that are not in it.

@@ -10,7 +10,7 @@ struct HomeVector {
   /// Towards home in the frame of the robot that took the current view, in units of the distance R
   /// at which all things are assumed to be.
   double xi = 0.0;
-  double eta = 0.0;
+  double eta = 0.0;  ///< the same to the left
   /// Heading of the home view minus heading of the current view, in [-pi, pi).
   double heading_rad = 0.0;
   /// Similarity of the views: their correlation at the heading that the compass found, -1 .. 1 [S06
@@ -59,9 +59,9 @@ struct FourierHomingOptions {
   /// The first iteration compares a few frequencies and each further one more, up to K [S06
   /// footnote 6].
   bool rising = false;
-  TurnEstimate turn = TurnEstimate::global;
-  HomingGradient gradient = HomingGradient::both;
-  HomingWeights weights = HomingWeights::coherence;
+  TurnEstimate turn = TurnEstimate::global;          ///< how the first heading is found
+  HomingGradient gradient = HomingGradient::both;    ///< where the slope of the image is taken
+  HomingWeights weights = HomingWeights::coherence;  ///< which components and rows count more
   /// Headings from which the displacement is solved; the one that explains the views best is taken
   /// [S06 footnote 10].
   int starting_estimates = 2;

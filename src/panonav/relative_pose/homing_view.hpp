@@ -22,18 +22,23 @@ class HomingView {
   HomingView(int rows, int components, std::vector<float> cosines, std::vector<float> sines,
              std::optional<ElevationBand> elevations = std::nullopt);
 
+  /// Rows of the view, from the highest elevation to the lowest.
   [[nodiscard]] int rows() const noexcept { return rows_; }
+  /// Frequencies k = 0 .. components - 1.
   [[nodiscard]] int components() const noexcept { return components_; }
   /// Empty: unknown, every row counts as on the horizon.
   [[nodiscard]] const std::optional<ElevationBand>& elevations() const noexcept {
     return elevations_;
   }
+  /// The cosine coefficient a_k of a row. The caller guarantees that row and k are in the view.
   [[nodiscard]] float a(int row, int k) const noexcept { return cosines_[index(row, k)]; }
+  /// The sine coefficient b_k of a row. The caller guarantees that row and k are in the view.
   [[nodiscard]] float b(int row, int k) const noexcept { return sines_[index(row, k)]; }
   /// a_k and b_k of all rows, `rows()` numbers each.
   [[nodiscard]] std::span<const float> cosines(int k) const noexcept {
     return std::span(cosines_).subspan(index(0, k), static_cast<std::size_t>(rows_));
   }
+  /// The same of b_k.
   [[nodiscard]] std::span<const float> sines(int k) const noexcept {
     return std::span(sines_).subspan(index(0, k), static_cast<std::size_t>(rows_));
   }

@@ -16,8 +16,9 @@ class ReferenceViews {
  public:
   /// Adds all views of a memory. Throws ContractError unless its ids are above those held.
   void add(const VisualMemory& loaded);
-  void clear() noexcept;
+  void clear() noexcept;  ///< Forgets all views; ids may then begin anew.
 
+  /// Number of views held.
   [[nodiscard]] std::size_t size() const noexcept { return ids_.size(); }
   /// Null when the view is not held. Valid until the next `add` or `clear`.
   [[nodiscard]] const HomingView* find(ViewId view) const noexcept;

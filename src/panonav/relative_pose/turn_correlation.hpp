@@ -9,19 +9,22 @@ namespace panonav {
 /// C(sigma) = sum_{k=1..K} Re(real[k] + j imaginary[k]) exp(-j k sigma): the correlation of two
 /// views against the turn between them, all rows summed [S06 eq. 33]. Entry 0 is not used.
 struct TurnCorrelation {
-  static constexpr int max_frequencies = 62;
-  int highest = 0;  ///< K, 1 .. max_frequencies
-  std::array<float, max_frequencies + 1> real{};
+  static constexpr int max_frequencies = 62;      ///< the most that are held without an allocation
+  int highest = 0;                                ///< K, 1 .. max_frequencies
+  std::array<float, max_frequencies + 1> real{};  ///< of each frequency, summed over the rows
+  /// Of each frequency, summed over the rows.
   std::array<float, max_frequencies + 1> imaginary{};
 
+  /// C at one turn. Cost: a sine, a cosine and a few multiplications a frequency.
   [[nodiscard]] float at(float turn_rad) const noexcept;
 };
 
 /// The headings that are considered: within `half_width_rad` of `middle_rad`; all by default.
 struct TurnWindow {
-  float middle_rad = 0.0F;
-  float half_width_rad = 4.0F;
+  float middle_rad = 0.0F;      ///< heading that is most expected
+  float half_width_rad = 4.0F;  ///< more than pi: all turns
 
+  /// Whether a turn lies in the window, by the shorter way round.
   [[nodiscard]] bool contains(float turn_rad) const noexcept {
     return std::abs(std::remainder(turn_rad - middle_rad, 6.2831853F)) <= half_width_rad;
   }

@@ -30,7 +30,7 @@ struct PhaseReading {
 /// A turn that is known coarsely from another source.
 struct TurnHint {
   double turn_rad = 0.0;    ///< heading of b minus heading of a
-  double within_rad = 0.5;  ///< > 0 and <= pi
+  double within_rad = 0.5;  ///< above 0, at most pi
 };
 
 /// Reads both ways, from a to b and back. Empty when either view has no structure. Throws

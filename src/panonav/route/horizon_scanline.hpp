@@ -7,6 +7,7 @@
 
 namespace panonav {
 
+/// How a scanline is cut out of a panorama.
 struct HorizonScanlineOptions {
   int columns = 360;  ///< of the line: a byte a degree, as [Y03 section 2.2]
   /// Rows whose middle lies so near to the horizon are averaged. Light in the plane of the horizon

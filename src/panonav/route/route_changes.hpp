@@ -12,7 +12,8 @@ namespace panonav {
 
 /// Azimuths in the robot's frame, counter-clockwise from the first to the second.
 struct AzimuthRange {
-  double from_rad = 0.0;
+  double from_rad = 0.0;  ///< in [-pi, pi)
+  /// In [-pi, pi); below `from_rad` where the range goes through straight behind.
   double to_rad = 0.0;
 };
 
@@ -24,8 +25,7 @@ struct AzimuthRange {
 /// two lines is interpolated, and pictures from the same gap all share its error.
 class RouteChanges {
  public:
-  /// Without lines each picture counts.
-  RouteChanges() = default;
+  RouteChanges() = default;  ///< Without lines each picture counts.
   /// `lines`: where those of the route were seen from.
   explicit RouteChanges(std::span<const Pose2> lines) : lines_(lines.begin(), lines.end()) {}
 

@@ -24,7 +24,7 @@ struct RouteContourOptions {
   double constant = 0.5;       ///< w_const, eq. 11 squared
   double smoothing_deg = 1.0;  ///< of the lines before they are differentiated
   int max_points = 120;        ///< control points, at the strongest edges of the line
-  int max_iterations = 200;
+  int max_iterations = 200;    ///< moves of the contours at most, >= 1
   friend bool operator==(const RouteContourOptions&, const RouteContourOptions&) = default;
 };
 void visit_options(RouteContourOptions& options, OptionVisitor& visitor);
@@ -37,14 +37,14 @@ struct ContourPoint {
 
 /// The final contours and the pose that fits them.
 struct RouteContourFix {
-  Pose2 pose;
+  Pose2 pose;  ///< in the route's frame, by least squares over both contours
   std::array<double, 9> covariance{};  ///< of x, y, heading; row-major
-  double residual_m = 0.0;  ///< root mean square between contour and eq. 5, along the path, robust
-  bool converged = false;   ///< both contours met at four of five control points
-  int iterations = 0;
-  std::vector<int> columns;         ///< of the line, one a control point
-  std::vector<ContourPoint> first;  ///< the contour that started ahead
-  std::vector<ContourPoint> second;
+  double residual_m = 0.0;   ///< root mean square between contour and eq. 5, along the path, robust
+  bool converged = false;    ///< both contours met at four of five control points
+  int iterations = 0;        ///< moves of the contours until they stopped
+  std::vector<int> columns;  ///< of the line, one a control point
+  std::vector<ContourPoint> first;   ///< the contour that started ahead
+  std::vector<ContourPoint> second;  ///< the contour that started behind
 };
 
 /// A route panorama made ready for active contours.

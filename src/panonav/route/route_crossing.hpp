@@ -13,13 +13,13 @@ struct RouteCrossing {
   float along = -1.0F;      ///< index of the line, with its fraction; below 0: nowhere
   float distance_m = 0.0F;  ///< from the viewpoint, positive ahead of it and negative behind
   float along_by_x = 0.0F;  ///< change of `along` with the viewpoint, per metre
-  float along_by_y = 0.0F;
+  float along_by_y = 0.0F;  ///< the same along y
 };
 
 /// A direction in the plane, of unit length.
 struct Direction2 {
-  double x = 1.0;
-  double y = 0.0;
+  double x = 1.0;  ///< along the x axis
+  double y = 0.0;  ///< along the y axis
 };
 
 /// `count` directions, equally spaced from the x axis counter-clockwise.

@@ -25,7 +25,7 @@ void visit_options(RouteFitOptions& options, OptionVisitor& visitor);
 
 /// The pose from which a scanline was seen.
 struct RouteFix {
-  Pose2 pose;
+  Pose2 pose;  ///< in the route's frame
   /// Of x, y and heading in metres and radians, row-major, as far as the noise of the lines goes.
   std::array<double, 9> covariance{};
   /// Robust root mean square of the residuals over the standard deviation of what the route shows.
@@ -64,7 +64,7 @@ class RouteLines {
 
   /// Where a line may have been seen from.
   struct Candidate {
-    Pose2 pose;
+    Pose2 pose;                ///< in the route's frame
     double correlation = 0.0;  ///< at the coarsest level
   };
   /// Correlation of the coarsest level of a line with what the route shows from `position`, at the
@@ -76,9 +76,11 @@ class RouteLines {
   /// `line` as `candidate` wants it.
   [[nodiscard]] std::vector<float> coarse(std::span<const float> line) const;
 
+  /// Where each line was seen from, in the route's frame.
   [[nodiscard]] std::span<const Pose2> poses() const& noexcept { return poses_; }
-  std::span<const Pose2> poses() const&& = delete;  // would dangle
-  [[nodiscard]] int columns() const noexcept { return columns_; }
+  std::span<const Pose2> poses() const&& = delete;                 // would dangle
+  [[nodiscard]] int columns() const noexcept { return columns_; }  ///< Values of a line.
+  /// As they were given.
   [[nodiscard]] const RouteFitOptions& options() const noexcept { return options_; }
 
  private:

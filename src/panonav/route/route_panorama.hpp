@@ -29,11 +29,15 @@ class RoutePanorama {
   /// The same for a line that is bytes already.
   bool append(const Pose2& pose, std::span<const std::uint8_t> line);
 
+  /// Bytes of a line: azimuths of a full turn.
   [[nodiscard]] int columns() const noexcept { return columns_; }
-  [[nodiscard]] std::size_t size() const noexcept { return poses_.size(); }
+  [[nodiscard]] std::size_t size() const noexcept { return poses_.size(); }  ///< Number of lines.
+  /// Whether there is no line.
   [[nodiscard]] bool empty() const noexcept { return poses_.empty(); }
+  /// Where each line was seen from, in the route's frame.
   [[nodiscard]] std::span<const Pose2> poses() const& noexcept { return poses_; }
   std::span<const Pose2> poses() const&& = delete;  // would dangle
+  /// The bytes of line i, from straight ahead counter-clockwise. The caller guarantees i < size().
   [[nodiscard]] std::span<const std::uint8_t> line(std::size_t i) const& noexcept {
     return std::span(bytes_).subspan(i * static_cast<std::size_t>(columns_),
                                      static_cast<std::size_t>(columns_));

@@ -9,6 +9,7 @@
 
 namespace panonav {
 
+/// Where a tracker looks for the robot, and when it believes what it finds.
 struct RouteTrackerOptions {
   double search_step_m = 0.2;      ///< between the places along the path that a search tries
   double search_lateral_m = 0.25;  ///< and to either side of it
@@ -31,9 +32,10 @@ enum class RouteFixOrigin {
   search,      ///< found on the whole route
 };
 
+/// Where the robot is, and how that was found.
 struct TrackedRouteFix {
-  RouteFix fix;
-  RouteFixOrigin origin = RouteFixOrigin::prediction;
+  RouteFix fix;  ///< the pose with its covariance, and how well the line fits there
+  RouteFixOrigin origin = RouteFixOrigin::prediction;  ///< by which of the three ways
   double along_m = 0.0;    ///< way along the path to its place nearest to the robot
   double lateral_m = 0.0;  ///< from the path to the robot; positive to the left of the path
 };
@@ -72,8 +74,11 @@ class RouteTracker {
     elsewhere_.reset();
     followed_ = false;
   }
+  /// Where the robot is believed to be, odometry included; empty: unknown.
   [[nodiscard]] const std::optional<Pose2>& pose() const noexcept { return pose_; }
+  /// The least correlation of a fit that is believed: learnt, or as given.
   [[nodiscard]] double min_correlation() const noexcept { return min_correlation_; }
+  /// The route as fits compare it.
   [[nodiscard]] const RouteLines& lines() const noexcept { return lines_; }
 
  private:

@@ -16,8 +16,8 @@ namespace panonav {
 /// differs from one direction to another cancels.
 class ColumnProfiles {
  public:
-  static constexpr int columns = 128;
-  static constexpr int bands = 16;
+  static constexpr int columns = 128;  ///< directions around the robot, 2 pi / 128 apart
+  static constexpr int bands = 16;     ///< most bands of elevation, the size of a stored column
   static constexpr int compared_columns = 32;  ///< of a query: every fourth
 
   /// Of the first `components` of the signature, 0 for all, but no more than 64; rows that are 0 in
@@ -55,7 +55,7 @@ struct ColumnMatch {
 /// The same with a second turn, because a corridor looks much the same when turned by half a
 /// circle.
 struct ColumnMatches {
-  ColumnMatch best;
+  ColumnMatch best;   ///< the turn at which the views differ least
   ColumnMatch other;  ///< the best turn at least 60 degrees from `best`
 };
 

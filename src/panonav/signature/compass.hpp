@@ -17,6 +17,7 @@ struct CompassReading {
   double distinctness = 0.0;
 };
 
+/// Which components the compass compares.
 struct CompassOptions {
   int components = 0;  ///< k = 1 .. components - 1 are used; 0 takes all that both signatures have
 };

@@ -12,9 +12,9 @@ namespace panonav {
 /// precision, homing single.
 template <class Real>
 struct CorrelationPoint {
-  Real value = 0;
-  Real slope = 0;
-  Real curvature = 0;
+  Real value = 0;      ///< C(sigma), in the square of the views' unit
+  Real slope = 0;      ///< dC / dsigma, for each radian
+  Real curvature = 0;  ///< the second derivative, below 0 at a maximum
 };
 
 /// Cost: a sine, a cosine and a few multiplications a frequency.

@@ -12,9 +12,10 @@ namespace panonav {
 
 /// `components` counts k = 0 .. components - 1 (the papers' "first 15").
 struct SignatureShape {
-  int rows = 80;
-  int components = 15;
+  int rows = 80;        ///< rows of the panorama, >= 1 [M04 section 2.1]
+  int components = 15;  ///< >= 1 [M04 section 2.1]
 
+  /// Coefficients of a view: rows * components.
   [[nodiscard]] std::size_t size() const noexcept {
     return static_cast<std::size_t>(rows) * static_cast<std::size_t>(components);
   }
@@ -32,20 +33,28 @@ class FourierSignature {
   FourierSignature(SignatureShape shape, std::vector<float> magnitudes,
                    std::vector<float> phases_rad, std::optional<ElevationBand> elevations);
 
+  /// Rows and components.
   [[nodiscard]] SignatureShape shape() const noexcept { return shape_; }
+  /// Rows of the panorama, from the highest elevation to the lowest.
   [[nodiscard]] int rows() const noexcept { return shape_.rows; }
+  /// Frequencies k = 0 .. components - 1.
   [[nodiscard]] int components() const noexcept { return shape_.components; }
+  /// Of the panorama's rows; empty: unknown.
   [[nodiscard]] const std::optional<ElevationBand>& elevations() const noexcept {
     return elevations_;
   }
+  /// Magnitude A_k of a row, an amplitude of brightness. The caller guarantees that row and k are
+  /// in the shape.
   [[nodiscard]] float magnitude(int row, int k) const noexcept {
     return magnitudes_[index(row, k)];
   }
+  /// Phase psi_k of a row, in [-pi, pi). The caller guarantees that row and k are in the shape.
   [[nodiscard]] float phase_rad(int row, int k) const noexcept {
     return phases_rad_[index(row, k)];
   }
   /// Component-major: index k * rows + row.
   [[nodiscard]] std::span<const float> magnitudes() const& noexcept { return magnitudes_; }
+  /// In the order of the magnitudes.
   [[nodiscard]] std::span<const float> phases_rad() const& noexcept { return phases_rad_; }
   std::span<const float> magnitudes() const&& = delete;  // would dangle
   std::span<const float> phases_rad() const&& = delete;  // would dangle
@@ -80,9 +89,9 @@ class FourierSignature {
 /// most pi / 256. Where a magnitude is packed as 0 its phase is too. Component-major like
 /// FourierSignature. Both vectors have shape.size() entries.
 struct PackedSignature {
-  SignatureShape shape;
-  std::vector<std::uint8_t> magnitudes;
-  std::vector<std::uint8_t> phases;
+  SignatureShape shape;                  ///< rows and components of both vectors
+  std::vector<std::uint8_t> magnitudes;  ///< 255 stands for `full_scale` and all above
+  std::vector<std::uint8_t> phases;      ///< in steps of 2 pi / 256 from 0
   friend bool operator==(const PackedSignature&, const PackedSignature&) = default;
 };
 

@@ -13,8 +13,8 @@ namespace panonav {
 
 /// A corner of a view and what its surroundings look like.
 struct LocalFeature {
-  std::uint16_t column = 0;
-  std::uint16_t row = 0;
+  std::uint16_t column = 0;  ///< of the panorama, where the corner is
+  std::uint16_t row = 0;     ///< of the panorama, 0 at the top
   /// Bit i tells which of the i-th pair of places around the corner is brighter.
   std::array<std::uint64_t, 4> bits{};
   friend bool operator==(const LocalFeature&, const LocalFeature&) = default;
@@ -24,12 +24,12 @@ struct LocalFeature {
 /// azimuth, at most `max_count`, each with an upright binary descriptor. A turn of the robot by
 /// whole columns moves them and changes nothing else.
 struct LocalFeatures {
-  static constexpr int max_count = 256;
+  static constexpr int max_count = 256;  ///< features kept of a view at most, the strongest ones
   /// Of the packed form: column, row, bits, all little-endian.
   static constexpr std::size_t packed_bytes = 36;
 
-  PanoramaShape shape;  ///< of the panorama
-  ElevationBand elevations;
+  PanoramaShape shape;                 ///< of the panorama
+  ElevationBand elevations;            ///< of the panorama
   std::vector<LocalFeature> features;  ///< by row, then column
   friend bool operator==(const LocalFeatures&, const LocalFeatures&) = default;
 };

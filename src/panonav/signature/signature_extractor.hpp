@@ -21,8 +21,9 @@ class SignatureExtractor {
  public:
   /// Buffers that are reused from picture to picture; what they hold between calls does not matter.
   struct Workspace {
-    Unwarper::Workspace unwarping;
-    std::vector<float> real, imaginary;
+    Unwarper::Workspace unwarping;  ///< of `Unwarper`
+    std::vector<float> real,        ///< Fourier sums of the rows, the cosine parts
+        imaginary;                  ///< the sine parts
   };
 
   /// For cylinders of this shape. Throws ContractError unless 1 <= components <= columns / 2 and
@@ -30,9 +31,11 @@ class SignatureExtractor {
   explicit SignatureExtractor(PanoramaShape cylinder, int components = 15,
                               const PreprocessingOptions& preprocessing = {});
 
+  /// The steps before the transform.
   [[nodiscard]] const PreprocessingOptions& preprocessing() const noexcept {
     return preprocessing_;
   }
+  /// Rows and components of the signatures that it makes.
   [[nodiscard]] SignatureShape shape() const noexcept { return {rows_, transform_.components()}; }
 
   /// Throws ContractError on a panorama of another shape.

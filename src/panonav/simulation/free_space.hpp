@@ -14,8 +14,9 @@
 
 namespace panonav {
 
+/// What a robot fits through and drives over.
 struct FreeSpaceOptions {
-  double robot_radius_m = 0.2;
+  double robot_radius_m = 0.2;  ///< >= 0; the robot is taken for a cylinder
   double robot_height_m =
       0.6;  ///< what stands between the step height and this height is in the way
   double step_height_m = 0.05;  ///< lower things (floor, carpet, sill) are driven over
@@ -46,14 +47,17 @@ class FreeSpace {
   explicit FreeSpace(const Scene& scene, const FreeSpaceOptions& options = {},
                      std::optional<Point2> seed = std::nullopt);
 
+  /// Whether the middle of the robot may be there. False outside the map.
   [[nodiscard]] bool is_free(Point2 position) const noexcept;
   /// Lower bound of the distance from `position` to the nearest obstacle; 0 outside the map.
   [[nodiscard]] double clearance_m(Point2 position) const noexcept;
   /// Whether every place on the straight line is free.
   [[nodiscard]] bool is_free_between(Point2 a, Point2 b) const noexcept;
 
-  [[nodiscard]] double area_m2() const noexcept;
+  [[nodiscard]] double area_m2() const noexcept;  ///< Of all free cells together.
+  /// Lower left corner of the map: that of the scene's floor.
   [[nodiscard]] Point2 low() const noexcept { return low_; }
+  /// Upper right corner of the map: that of the scene's floor.
   [[nodiscard]] Point2 high() const noexcept { return high_; }
 
   /// The free places of a regular grid over the floor.

@@ -8,8 +8,9 @@
 
 namespace panonav {
 
+/// How a Gazebo world becomes a scene.
 struct GazeboOptions {
-  TextureOptions textures{};
+  TextureOptions textures{};  ///< how pictures on surfaces are read
   /// Folders in which `model://NAME` is looked for, before the usual places: `models` beside the
   /// world file and beside its folder, and these two folders themselves.
   std::vector<std::filesystem::path> model_folders;

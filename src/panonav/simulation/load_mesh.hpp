@@ -10,13 +10,14 @@ namespace panonav {
 /// Which axis of a mesh file points up.
 enum class UpAxis {
   of_format,  ///< as the file says (COLLADA), y for glTF; z for all formats that do not say it
-  y,
-  z,
+  y,          ///< whatever the file says
+  z,          ///< whatever the file says
 };
 
+/// How a mesh file becomes a scene.
 struct MeshOptions {
-  TextureOptions textures{};
-  UpAxis up = UpAxis::of_format;
+  TextureOptions textures{};      ///< how pictures on surfaces are read
+  UpAxis up = UpAxis::of_format;  ///< which axis becomes the scene's z
   double scale =
       1.0;  ///< metres for one unit of the file, after the unit that COLLADA files state; > 0
 };

@@ -17,9 +17,9 @@ enum class MirrorTarget {
 /// The path of light from a pixel through the lens to the mirror and out, in the robot frame (x
 /// forward, y left, z up) with its origin in the mirror's inner focus, the viewpoint.
 struct MirrorRay {
-  MirrorTarget target = MirrorTarget::housing;
-  Vector3 origin;            ///< on the mirror; meaningless for the housing
-  Direction3 direction;      ///< of unit length; meaningless for the housing
+  MirrorTarget target = MirrorTarget::housing;  ///< what the light of the pixel comes from
+  Vector3 origin;                               ///< on the mirror; meaningless for the housing
+  Direction3 direction;                         ///< of unit length; meaningless for the housing
   double body_radius = 0.0;  ///< camera body: distance from its axis in radii of the body, 0 .. 1
 };
 
@@ -31,9 +31,12 @@ class HyperboloidalMirror {
   /// Throws ContractError unless the camera is valid and its model hyperboloidal.
   explicit HyperboloidalMirror(const Camera& camera);
 
+  /// Follows the light of a point of the picture. Points beyond the
+  /// mirror's rim see the housing.
   [[nodiscard]] MirrorRay trace(PixelPoint pixel) const;
   /// Radius of the mirror's rim, and of the camera body that hides the middle.
   [[nodiscard]] double rim_radius_m() const noexcept { return rim_radius_mm_ * 1e-3; }
+  /// Radius of the camera body, 0: nothing is hidden.
   [[nodiscard]] double body_radius_m() const noexcept { return body_radius_mm_ * 1e-3; }
 
  private:

@@ -34,21 +34,22 @@ enum class RecordingHeading {
   random,  ///< any
 };
 
+/// Where and how a robot takes its pictures.
 struct RecordingOptions {
-  RecordingPath path = RecordingPath::grid;
-  RecordingHeading heading = RecordingHeading::fixed;
-  double heading_rad = 0.0;  ///< of fixed headings
-  double spacing_m = 0.5;    ///< of the grid, or along the path
-  int poses = 200;           ///< number of a walk or of random poses
-  double speed_m_s = 0.3;    ///< gives the stamps
+  RecordingPath path = RecordingPath::grid;            ///< from place to place
+  RecordingHeading heading = RecordingHeading::fixed;  ///< at each place
+  double heading_rad = 0.0;                            ///< of fixed headings
+  double spacing_m = 0.5;                              ///< of the grid, or along the path
+  int poses = 200;                                     ///< number of a walk or of random poses
+  double speed_m_s = 0.3;                              ///< gives the stamps
 };
 void visit_options(RecordingOptions& options, OptionVisitor& visitor);
 
 /// One place of a recording and what the robot knows of it.
 struct RecordedPose {
-  double stamp_s = 0.0;
-  Pose2 pose;      ///< where it truly is
-  Pose2 odometry;  ///< where its odometry says that it is, in the odometry frame
+  double stamp_s = 0.0;  ///< seconds, by way and speed; of a trajectory its own
+  Pose2 pose;            ///< where it truly is
+  Pose2 odometry;        ///< where its odometry says that it is, in the odometry frame
   friend bool operator==(const RecordedPose&, const RecordedPose&) = default;
 };
 
@@ -65,8 +66,9 @@ struct RecordedPose {
 /// What is rendered: a picture through a camera, or the panoramic cylinder directly.
 using RecordingCamera = std::variant<PanoramaRendering, Camera>;
 
+/// How each picture of a recording is taken.
 struct FrameOptions {
-  double camera_height_m = 0.6;
+  double camera_height_m = 0.6;  ///< of the viewpoint above the floor, > 0
   /// Tilt of the robot, in another random direction at each place.
   double tilt_rad = 0.0;
   int rays_per_axis = 2;  ///< for pictures through a camera
@@ -92,10 +94,10 @@ void visit_options(FrameOptions& options, OptionVisitor& visitor);
 
 /// One picture of a recording, for as long as it is looked at.
 struct RecordedFrame {
-  std::size_t number = 0;
-  const RecordedPose& pose;
-  Tilt tilt;  ///< as it truly is
-  const Image& picture;
+  std::size_t number = 0;    ///< counted from 0
+  const RecordedPose& pose;  ///< belongs to the poses that `record` was given
+  Tilt tilt;                 ///< as it truly is
+  const Image& picture;      ///< as `take_picture` gives it; gone after the call
 };
 
 /// Takes all pictures in order and hands each to `frame`, so that only one is in memory. Frame i

@@ -15,12 +15,13 @@ namespace panonav {
 
 /// Where the camera is in the scene. Its axis is vertical unless the robot is tilted.
 struct Viewpoint {
-  Pose2 pose;
+  Pose2 pose;              ///< of the robot on the floor, in the scene's x and y
   double height_m = 0.6;   ///< of the single viewpoint above the floor
   double roll_rad = 0.0;   ///< about the robot's x axis, then
   double pitch_rad = 0.0;  ///< about its y axis; positive lowers the front
 };
 
+/// How a scene is rendered.
 struct RendererOptions {
   /// Embree's instruction set, for example "sse4.2" for pictures that must be the same on every
   /// machine. Empty: the widest that the processor has.
@@ -33,8 +34,8 @@ struct RendererOptions {
 
 /// How a panoramic cylinder is rendered.
 struct PanoramaRendering {
-  int rows = 80;
-  int columns = 512;
+  int rows = 80;                                                      ///< values of a column, >= 1
+  int columns = 512;                                                  ///< values of a row, >= 4
   ElevationBand elevations{-0.5235987755982988, 0.6981317007977318};  ///< -30 .. 40 degrees
   /// Rays per pixel and axis, n x n within the pixel. No two share a line along either axis, so
   /// that an edge is placed to 1 / n^2 of a pixel.
@@ -45,10 +46,10 @@ struct PanoramaRendering {
 /// not clamped. Rows from the top, channels interleaved (1 grey by the weights of ITU-R BT.601, 3
 /// RGB).
 struct Radiance {
-  int width = 0;
-  int height = 0;
-  int channels = 1;
-  std::vector<float> values;
+  int width = 0;              ///< pixels of a row
+  int height = 0;             ///< rows
+  int channels = 1;           ///< 1 grey, 3 RGB
+  std::vector<float> values;  ///< width * height * channels numbers
 };
 
 /// Ray tracing of a scene with Embree. Light and shadows are computed once, when it is built, at
@@ -60,8 +61,10 @@ class Renderer {
   /// Keeps what it needs of the scene. Throws ContractError on a scene that is not valid and on a
   /// number of channels that is neither 1 nor 3. `executor` helps to compute the light.
   Renderer(const Scene& scene, const RendererOptions& options, Executor& executor);
+  /// The same with the light computed in the calling thread alone.
   explicit Renderer(const Scene& scene, const RendererOptions& options = {});
   ~Renderer();
+  /// What is left of the other may only be destroyed or assigned to.
   Renderer(Renderer&&) noexcept;
   Renderer& operator=(Renderer&&) noexcept;
 

@@ -13,9 +13,9 @@ namespace panonav {
 
 /// A point or vector of the scene in metres: x east, y north, z up.
 struct Vector3 {
-  double x_m = 0.0;
-  double y_m = 0.0;
-  double z_m = 0.0;
+  double x_m = 0.0;  ///< east
+  double y_m = 0.0;  ///< north
+  double z_m = 0.0;  ///< up
   friend bool operator==(const Vector3&, const Vector3&) = default;
 };
 
@@ -30,38 +30,39 @@ inline constexpr double scene_reach_m = 1e9;
 /// coordinate of 1. Texture coordinate (0, 0) is the lower left corner of the picture, u runs to
 /// the right and v upwards. Linear 0 .. 1; matt, seen from both sides.
 struct Material {
-  std::array<float, 3> colour{0.7F, 0.7F, 0.7F};
-  std::shared_ptr<const Image> texture;  ///< null: plain colour
-  float emission = 0.0F;                 ///< 1: shows its colour whatever the light (sky, lamps)
+  std::array<float, 3> colour{0.7F, 0.7F, 0.7F};  ///< red, green, blue, linear
+  std::shared_ptr<const Image> texture;           ///< null: plain colour
+  float emission = 0.0F;  ///< 1: shows its colour whatever the light (sky, lamps)
 };
 
 /// Triangles of one material. `texture_coordinates` is empty or has one entry per vertex.
 struct Mesh {
-  std::string object;  ///< which object of the scene it belongs to ("wall", "desk 3")
-  int material = 0;
-  std::vector<Vector3> vertices;
-  std::vector<std::array<float, 2>> texture_coordinates;
+  std::string object;             ///< which object of the scene it belongs to ("wall", "desk 3")
+  int material = 0;               ///< its number among the scene's materials
+  std::vector<Vector3> vertices;  ///< the corners of its triangles
+  std::vector<std::array<float, 2>> texture_coordinates;  ///< u and v of each vertex
+  /// Numbers of their vertices; surfaces are seen from both sides, so the order does not count.
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
 /// A lamp. A surface at distance d that faces it gets the light intensity / (d^2 + radius^2), in
 /// metres; a white surface in light 1 has the value 1.
 struct PointLight {
-  Vector3 position;
-  float intensity = 1.0F;
-  float radius_m = 0.4F;  ///< of the lamp itself: near it, light does not grow without bound
+  Vector3 position;        ///< in the scene
+  float intensity = 1.0F;  ///< light at a distance of 1 m, but for its own size
+  float radius_m = 0.4F;   ///< of the lamp itself: near it, light does not grow without bound
 };
 
 /// Light from far away: a surface that faces it gets the light `intensity`.
 struct DirectionalLight {
-  Direction3 towards_light{0.0, 0.0, 1.0};
-  float intensity = 1.0F;
+  Direction3 towards_light{0.0, 0.0, 1.0};  ///< of any length but 0
+  float intensity = 1.0F;                   ///< any finite number
 };
 
 /// An axis-aligned rectangle of the floor.
 struct FloorArea {
-  Point2 low;
-  Point2 high;
+  Point2 low;   ///< the corner of least x and y
+  Point2 high;  ///< the corner of largest x and y
   friend bool operator==(const FloorArea&, const FloorArea&) = default;
 };
 
@@ -69,15 +70,15 @@ struct FloorArea {
 /// only in the `drivable` areas if there are any, less the places where a mesh below the robot's
 /// height stands within its radius (see `FreeSpace`).
 struct Scene {
-  std::string name;
-  std::vector<Material> materials;
-  std::vector<Mesh> meshes;
-  std::vector<PointLight> lights;
-  std::vector<DirectionalLight> directional_lights;
+  std::string name;                 ///< of the built-in scene or of the file
+  std::vector<Material> materials;  ///< meshes name them by their number
+  std::vector<Mesh> meshes;         ///< everything that can be seen or driven against
+  std::vector<PointLight> lights;   ///< lamps
+  std::vector<DirectionalLight> directional_lights;  ///< from far away, as of the sun
   float ambient = 0.5F;  ///< light that comes from everywhere; less of it reaches corners
   std::array<float, 3> background{0.75F, 0.8F, 0.85F};  ///< what a ray sees that hits nothing
-  Point2 floor_low;
-  Point2 floor_high;
+  Point2 floor_low;                   ///< corner of least x and y of where the robot may drive
+  Point2 floor_high;                  ///< corner of largest x and y of where the robot may drive
   std::vector<FloorArea> drivable;    ///< empty: the whole floor
   std::vector<Point2> tour;           ///< a closed round trip through free space; may be empty
   double robot_radius_m = 0.2;        ///< of the robot that the scene is made for

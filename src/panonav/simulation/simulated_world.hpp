@@ -21,35 +21,35 @@ namespace panonav {
 
 /// How the scene differs from the plain one, and what is drawn at random.
 struct SceneOptions {
-  int seed = 1;  ///< poses, noise, tilt, odometry
-  int scene_seed = 1;
-  double moved_objects = 0.0;
-  int moved_seed = 1;
-  double light = 1.0;
+  int seed = 1;                ///< poses, noise, tilt, odometry
+  int scene_seed = 1;          ///< textures and furniture of built-in scenes
+  double moved_objects = 0.0;  ///< share of the movable objects that stand elsewhere, 0 .. 1
+  int moved_seed = 1;          ///< which objects moved, and where to
+  double light = 1.0;          ///< factor on all lamps and the sky, > 0
 };
 void visit_options(SceneOptions& options, OptionVisitor& visitor);
 
 /// The simulated camera and the scene.
 struct SimulationOptions {
-  int kind = 0;  ///< mirror, panorama, dual-fisheye
-  int rows = 80;
-  int columns = 512;
-  double elevation_low_deg = -30.0;
-  double elevation_high_deg = 40.0;
-  int lens_seed = 1;  ///< see `simulated_dual_fisheye`
-  double lens_distance_m = 0.0;
-  SceneOptions scene;
+  int kind = 0;                      ///< mirror, panorama, dual-fisheye
+  int rows = 80;                     ///< of panoramas, 1 .. 4096
+  int columns = 512;                 ///< of panoramas, 4 .. 16384
+  double elevation_low_deg = -30.0;  ///< lower edge of panoramas
+  double elevation_high_deg = 40.0;  ///< upper edge of panoramas
+  int lens_seed = 1;                 ///< see `simulated_dual_fisheye`
+  double lens_distance_m = 0.0;      ///< of the two lenses, 0 .. 1; gives near things a parallax
+  SceneOptions scene;                ///< how it differs from the plain one
 };
 void visit_options(SimulationOptions& options, OptionVisitor& visitor);
 
 /// Everything that can be chosen of a simulated run.
 struct SimulatedWorldOptions {
-  SimulationOptions simulation;
-  RecordingOptions recording;
+  SimulationOptions simulation;  ///< camera and scene
+  RecordingOptions recording;    ///< where pictures are taken
   FrameOptions frame;  ///< camera_height_m is the scene's own unless the user gives another
-  FreeSpaceOptions free_space;  ///< likewise: of the robot that the scene is made for
-  SensorOptions sensor;
-  OdometryNoise odometry;
+  FreeSpaceOptions free_space;   ///< likewise: of the robot that the scene is made for
+  SensorOptions sensor;          ///< noise and faults of the camera
+  OdometryNoise odometry;        ///< errors of the wheels
   std::optional<Camera> mirror;  ///< of mirror pictures; empty: `simulated_mirror_camera`
 };
 
@@ -74,14 +74,19 @@ class SimulatedWorld {
   /// The same world for another recording: its poses, noise and odometry.
   [[nodiscard]] SimulatedWorld with(const RecordingOptions& recording, int seed) const;
 
+  /// With its light and its moved objects.
   [[nodiscard]] const Scene& scene() const noexcept { return scene_; }
+  /// Where the robot can stand and drive.
   [[nodiscard]] const FreeSpace& free_space() const noexcept { return *free_space_; }
+  /// Takes the pictures.
   [[nodiscard]] const Renderer& renderer() const noexcept { return *renderer_; }
   /// The same for those who outlive the world.
   [[nodiscard]] std::shared_ptr<const FreeSpace> shared_free_space() const { return free_space_; }
+  /// As `shared_free_space`.
   [[nodiscard]] std::shared_ptr<const Renderer> shared_renderer() const { return renderer_; }
   /// With what is the scene's own filled in.
   [[nodiscard]] const SimulatedWorldOptions& options() const noexcept { return wanted_; }
+  /// What its pictures are taken with: a panorama or a camera, as the options say.
   [[nodiscard]] RecordingCamera camera() const;
   /// How the robot's pictures lie.
   [[nodiscard]] PictureSource source() const;

@@ -15,13 +15,15 @@ namespace panonav {
 /// blobs by their length too, so that different records never give the same bytes.
 class RecordBytes {
  public:
-  void add_null();
-  void add(std::int64_t value);
-  void add(double value);
-  void add(std::string_view text);
-  void add(std::span<const std::uint8_t> blob);
+  void add_null();                  ///< A field without a value.
+  void add(std::int64_t value);     ///< A whole number.
+  void add(double value);           ///< A real number, by its bits; both zeros are the same.
+  void add(std::string_view text);  ///< A text, by its bytes.
+  void add(std::span<const std::uint8_t> blob);  ///< Bytes as they are.
+  /// All that was added since the last `clear`; valid until the next `add` or `clear`.
   [[nodiscard]] std::span<const std::uint8_t> bytes() const& noexcept { return bytes_; }
   std::span<const std::uint8_t> bytes() const&& = delete;  // would dangle
+  /// Forgets all fields; the memory is kept for the next record.
   void clear() noexcept { bytes_.clear(); }
 
  private:

@@ -12,10 +12,11 @@ namespace panonav {
 /// A square of 10 m of a memory's map: column and row count from the origin, and (0, 0) lies
 /// between it and (10 m, 10 m).
 struct MemoryArea {
-  double column = 0.0;  ///< whole numbers
-  double row = 0.0;
+  double column = 0.0;  ///< whole numbers, along x
+  double row = 0.0;     ///< whole numbers, along y
   friend auto operator<=>(const MemoryArea&, const MemoryArea&) = default;
 };
+/// Side of an area.
 inline constexpr double memory_area_side_m = 10.0;
 
 /// The area that a position lies in.
@@ -35,6 +36,7 @@ class MemoryChanges {
   /// memory file, which tells nobody.
   explicit MemoryChanges(const std::filesystem::path& memory);
   ~MemoryChanges();
+  /// What is left of the other may only be destroyed or assigned to.
   MemoryChanges(MemoryChanges&&) noexcept;
   MemoryChanges& operator=(MemoryChanges&&) noexcept;
 

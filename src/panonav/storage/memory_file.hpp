@@ -22,10 +22,11 @@ namespace panonav {
 /// What a memory file says of all its views: how a picture becomes a signature that can be compared
 /// with them. Fixed when the file is made.
 struct MemoryHeader {
-  SignatureShape shape;
+  SignatureShape shape;                     ///< rows and components of every view
   float full_scale = 1.0F;                  ///< magnitude that is packed as 255
   std::optional<ElevationBand> elevations;  ///< of the signatures' rows; empty: unknown
   int panorama_columns = 512;               ///< of the cylinders that the signatures are taken from
+  /// Steps before the transform, the same for views and queries.
   PreprocessingOptions preprocessing;
   PictureSource source;  ///< how queries without a data set of their own are read
   /// Rows and columns of ready-made panoramas that are resampled to the memory's; empty: they have
@@ -37,24 +38,30 @@ struct MemoryHeader {
 
 /// A view on its way into a memory file.
 struct NewView {
-  ReferenceInfo info;
-  PackedSignature signature;
+  ReferenceInfo info;                   ///< name, pose and stamp; the name is new to the file
+  PackedSignature signature;            ///< of the header's shape, packed with its full scale
   std::vector<std::uint8_t> thumbnail;  ///< a PNG or JPEG file for people to look at; empty: none
   std::vector<std::uint8_t> features;   ///< packed `LocalFeatures`; empty: none
 };
 
-/// A rectangle of positions.
+/// A rectangle in the frame of the memory's positions.
 struct PositionBounds {
-  double min_x_m = 0.0, max_x_m = 0.0;
-  double min_y_m = 0.0, max_y_m = 0.0;
+  double min_x_m = 0.0,  ///< smallest x, included
+      max_x_m = 0.0;     ///< largest x, included
+  double min_y_m = 0.0,  ///< smallest y, included
+      max_y_m = 0.0;     ///< largest y, included
 };
 
-enum class Access { read_only, read_write };
+/// For what a memory file is opened.
+enum class Access {
+  read_only,  ///< others may write meanwhile
+  read_write  ///< one process at a time
+};
 
 /// What is wrong in a memory file; `view` where it concerns one.
 struct MemoryFault {
-  std::optional<ViewId> view;
-  std::string what;  ///< one line
+  std::optional<ViewId> view;  ///< empty: the fault is the file's as a whole
+  std::string what;            ///< one line
   friend bool operator==(const MemoryFault&, const MemoryFault&) = default;
 };
 
@@ -69,20 +76,20 @@ struct KeptChange {
 
 /// Counts and sizes of a memory file.
 struct MemoryFileInfo {
-  std::uint64_t views = 0;
-  std::uint64_t views_with_position = 0;
-  std::uint64_t views_with_heading = 0;
-  std::uint64_t links = 0;
-  std::uint64_t thumbnails = 0;
-  std::uint64_t views_with_features = 0;
-  std::uint64_t feature_bytes = 0;  ///< packed local features of all views
+  std::uint64_t views = 0;                ///< reference views
+  std::uint64_t views_with_position = 0;  ///< of these, with x and y
+  std::uint64_t views_with_heading = 0;   ///< of these, with a heading
+  std::uint64_t links = 0;                ///< between two views
+  std::uint64_t thumbnails = 0;           ///< views stored with a picture file
+  std::uint64_t views_with_features = 0;  ///< views stored with local features
+  std::uint64_t feature_bytes = 0;        ///< packed local features of all views
   /// Chains of snapshots that an earlier version saved. They are kept, and nothing reads them.
   /// Counted up to a million.
   std::uint64_t unused_chains = 0;
-  std::uint64_t maps = 0;
-  std::uint64_t routes = 0;
+  std::uint64_t maps = 0;        ///< kept by name
+  std::uint64_t routes = 0;      ///< kept by name
   std::uint64_t file_bytes = 0;  ///< with what is still in the write-ahead log
-  int format_version = 0;
+  int format_version = 0;        ///< of docs/formats.md, >= 1
   friend bool operator==(const MemoryFileInfo&, const MemoryFileInfo&) = default;
 };
 
@@ -103,6 +110,7 @@ class MemoryFile {
   /// read_write.
   static MemoryFile open(const std::filesystem::path& path, Access access);
   ~MemoryFile();
+  /// What is left of the other may only be destroyed or assigned to.
   MemoryFile(MemoryFile&&) noexcept;
   MemoryFile& operator=(MemoryFile&&) noexcept;
 
@@ -113,7 +121,8 @@ class MemoryFile {
   /// `create`, and on damage.
   void copy_to(const std::filesystem::path& path) const;
 
-  [[nodiscard]] const MemoryHeader& header() const noexcept;
+  [[nodiscard]] const MemoryHeader& header() const noexcept;  ///< As the file was made.
+  /// As it was given to `create` or `open`; of a server the address without its password.
   [[nodiscard]] const std::filesystem::path& path() const noexcept;
 
   /// All that `changes` changes by the member functions below, in one transaction: all of it is on
@@ -148,14 +157,18 @@ class MemoryFile {
   /// Also drops the view's links, thumbnail and features and its node in maps, in one transaction
   /// for all. Throws ContractError when there is no such view; then nothing is removed.
   void remove(std::span<const ViewId> views);
+  /// Replaces what is known of the pose; empty: it is unknown. Throws ContractError when there is
+  /// no such view, and on a pose that is not finite.
   void set_pose(ViewId view, const std::optional<ReferencePose>& pose);
   /// Gives a view another name. Throws ContractError when there is no such view, and on a name that
   /// another view has, is empty, has control characters or more than 4096 bytes.
   void rename(ViewId view, std::string_view name);
   /// A second link of the same two views replaces the first. All links in one transaction.
   void link(std::span<const Link> links);
+  /// Drops the link of the two views, in whichever order; nothing happens where there is none.
   void unlink(ViewId a, ViewId b);
 
+  /// The view of that name; empty when there is none. Cost: a look-up in an index.
   [[nodiscard]] std::optional<ViewId> find(std::string_view name) const;
   /// Names of all views, by ascending id: what a resumed recording need not add again.
   [[nodiscard]] std::vector<std::string> names() const;
@@ -169,6 +182,7 @@ class MemoryFile {
 
   /// What was learnt from the views (a model of unknown places, weights), by name, as text.
   void set_parameter(std::string_view name, std::string_view value);
+  /// What `set_parameter` stored under the name; empty where there is nothing.
   [[nodiscard]] std::optional<std::string> parameter(std::string_view name) const;
 
   /// Keeps a map under a name, instead of the one that had it. The first map gives the file format
@@ -217,6 +231,7 @@ class MemoryFile {
   [[nodiscard]] std::vector<Link> links() const;
   /// Everything that is wrong with the file, in full: structure, then view by view. Empty: intact.
   [[nodiscard]] std::vector<MemoryFault> verify() const;
+  /// Counts rows and sizes; nothing is checked. Cost: a pass over the rows of the tables.
   [[nodiscard]] MemoryFileInfo info() const;
 
  private:

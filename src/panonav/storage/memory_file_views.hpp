@@ -22,6 +22,7 @@ class MemoryFileViews final : public ViewSource {
   [[nodiscard]] std::span<const ViewId> views() const override { return views_; }
   /// Throws FileError, ContractError as `MemoryFile::load`.
   [[nodiscard]] VisualMemory load(std::span<const ViewId> views) const override;
+  /// The open file, for what it tells besides views.
   [[nodiscard]] const MemoryFile& file() const noexcept { return file_; }
 
  private:

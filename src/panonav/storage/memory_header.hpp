@@ -13,6 +13,7 @@ namespace panonav {
 
 /// What a memory file says of itself, by key.
 using SettingValue = std::variant<std::int64_t, double, std::string, std::vector<std::uint8_t>>;
+/// Entries by key, ascending.
 using Settings = std::map<std::string, SettingValue, std::less<>>;
 
 /// Throws ContractError or OptionError that names the field, its value and its range.
@@ -21,6 +22,7 @@ void validate(const MemoryHeader& header);
 /// The header as settings, and back. `header_from` throws ContractError on a missing, unknown or
 /// impossible entry. Entries whose key starts with "parameter." are no part of the header.
 [[nodiscard]] Settings settings_of(const MemoryHeader& header);
+/// The header that such settings tell.
 [[nodiscard]] MemoryHeader header_from(const Settings& settings);
 
 }  // namespace panonav
