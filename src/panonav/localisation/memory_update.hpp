@@ -15,6 +15,7 @@
 
 namespace panonav {
 
+/// How many views a memory may keep, and when one is forgotten.
 struct MemoryUpdateOptions {
   int appearances = 3;  ///< views of one place that stand beside each other, at most
   int failures = 10;    ///< runs in a row in which a view failed before it is forgotten
@@ -34,12 +35,12 @@ struct ViewUse {
 /// What updates of a memory know of the runs before. Plain numbers, so that they can be kept beside
 /// the memory.
 struct MemoryUse {
-  int runs = 0;
+  int runs = 0;  ///< that the memory was updated by
   /// Of the memory before its first update: appearances of a place make references seem nearer to
   /// each other and less alike than places are. 0 before that.
   double spacing_m = 0.0;
-  double far_difference = 0.0;
-  double range_m = 0.0;
+  double far_difference = 0.0;  ///< of the same memory, as `ObservationModel` has it
+  double range_m = 0.0;         ///< of the same memory, as `ObservationModel` has it
   /// Views of the memory before its first update, and of places that came later.
   int places = 0;
   int size = 0;                     ///< views of the memory after the last update
@@ -49,18 +50,19 @@ struct MemoryUse {
 
 /// One picture of a run, as a `Localiser` answered it by the memory that the run began with.
 struct RunView {
-  Pose2 odometry;  ///< absolute, in its own frame
-  PackedSignature signature;
-  double known_probability = 0.0;
+  Pose2 odometry;                  ///< absolute, in its own frame
+  PackedSignature signature;       ///< of the picture, as the memory compares it
+  double known_probability = 0.0;  ///< of the answer
   std::optional<Pose2> pose;       ///< of the answer; empty where position or heading is not known
   std::optional<double> radius_m;  ///< of 95 %, of the position
 };
 
 /// What a run changes in its memory.
 struct MemoryChanges {
+  /// A picture of the run that becomes a view.
   struct Added {
     std::size_t number = 0;  ///< of the picture in the run
-    ReferencePose pose;
+    ReferencePose pose;      ///< where it certainly was taken, with its heading
   };
   std::vector<Added> added;       ///< ascending
   std::vector<ViewId> replaced;   ///< dropped for an added one; ascending
@@ -77,11 +79,14 @@ struct MemoryChanges {
 /// a camera that was turned, a place that looks alike and a robot that is carried away say nothing.
 /// `others` without the picture itself; `travelled_m`: from the picture to each of them.
 struct PoseWitness {
-  Pose2 odometry;
-  Pose2 pose;
-  double radius_m = 0.0;
+  Pose2 odometry;            ///< at the picture that was answered, in the odometry's frame
+  Pose2 pose;                ///< of the answer, in the frame of the memory's positions
+  double radius_m = 0.0;     ///< of the answer: holds its position in 95 % of the cases
   double travelled_m = 0.0;  ///< between it and the picture, >= 0
 };
+/// The pose on which the witnesses agree; empty where they are too few, too near to each other or
+/// of different minds. `odometry`: at the picture; `own`: its own answer, where that was sure.
+/// `spacing_m`: of the references. Cost: the square of the number of witnesses.
 [[nodiscard]] std::optional<Pose2> witnessed_pose(const Pose2& odometry,
                                                   std::span<const PoseWitness> witnesses,
                                                   const std::optional<PoseWitness>& own,

@@ -18,7 +18,7 @@ struct LiveMemoryOptions {
   /// (`MemoryLearner`) where the memory has positions and headings and the observations odometry;
   /// without it the file is only read.
   bool learn = false;
-  MemoryUpdateOptions update;
+  MemoryUpdateOptions update;  ///< of views at known places
   /// Between two views that are added: until the memory has learnt from a view, those after it look
   /// as new as it did. Of observations with stamps.
   double min_interval_s = 0.5;

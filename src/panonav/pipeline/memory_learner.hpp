@@ -25,6 +25,7 @@ class MemoryLearner {
   explicit MemoryLearner(const std::filesystem::path& memory,
                          const MemoryUpdateOptions& options = {});
   ~MemoryLearner();
+  /// What is left of the other may only be destroyed or assigned to.
   MemoryLearner(MemoryLearner&&) noexcept;
   MemoryLearner& operator=(MemoryLearner&&) noexcept;
 
@@ -35,14 +36,15 @@ class MemoryLearner {
   /// place it by odometry.
   [[nodiscard]] bool near_known_places() const;
 
+  /// What a run did to its memory.
   struct Changes {
-    std::size_t seen = 0;     ///< observations with odometry
-    std::size_t certain = 0;  ///< of these, whose place was certain and new
-    std::size_t reinforced = 0;
-    std::size_t added = 0;
-    std::size_t replaced = 0;
-    std::size_t forgotten = 0;
-    std::size_t views = 0;  ///< of the memory now
+    std::size_t seen = 0;        ///< observations with odometry
+    std::size_t certain = 0;     ///< of these, whose place was certain and new
+    std::size_t reinforced = 0;  ///< views of the memory that explained what the robot saw
+    std::size_t added = 0;       ///< views of this run
+    std::size_t replaced = 0;    ///< views that were dropped for added ones
+    std::size_t forgotten = 0;   ///< views that were dropped because they had failed for long
+    std::size_t views = 0;       ///< of the memory now
   };
   /// Changes the file and learns its models anew. `what`: the run, for the history. Once. Throws
   /// FileError; the file is as it was then.

@@ -135,9 +135,10 @@ class MemoryFile {
   /// change itself takes more than 200 MiB.
   void change(const std::function<void()>& changes,
               const std::optional<std::string>& undo = std::nullopt);
-  static constexpr std::size_t max_undo_levels = 100;
+  static constexpr std::size_t max_undo_levels = 100;  ///< Changes that can be taken back.
+  /// What they may take in the file; the newest is kept whatever it takes.
   static constexpr std::uint64_t max_history_bytes = 64U << 20U;
-  static constexpr std::size_t max_history = 1000;
+  static constexpr std::size_t max_history = 1000;  ///< Changes whose description is kept.
   /// The changes that were kept for `undo`, the newest first. Those that were taken back are not in
   /// it.
   [[nodiscard]] std::vector<KeptChange> history() const;
