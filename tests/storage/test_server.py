@@ -18,7 +18,8 @@ SHARED = ("MemoryFileContent.HeadersComeBack:MemoryFileContent.ContentComesBack:
           "MemoryFileContent.Para*:MemoryFileContent.ABad*:MemoryFileContent.Readers*:MemoryFileContent.TwoW*:"
           "MapTables.*:RouteTables.W*:RouteTables.B*:MemoryFileUndo.*:"
           "ViewsOfAMemoryFile.AreThose*:ViewsOfAMemoryFile.See*:MemoryOnServer.*"
-          "-*Tampered*:MemoryFileUndo.Damage*")
+          # What attacks a file, and how many changes a file keeps for undo: a server keeps the last one.
+          "-*Tampered*:MemoryFileUndo.Damage*:MemoryFileUndo.BringsBackAll*:MemoryFileUndo.History*")
 
 
 def run(*words, code=0, **more):
