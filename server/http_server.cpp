@@ -12,7 +12,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cctype>
 #include <cerrno>
 #include <charconv>
 #include <chrono>
@@ -27,6 +26,7 @@
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 
 namespace panonav {
 
@@ -54,12 +54,6 @@ class Handle {
  private:
   int number_;
 };
-
-std::string lower(std::string_view text) {
-  std::string small(text);
-  for (char& c : small) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return small;
-}
 
 std::string_view trimmed(std::string_view text) {
   const std::size_t from = text.find_first_not_of(" \t");
@@ -131,7 +125,7 @@ std::optional<Head> read_head(std::string_view text, std::size_t max_body, int& 
     const std::string_view field = next_line();
     const std::size_t colon = field.find(':');
     if (colon == 0 || colon == std::string_view::npos) return std::nullopt;
-    const std::string name = lower(field.substr(0, colon));
+    const std::string name = lower_case(field.substr(0, colon));
     const std::string_view value = trimmed(field.substr(colon + 1));
     if (name == "host" || name == "origin" || name == "authorization") {
       std::string& kept = name == "host"     ? head.request.host
@@ -150,9 +144,9 @@ std::optional<Head> read_head(std::string_view text, std::size_t max_body, int& 
     } else if (name == "transfer-encoding") {
       status = 501;
       return std::nullopt;
-    } else if (name == "connection" && lower(value) == "close") {
+    } else if (name == "connection" && lower_case(value) == "close") {
       head.keep = false;
-    } else if (name == "expect" && lower(value) == "100-continue") {
+    } else if (name == "expect" && lower_case(value) == "100-continue") {
       head.expected = true;
     }
   }

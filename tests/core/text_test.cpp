@@ -49,6 +49,11 @@ TEST(ShellQuoted, LeavesPlainWordsAndQuotesTheRest) {
   EXPECT_EQ(shell_quoted("it's $HOME"), "'it'\\''s $HOME'");
 }
 
+TEST(LowerCase, ChangesLettersOfAsciiAlone) {
+  EXPECT_EQ(lower_case("View_007.JPG @[`{"), "view_007.jpg @[`{");
+  EXPECT_EQ(lower_case("\xC3\x84"), "\xC3\x84") << "a letter of UTF-8 is not cut";
+}
+
 TEST(ShortNumber, IsAsPeopleWriteIt) {
   EXPECT_EQ(short_number(29.999999999999996), "30");
   EXPECT_EQ(short_number(1.735e-18), "0");

@@ -32,10 +32,8 @@ struct Ros2Arguments {
 };
 
 std::string parameter_name(const ArgumentInfo& info) {
-  std::string name = info.name.substr(info.positional() ? 0 : 2);
-  std::ranges::transform(name, name.begin(), [](char c) {
-    return c == '-' ? '_' : c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  });
+  std::string name = lower_case(info.name.substr(info.positional() ? 0 : 2));
+  std::ranges::replace(name, '-', '_');
   return name;
 }
 

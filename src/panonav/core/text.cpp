@@ -98,6 +98,14 @@ std::string short_number(double value, std::string_view unit, int significant) {
   return text;
 }
 
+std::string lower_case(std::string_view text) {
+  std::string lower(text);
+  for (char& c : lower) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  return lower;
+}
+
 std::string readable_line(std::string_view text) {
   std::string line;
   line.reserve(text.size());

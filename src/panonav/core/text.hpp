@@ -21,6 +21,9 @@ namespace panonav {
 /// characters become spaces, bytes that are not UTF-8 the replacement character U+FFFD.
 [[nodiscard]] std::string readable_line(std::string_view text);
 
+/// The text with small letters of ASCII in place of capital ones; other bytes stay.
+[[nodiscard]] std::string lower_case(std::string_view text);
+
 /// The field as a CSV file needs it: in quotes where it holds a comma, a quote, a `#` or a line
 /// break, is empty or has a blank at an end.
 [[nodiscard]] std::string csv_field(std::string_view text);

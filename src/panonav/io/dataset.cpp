@@ -162,8 +162,7 @@ std::vector<DatasetEntry> read_entries(const fs::path& folder, const fs::path& p
 }
 
 bool is_picture(const fs::path& path) {
-  std::string extension = path.extension().string();
-  for (auto& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const std::string extension = lower_case(path.extension().string());
   return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
 }
 

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <array>
-#include <cctype>
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
@@ -170,8 +169,7 @@ panonav::Image picture_of(const Image& message, const ImageLimits& limits) {
 
 panonav::Image picture_of(const CompressedImage& message, std::string_view name,
                           const ImageLimits& limits) {
-  std::string format = message.format;
-  for (char& c : format) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const std::string format = lower_case(message.format);
   const auto says = [&](std::string_view word) { return format.find(word) != std::string::npos; };
   const bool known = format.empty() || says("jpeg") || says("jpg") || says("png");
   if (!known || says("compresseddepth")) {

@@ -213,9 +213,7 @@ class VideoStore final : public PictureStore {
 }  // namespace
 
 bool is_video(const fs::path& file) {
-  std::string name = file.extension().string();
-  std::ranges::transform(name, name.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string name = lower_case(file.extension().string());
   constexpr std::array<std::string_view, 6> known{".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi"};
   return std::ranges::find(known, name) != known.end();
 }

@@ -1,7 +1,6 @@
 #include "panonav/simulation/load_gazebo.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -139,9 +138,8 @@ std::string well_known_name(std::string_view uri) {
   std::string name(uri.substr(uri.find_last_of('/') + 1));
   for (auto at = name.find("%20"); at != std::string::npos; at = name.find("%20"))
     name.replace(at, 3, "_");
-  for (char& c : name)
-    c = c == ' ' ? '_' : static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return name;
+  std::ranges::replace(name, ' ', '_');
+  return lower_case(name);
 }
 
 // The two models of Gazebo's database that nearly all worlds take from there.

@@ -7,7 +7,6 @@
 #include <assimp/DefaultIOSystem.h>
 #include <algorithm>
 #include <assimp/Importer.hpp>
-#include <cctype>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -30,9 +29,7 @@ Affine3 affine(const aiMatrix4x4& m) {
 }
 
 std::string lower_ending(const fs::path& path) {
-  std::string ending = path.extension().string();
-  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return ending;
+  return lower_case(path.extension().string());
 }
 
 // What turns the importer's axes into z up. It has turned COLLADA files to y up already.

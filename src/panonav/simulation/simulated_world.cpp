@@ -7,13 +7,13 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cerrno>
 #include <csignal>
 #include <fstream>
 #include <functional>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/simulation/load_gazebo.hpp"
@@ -121,9 +121,7 @@ Scene load_scene(const std::string& name, const SceneOptions& options, const Giv
   }
   refuse_variations_of_file(name, given);
   Scene scene;
-  std::string ending = fs::path(name).extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string ending = lower_case(fs::path(name).extension().string());
   if (ending == ".world" || ending == ".sdf") {
     GazeboOptions gazebo;
     gazebo.model_folders = gazebo_model_folders_of_environment();

@@ -2,21 +2,16 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <optional>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 
 namespace panonav {
 
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string lower_case(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
 
 // Slashes of our kind, no scheme.
 std::string plain_path(std::string_view written) {
