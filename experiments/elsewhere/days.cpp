@@ -137,7 +137,7 @@ class LearningRobot {
       signatures.push_back(signature_for(seen[i].panorama, memory_));
       update.add(run_view(odometry.pose(), signatures.back(), answers[i]));
     }
-    MemoryChanges changes = update.finish();
+    RunChanges changes = update.finish();
     use_ = std::move(changes.use);
     auto features = std::make_shared<FeatureMap>(*remembered_->features());
     for (const auto* views : {&changes.replaced, &changes.forgotten}) {

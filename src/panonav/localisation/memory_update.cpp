@@ -236,9 +236,9 @@ bool MemoryUpdate::is_less_useful(ViewId a, ViewId b) const {
   return rank(a) < rank(b);
 }
 
-MemoryChanges MemoryUpdate::finish() {
+RunChanges MemoryUpdate::finish() {
   decide_ready(true);
-  MemoryChanges changes;
+  RunChanges changes;
   changes.certain = certain_;
   changes.matched.assign(matched_.begin(), matched_.end());
   for (const ViewId view : matched_) {
@@ -285,7 +285,7 @@ MemoryChanges MemoryUpdate::finish() {
         {chosen.number, {chosen.pose.x_m, chosen.pose.y_m, chosen.pose.heading_rad}});
   }
   for (const ViewId view : dropped) use_.views.erase(view);
-  std::ranges::sort(changes.added, {}, &MemoryChanges::Added::number);
+  std::ranges::sort(changes.added, {}, &RunChanges::Added::number);
   std::ranges::sort(changes.replaced);
   changes.use = std::move(use_);
   return changes;

@@ -58,7 +58,7 @@ struct RunView {
 };
 
 /// What a run changes in its memory.
-struct MemoryChanges {
+struct RunChanges {
   /// A picture of the run that becomes a view.
   struct Added {
     std::size_t number = 0;  ///< of the picture in the run
@@ -124,7 +124,7 @@ class MemoryUpdate {
   /// certain.
   [[nodiscard]] bool near_known_places() const;
   /// Decides what still waits. Nothing may be added afterwards.
-  [[nodiscard]] MemoryChanges finish();
+  [[nodiscard]] RunChanges finish();
 
  private:
   struct Picture {

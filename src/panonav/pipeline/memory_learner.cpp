@@ -138,7 +138,7 @@ bool MemoryLearner::near_known_places() const {
 
 MemoryLearner::Changes MemoryLearner::finish(const std::string& what) {
   auto& self = *implementation_;
-  MemoryChanges planned = self.update.finish();
+  RunChanges planned = self.update.finish();
   Changes changes{.seen = self.seen, .certain = planned.certain, .views = self.memory.size()};
   if (planned.certain == 0) return changes;
   changes.reinforced = planned.matched.size();
