@@ -42,8 +42,10 @@ void furnish_room_shell(SceneBuilder& builder, const FloorArea& room, double hei
         builder.lamp({from.x_m + middle * (to.x_m - from.x_m) + 0.8 * in_x,
                       from.y_m + middle * (to.y_m - from.y_m) + 0.8 * in_y, middle_z},
                      1.8F, 1.2F);
-        builder.on_wall(name, builder.textured(window_texture(random, 128), 1.0F), from, to, along,
-                        width, random.uniform(0.8, 1.0), std::min(height_m - 0.3, 2.1));
+        const double bottom = random.uniform(0.8, 1.0);
+        const int window = builder.textured(window_texture(random, 128), 1.0F);
+        builder.on_wall(name, window, from, to, along, width, bottom,
+                        std::min(height_m - 0.3, 2.1));
       } else if (i != outer_wall && kind < 0.25) {
         width = std::min(0.9, length - along - 0.1);
         builder.on_wall(name,
@@ -52,9 +54,9 @@ void furnish_room_shell(SceneBuilder& builder, const FloorArea& room, double hei
       } else if (kind < 0.8) {
         width = std::min(random.uniform(0.5, 1.2), length - along - 0.1);
         const double bottom = random.uniform(0.7, 1.3);
-        builder.on_wall(name, builder.textured(poster_texture(random, 128)), from, to, along, width,
-                        bottom,
-                        std::min(height_m - 0.2, bottom + width * random.uniform(0.7, 1.3)));
+        const double top = std::min(height_m - 0.2, bottom + width * random.uniform(0.7, 1.3));
+        const int poster = builder.textured(poster_texture(random, 128));
+        builder.on_wall(name, poster, from, to, along, width, bottom, top);
       } else {
         width = 0.4;
       }
@@ -87,9 +89,10 @@ void add_desk(SceneBuilder& builder, const std::string& name, const Footing& foo
               {0.5, 0.06, 0.34});
   for (int i = 0; i < 3; ++i) {
     const int paper = builder.plain(tint(random, 0.1, 0.95, 0.3));
-    builder.box(name, paper, paper, footing,
-                {random.uniform(-0.6, 0.6), random.uniform(-0.25, 0.25), 0.74},
-                {random.uniform(0.08, 0.3), random.uniform(0.08, 0.3), random.uniform(0.02, 0.3)});
+    const Vector3 size{random.uniform(0.08, 0.3), random.uniform(0.08, 0.3),
+                       random.uniform(0.02, 0.3)};
+    const Vector3 at{random.uniform(-0.6, 0.6), random.uniform(-0.25, 0.25), 0.74};
+    builder.box(name, paper, paper, footing, at, size);
   }
 }
 
@@ -167,9 +170,9 @@ void add_plant(SceneBuilder& builder, const std::string& name, Point2 centre) {
   builder.cylinder(name, pot, centre, 0.0, 0.3, 0.18, 12, 0.7);
   for (int i = 0; i < 9; ++i) {
     const Footing leaf{centre, random.uniform(-3.1, 3.1)};
-    builder.box(name, leaves, leaves, leaf,
-                {random.uniform(0.05, 0.18), 0.0, random.uniform(0.3, 0.7)},
-                {random.uniform(0.1, 0.25), 0.03, random.uniform(0.25, 0.6)});
+    const Vector3 size{random.uniform(0.1, 0.25), 0.03, random.uniform(0.25, 0.6)};
+    const Vector3 at{random.uniform(0.05, 0.18), 0.0, random.uniform(0.3, 0.7)};
+    builder.box(name, leaves, leaves, leaf, at, size);
   }
 }
 
@@ -204,11 +207,11 @@ void add_tree(SceneBuilder& builder, const std::string& name, const TreeKind& ki
   for (int i = 0; i < clumps; ++i) {
     const double share = (i + 0.5) / clumps;
     const double radius = crown * random.uniform(0.22, 0.36) * (1.15 - 0.5 * share);
-    builder.blob(
-        name, kind.leaves,
-        {centre.x_m + random.normal(0.0, 0.12 * crown),
-         centre.y_m + random.normal(0.0, 0.12 * crown), trunk + crown * (0.15 + 0.75 * share)},
-        {radius, radius, radius * random.uniform(0.7, 1.0)}, 0.13);
+    const Vector3 radii{radius, radius, radius * random.uniform(0.7, 1.0)};
+    const Vector3 middle{centre.x_m + random.normal(0.0, 0.12 * crown),
+                         centre.y_m + random.normal(0.0, 0.12 * crown),
+                         trunk + crown * (0.15 + 0.75 * share)};
+    builder.blob(name, kind.leaves, middle, radii, 0.13);
   }
 }
 

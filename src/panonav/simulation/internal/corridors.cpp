@@ -92,8 +92,9 @@ Scene make_loop(const SceneVariation& variation) {
     while (along < distance(from, to) - 0.5) {
       const double width = random.uniform(0.4, 0.9);
       const double bottom = random.uniform(0.5, 1.2);
-      builder.on_wall(wall + " picture", builder.textured(poster_texture(random, 128)), from, to,
-                      along, width, bottom, bottom + width * random.uniform(0.7, 1.2));
+      const double top = bottom + width * random.uniform(0.7, 1.2);
+      const int picture = builder.textured(poster_texture(random, 128));
+      builder.on_wall(wall + " picture", picture, from, to, along, width, bottom, top);
       along += width + random.uniform(0.3, 0.9);
     }
   }
@@ -130,9 +131,12 @@ Scene make_loop(const SceneVariation& variation) {
     const Footing footing = builder.movable({at, turn_rad}, 0.4, inside);
     const std::string name = "furniture " + std::to_string(number++);
     switch (random.index(4)) {
-      case 0:
-        add_shelf(builder, name, footing, random.uniform(0.7, 1.0), random.uniform(1.0, 2.0));
+      case 0: {
+        const double height_m = random.uniform(1.0, 2.0);
+        const double width_m = random.uniform(0.7, 1.0);
+        add_shelf(builder, name, footing, width_m, height_m);
         break;
+      }
       case 1:
         add_cabinet(builder, name, footing);
         break;
@@ -231,9 +235,10 @@ Scene make_corridor(const SceneVariation& variation) {
   // The few distinct places: a window, a notice board and a plant, each on a side of its own.
   builder.on_wall("window", builder.textured(window_texture(random, 128), 0.8F), {-kHalf, -kHalf},
                   {kLong + kHalf, -kHalf}, 11.55, 0.9, 0.9, 2.1);
-  builder.on_wall("notice board", builder.textured(poster_texture(random, 128)),
-                  {kLong + kHalf, kShort + kHalf}, {-kHalf, kShort + kHalf},
-                  random.uniform() < 0.5 ? 1.5 : 11.5, 1.0, 0.8, 1.6);
+  const double along = random.uniform() < 0.5 ? 1.5 : 11.5;
+  const int board = builder.textured(poster_texture(random, 128));
+  builder.on_wall("notice board", board, {kLong + kHalf, kShort + kHalf}, {-kHalf, kShort + kHalf},
+                  along, 1.0, 0.8, 1.6);
   add_plant(builder, "plant", {-kHalf + 0.3, random.uniform(2.0, 6.0)});
   const int shine = builder.plain({0.98F, 0.98F, 0.95F}, 1.0F);
   for (double x = 0.0; x <= kLong + 0.1; x += 2.0) {

@@ -156,27 +156,33 @@ Scene make_garden(const SceneVariation& variation) {
   constexpr double kBox = 0.7;
   for (int i = 0; i < 7; ++i) {
     const Footing wanted{place(kTrunk), 0.0};
-    add_tree(builder, "tree " + std::to_string(i), make_tree_kind(builder),
-             builder.movable(wanted, kTrunk, plot).centre, random.uniform(2.0, 4.5));
+    const double height_m = random.uniform(2.0, 4.5);
+    const TreeKind kind = make_tree_kind(builder);
+    add_tree(builder, "tree " + std::to_string(i), kind,
+             builder.movable(wanted, kTrunk, plot).centre, height_m);
   }
   for (int i = 0; i < 5; ++i) {
     const Footing wanted{place(kBox), random.uniform(-3.0, 3.0)};
     add_crate(builder, "flower box " + std::to_string(i), builder.movable(wanted, kBox, plot),
               {random.uniform(0.4, 1.2), random.uniform(0.3, 0.6), random.uniform(0.3, 0.8)});
   }
-  add_house(builder, "house", {{random.uniform(2.0, 10.0), 18.0}, random.uniform(-0.2, 0.2)},
-            {9.0, 6.0, 3.2}, tint(random, 0.4, 0.8, 0.2), {0.5F, 0.25F, 0.2F});
-  add_house(builder, "shed", {{-5.0, random.uniform(2.0, 8.0)}, random.uniform(1.2, 1.9)},
-            {3.0, 2.2, 2.0}, builder.palette().wood, tint(random, 0.15, 0.4, 0.2));
+  const Colour plaster = tint(random, 0.4, 0.8, 0.2);
+  const Footing house{{random.uniform(2.0, 10.0), 18.0}, random.uniform(-0.2, 0.2)};
+  add_house(builder, "house", house, {9.0, 6.0, 3.2}, plaster, {0.5F, 0.25F, 0.2F});
+  const Colour tar = tint(random, 0.15, 0.4, 0.2);
+  const Footing shed{{-5.0, random.uniform(2.0, 8.0)}, random.uniform(1.2, 1.9)};
+  add_house(builder, "shed", shed, {3.0, 2.2, 2.0}, builder.palette().wood, tar);
   // Far trees, of a few kinds, make the horizon.
   std::array<TreeKind, 6> kinds;
   for (TreeKind& kind : kinds) kind = make_tree_kind(builder);
   for (int i = 0; i < 60; ++i) {
     const double angle = 2.0 * std::numbers::pi * (i + random.uniform(-0.5, 0.5)) / 60.0;
     const double radius = random.uniform(25.0, 90.0);
-    add_tree(builder, "far tree " + std::to_string(i), kinds[random.index(kinds.size())],
+    const double height_m = random.uniform(4.0, 12.0);
+    const TreeKind& kind = kinds[random.index(kinds.size())];
+    add_tree(builder, "far tree " + std::to_string(i), kind,
              {middle.x_m + radius * std::cos(angle), middle.y_m + radius * std::sin(angle)},
-             random.uniform(4.0, 12.0));
+             height_m);
   }
   return builder.finish();
 }
@@ -226,9 +232,9 @@ Scene make_arena(const SceneVariation& variation) {
         const Footing place{{footing.centre.x_m + side * std::cos(footing.turn_rad),
                              footing.centre.y_m + side * std::sin(footing.turn_rad)},
                             footing.turn_rad};
-        add_house(builder, "house " + std::to_string(number++), place,
-                  {length, random.uniform(0.09, 0.14), random.uniform(0.1, 0.17)},
-                  alike(random, paint), tiles);
+        const Colour plaster = alike(random, paint);
+        const Vector3 size{length, random.uniform(0.09, 0.14), random.uniform(0.1, 0.17)};
+        add_house(builder, "house " + std::to_string(number++), place, size, plaster, tiles);
         if (!pair) break;
       }
     }

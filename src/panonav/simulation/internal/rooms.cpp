@@ -160,9 +160,10 @@ Scene make_hall(const SceneVariation& variation, bool periodic) {
   }
   // Every wall carries the same picture and pillar every 2 m; one clock and one door tell the walls
   // apart.
-  builder.floor(builder.textured(brick_texture(random, 128, 2, 2, tint(random, 0.3, 0.6, 0.1),
-                                               tint(random, 0.1, 0.4, 0.1))),
-                room.low, room.high, 1.0);
+  const Colour joint = tint(random, 0.1, 0.4, 0.1);
+  const Colour tile = tint(random, 0.3, 0.6, 0.1);
+  builder.floor(builder.textured(brick_texture(random, 128, 2, 2, tile, joint)), room.low,
+                room.high, 1.0);
   builder.ceiling(builder.plain({0.85F, 0.85F, 0.83F}), room.low, room.high, kHeight, 1.0);
   const int plaster =
       builder.textured(noise_texture(random, 128, tint(random, 0.45, 0.8, 0.1), 0.05));
