@@ -481,9 +481,9 @@ struct LocalisationServer::Implementation {
                                       10 * (Clock::now() - from)));
           if (options.note) {
             options.note(name + ": " +
-                         (again ? "the file was changed; " +
+                         (again ? "the memory was changed; " +
                                       std::to_string(again->recogniser.memory().size()) + " views"
-                                : "the file was changed and cannot be read; the memory stays as "
+                                : "the memory was changed and cannot be read; the memory stays as "
                                   "it was: " +
                                       fault));
           }

@@ -95,12 +95,12 @@ struct MemoryFileInfo {
 
 /// A visual memory on disk: an SQLite file (docs/formats.md), or with the address of a server
 /// (memory_address.hpp) the same on PostgreSQL (docs/scale.md), where `path` is the address without
-/// a password and a lost connection is a FileError. What a changing member function
-/// returned for is still there after the process is killed or the machine loses its power. One
-/// process writes at a time, any number read beside it, each seeing a state between two changes. A
-/// damaged or foreign file or one of a newer version is refused and never changed. One object
-/// belongs to one thread at a time. All member functions throw FileError; those that change
-/// something leave the file as it was when they throw.
+/// a password and a lost connection is a FileError. What a changing member function returned for is
+/// still there after the process is killed or the machine loses its power. One process writes at a
+/// time, any number read beside it, each seeing a state between two changes. A damaged or foreign
+/// file or one of a newer version is refused and never changed; the first change of one of an older
+/// version gives it the newest. One object belongs to one thread at a time. All member functions
+/// throw FileError; those that change something leave the file as it was when they throw.
 class MemoryFile {
  public:
   /// Makes an empty memory file, whole or not at all. Throws FileError when something is at `path`
@@ -186,9 +186,8 @@ class MemoryFile {
   /// What `set_parameter` stored under the name; empty where there is nothing.
   [[nodiscard]] std::optional<std::string> parameter(std::string_view name) const;
 
-  /// Keeps a map under a name, instead of the one that had it. The first map gives the file format
-  /// version 3. Throws ContractError on an empty name, a view that is not in the file, and as
-  /// `validate`.
+  /// Keeps a map under a name, instead of the one that had it. Throws ContractError on
+  /// an empty name, a view that is not in the file, and as `validate`.
   void save_map(std::string_view name, const TopologicalMap& map);
   /// The same bits; empty when there is no such map.
   [[nodiscard]] std::optional<TopologicalMap> map(std::string_view name) const;
@@ -199,7 +198,7 @@ class MemoryFile {
 
   /// Adds lines to the route of that name, which is made where there is none; all of them or none.
   /// Returns how many were added: the first ones are left out while they lie within a millimetre of
-  /// the last line there. The first route gives the file format version 4. Throws ContractError on
+  /// the last line there. Throws ContractError on
   /// an empty name, no lines, and another number of columns than the route has. Cost: that of the
   /// lines and at most 256 more.
   std::size_t append_route(std::string_view name, const RoutePanorama& more);
