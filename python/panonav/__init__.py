@@ -11,3 +11,8 @@ is a ValueError for values and an OSError for files. Results have `to_dict()`, o
 """
 from ._core import *  # noqa: F403
 from ._core import __version__
+
+#: Names of the models that `Camera` has.
+camera_models: tuple
+#: Names of the scenes that come with `SimulatedWorld`.
+scenes: tuple

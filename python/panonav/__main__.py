@@ -6,6 +6,7 @@ import sys
 
 
 def main() -> None:
+    """Becomes the command, with the same arguments; ends with one line where there is none."""
     beside = pathlib.Path(__file__).with_name("panonav")
     command = beside if beside.exists() else shutil.which("panonav")
     if command is None:

@@ -445,20 +445,24 @@ void bind_basics(py::module_& m) {
                          "Position and heading in the plane: x forward, y left, heading "
                          "counter-clockwise; a tuple of three numbers counts as one.");
   pose.def(py::init<double, double, double>(), py::arg("x_m") = 0.0, py::arg("y_m") = 0.0,
-           py::arg("heading_rad") = 0.0)
+           py::arg("heading_rad") = 0.0, "Lengths in metres, heading in radians.")
       .def(py::init([](const std::tuple<double, double, double>& numbers) {
-        return std::make_from_tuple<Pose2>(numbers);
-      }))
-      .def_readonly("x_m", &Pose2::x_m)
-      .def_readonly("y_m", &Pose2::y_m)
-      .def_readonly("heading_rad", &Pose2::heading_rad)
-      .def("inverse", [](const Pose2& p) { return inverse(p); })
+             return std::make_from_tuple<Pose2>(numbers);
+           }),
+           "Of (x_m, y_m, heading_rad).")
+      .def_readonly("x_m", &Pose2::x_m, "Position along the frame's x axis.")
+      .def_readonly("y_m", &Pose2::y_m, "Position along its y axis.")
+      .def_readonly("heading_rad", &Pose2::heading_rad,
+                    "In [-pi, pi) for every pose that panonav makes.")
+      .def(
+          "inverse", [](const Pose2& p) { return inverse(p); },
+          "Of the pose of b in the frame of a: the pose of a in the frame of b.")
       .def("__mul__", [](const Pose2& a, const Pose2& b) { return a * b; })
       .def("__eq__", [](const Pose2& a, const Pose2& b) { return a == b; })
       .def("__iter__",
            [](const Pose2& p) { return py::iter(py::make_tuple(p.x_m, p.y_m, p.heading_rad)); })
       .def("__len__", [](const Pose2&) { return 3; })
-      .def("to_dict", &record_to_dict)
+      .def("to_dict", &record_to_dict, "All fields.")
       .def("__repr__", &record_text);
   pose.attr("_fields") = py::make_tuple("x_m", "y_m", "heading_rad");
   pose.attr("__hash__") = py::none();
@@ -470,21 +474,25 @@ void bind_basics(py::module_& m) {
                                       "A tuple of two or three values counts as one.");
   reference
       .def(py::init<double, double, std::optional<double>>(), py::arg("x_m"), py::arg("y_m"),
-           py::arg("heading_rad") = py::none())
+           py::arg("heading_rad") = py::none(), "Lengths in metres, heading in radians.")
       .def(py::init([](const std::pair<double, double>& p) {
-        return ReferencePose{p.first, p.second, std::nullopt};
-      }))
+             return ReferencePose{p.first, p.second, std::nullopt};
+           }),
+           "Of (x_m, y_m); the heading is unknown.")
       .def(py::init([](const std::tuple<double, double, std::optional<double>>& numbers) {
-        return std::make_from_tuple<ReferencePose>(numbers);
-      }))
+             return std::make_from_tuple<ReferencePose>(numbers);
+           }),
+           "Of (x_m, y_m, heading_rad).")
       .def(py::init([](const Pose2& p) {
-        return ReferencePose{p.x_m, p.y_m, p.heading_rad};
-      }))
-      .def_readonly("x_m", &ReferencePose::x_m)
-      .def_readonly("y_m", &ReferencePose::y_m)
-      .def_readonly("heading_rad", &ReferencePose::heading_rad)
+             return ReferencePose{p.x_m, p.y_m, p.heading_rad};
+           }),
+           "Of a Pose2.")
+      .def_readonly("x_m", &ReferencePose::x_m, "In the frame of the memory's positions.")
+      .def_readonly("y_m", &ReferencePose::y_m, "In the frame of the memory's positions.")
+      .def_readonly("heading_rad", &ReferencePose::heading_rad,
+                    "In the same frame, in [-pi, pi); None: unknown.")
       .def("__eq__", [](const ReferencePose& a, const ReferencePose& b) { return a == b; })
-      .def("to_dict", &record_to_dict)
+      .def("to_dict", &record_to_dict, "All fields.")
       .def("__repr__", &record_text);
   reference.attr("_fields") = py::make_tuple("x_m", "y_m", "heading_rad");
   reference.attr("__hash__") = py::none();

@@ -45,7 +45,7 @@ void bind_mirrors(py::module_& m) {
   Record<FoundCircle>(m, "FoundCircle", "A circle found in an image.")
       .field(
           "centre", [](const FoundCircle& c) { return pixel(c.centre); }, "(u, v)")
-      .field("radius_px", &FoundCircle::radius_px, "")
+      .field("radius_px", &FoundCircle::radius_px, "Of the circle, > 0.")
       .field("quality", &FoundCircle::quality, "Part of the circumference with an edge, 0 to 1.")
       .field("residual_px", &FoundCircle::residual_px, "Of the edge points, across the circle.");
   Record<MirrorCircle>(m, "MirrorCircle", "Where a mirror lies in the pictures of its camera.")
@@ -112,7 +112,8 @@ void bind_mirrors(py::module_& m) {
 void bind_calibration(py::module_& m) {
   bind_mirrors(m);
   Record<DualFisheyeCalibration>(m, "DualFisheyeCalibration", "Two lenses, as they were found.")
-      .field("camera", &DualFisheyeCalibration::camera, "")
+      .field("camera", &DualFisheyeCalibration::camera,
+             "Of the model 'dual-fisheye'; its axis of turns is the vertical.")
       .field("matches", &DualFisheyeCalibration::matches, "Points found twice, no outliers.")
       .field("inlier_share", &DualFisheyeCalibration::inlier_share,
              "Of the textured places looked at; some 0.1 by chance.")

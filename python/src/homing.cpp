@@ -28,9 +28,11 @@ void bind_vectors(py::module_& m) {
       .field("length", &HomeVector::length, "In units of R.")
       .field("direction_rad", &HomeVector::direction_rad, "In the current robot frame.");
   Record<ChanceMatch>(m, "ChanceMatch", "How well two views match, beside noise.")
-      .field("match", &ChanceMatch::match, "")
-      .field("chance", &ChanceMatch::chance, "")
-      .field("deviation", &ChanceMatch::deviation, "")
+      .field("match", &ChanceMatch::match,
+             "Sum of the correlations of the home vectors there and back, -2 to 2.")
+      .field("chance", &ChanceMatch::chance,
+             "Mean of the same over noise with the spectrum of the current view.")
+      .field("deviation", &ChanceMatch::deviation, "Standard deviation of that.")
       .field("beyond_chance", &ChanceMatch::beyond_chance, "The views have something in common.")
       .field("direction_probability", &ChanceMatch::direction_probability,
              "That the home vector points home within 45 degrees.");
@@ -42,15 +44,18 @@ void bind_vectors(py::module_& m) {
       .field("disagreement_rad", &PhaseReading::disagreement_rad, "Of the two directions.")
       .field("turn_disagreement_rad", &PhaseReading::turn_disagreement_rad, "Of the two turns.")
       .field("points", &PhaseReading::points, "False for pictures of one place.")
-      .field("residual", &PhaseReading::residual, "");
+      .field("residual", &PhaseReading::residual,
+             "Share of the energy of both views that is left unexplained, 0 to 1.");
   py::class_<HomingView>(m, "HomingView", "A view as homing needs it.")
       .def(py::init([](const FourierSignature& signature, bool horizon) {
              return horizon ? horizon_view(signature) : homing_view(signature);
            }),
            py::arg("signature"), py::arg("horizon") = false,
            "All rows of a signature, or their mean near the horizon.")
-      .def_property_readonly("rows", &HomingView::rows)
-      .def_property_readonly("components", &HomingView::components);
+      .def_property_readonly("rows", &HomingView::rows,
+                             "Number of rows, from the highest elevation to the lowest.")
+      .def_property_readonly("components", &HomingView::components,
+                             "Number of frequencies, from 0 on.");
   const std::string options = with_options("", {options_of<FourierHomingOptions>()});
   m.def(
       "home_vector",
@@ -143,10 +148,11 @@ void bind_catchment(py::module_& m) {
           "distance_m", [](const CatchmentBin& b) { return b.homeward.distance_m; },
           "Middle of the range.")
       .field(
-          "pairs", [](const CatchmentBin& b) { return b.homeward.pairs; }, "")
+          "pairs", [](const CatchmentBin& b) { return b.homeward.pairs; },
+          "Of a place and a home in the range.")
       .field(
           "homeward_component", [](const CatchmentBin& b) { return b.homeward.component; },
-          "Mean cosine between home vector and true direction.")
+          "Mean cosine between home vector and true direction; nan without pairs.")
       .field("orientation_error_rad", &CatchmentBin::orientation_error_rad,
              "Circular standard deviation.");
   Record<NamedSurvey>(m, "CatchmentSurvey", "From how far the views of a recording lead home.")
@@ -167,7 +173,7 @@ void bind_catchment(py::module_& m) {
       .field("orientation_error_rad", &NamedSurvey::orientation_error_rad,
              "Circular standard deviation.")
       .field("bins", &NamedSurvey::bins, "By distance.")
-      .field("accepted_m", &NamedSurvey::accepted_m, "")
+      .field("accepted_m", &NamedSurvey::accepted_m, "Distances of `areas`: 0 to 5 spacings.")
       .field("areas", &NamedSurvey::areas,
              "Mean number of places from which runs end so near, for each of accepted_m.")
       .field(

@@ -30,14 +30,14 @@ void bind_places(py::module_& m) {
              "Local features that agree; None where they do not decide.")
       .field("heading_rad", &PlaceMatch::heading_rad, "Of the robot relative to this view.");
   Record<PlacePosition>(m, "PlacePosition", "A position and how far off it may be.")
-      .field("x_m", &PlacePosition::x_m, "")
-      .field("y_m", &PlacePosition::y_m, "")
+      .field("x_m", &PlacePosition::x_m, "Along the x axis of the frame of the memory's positions.")
+      .field("y_m", &PlacePosition::y_m, "Along its y axis.")
       .field("radius_m", &PlacePosition::radius_m,
              "The true position lies within it in 95 % of the cases.");
   Record<Circle>(m, "Circle", "A circle.")
       .field(
           "centre", [](const Circle& c) { return c.centre; }, "(x_m, y_m)")
-      .field("radius_m", &Circle::radius_m, "");
+      .field("radius_m", &Circle::radius_m, "0 for one point.");
   Record<LocalisationLevel>(m, "LocalisationLevel",
                             "The area where the robot may be after some components.")
       .field("components", &LocalisationLevel::components, "Compared.")
@@ -225,16 +225,17 @@ std::vector<NamedEstimate> track_recording(Tracker& tracker, Dataset run, std::s
 
 void bind_tracker(py::module_& m) {
   Record<PoseMode>(m, "PoseMode", "Particles that lie together.")
-      .field("weight", &PoseMode::weight, "")
-      .field("mean", &PoseMode::mean, "")
+      .field("weight", &PoseMode::weight, "Sum over its particles.")
+      .field("mean", &PoseMode::mean, "Weighted; the heading is the circular mean.")
       .field(
           "covariance",
           [](const PoseMode& mode) {
             return py::array_t<double>({3, 3}, mode.covariance.data());
           },
           "(3, 3) of x, y in m and heading in rad.")
-      .field("spread_m", &PoseMode::spread_m, "")
-      .field("heading_spread_rad", &PoseMode::heading_spread_rad, "");
+      .field("spread_m", &PoseMode::spread_m,
+             "Root mean square distance of the particles from the mean.")
+      .field("heading_spread_rad", &PoseMode::heading_spread_rad, "The same of the headings.");
   Record<NamedEstimate>(m, "MonteCarloEstimate", "Where a tracked robot is.")
       .field("name", &NamedEstimate::name, "Of the picture, where it has one.")
       .field(
@@ -244,13 +245,20 @@ void bind_tracker(py::module_& m) {
       .field("inside", &NamedEstimate::inside, "Belief that the robot is in the memorised area.")
       .field("probability", &NamedEstimate::probability, "That it is at the heaviest mode.")
       .field("modes", &NamedEstimate::modes, "Heaviest first.")
-      .field("spread_m", &NamedEstimate::spread_m, "")
-      .field("particles", &NamedEstimate::particles, "")
-      .field("effective_particles", &NamedEstimate::effective_particles, "")
-      .field("resampled", &NamedEstimate::resampled, "")
-      .field("injected", &NamedEstimate::injected, "")
-      .field("difference_here", &NamedEstimate::difference_here, "")
-      .field("difference_anywhere", &NamedEstimate::difference_anywhere, "");
+      .field("spread_m", &NamedEstimate::spread_m,
+             "Root mean square distance of all particles from their mean.")
+      .field("particles", &NamedEstimate::particles,
+             "Number of them; as many as KLD sampling asks for.")
+      .field("effective_particles", &NamedEstimate::effective_particles,
+             "Effective number of them, before resampling.")
+      .field("resampled", &NamedEstimate::resampled,
+             "Whether light particles were replaced by heavy ones.")
+      .field("injected", &NamedEstimate::injected, "Particles that were replaced by new ones.")
+      .field("difference_here", &NamedEstimate::difference_here,
+             "Least column difference (0: equal, above about 0.6: unrelated) from the views near "
+             "the particles, or None.")
+      .field("difference_anywhere", &NamedEstimate::difference_anywhere,
+             "The same from views anywhere, or None.");
   using SharedTracker = Shared<Tracker>;
   py::class_<SharedTracker>(
       m, "Tracker",
@@ -304,7 +312,9 @@ void bind_tracker(py::module_& m) {
             tracker.change(
                 [&](Tracker& t) { t.start_at(pose, deviation_m, heading_deviation_rad); });
           },
-          py::arg("pose"), py::arg("deviation_m"), py::arg("heading_deviation_rad"))
+          py::arg("pose"), py::arg("deviation_m"), py::arg("heading_deviation_rad"),
+          "Around a known pose in the frame of the memory's positions; deviations of each "
+          "coordinate, >= 0.")
       .def(
           "track",
           [](SharedTracker& tracker, const py::object& recording, int every, int threads) {

@@ -51,26 +51,27 @@ MappedRun make_map(const Dataset& recording, const std::filesystem::path& path,
 
 void bind_maps(py::module_& m) {
   Record<MapNode>(m, "MapNode", "A node of a map: a view and its pose.")
-      .field("view", &MapNode::view, "")
+      .field("view", &MapNode::view, "Its id in the memory.")
       .field("pose", &MapNode::pose, "In the frame of its connected component.")
-      .field("component", &MapNode::component, "");
+      .field("component", &MapNode::component,
+             "Number of its connected component; components have no common frame.");
   Record<MapEdge>(m, "MapEdge", "Two nodes and the motion between them.")
-      .field("a", &MapEdge::a, "")
-      .field("b", &MapEdge::b, "")
-      .field("a_from_b", &MapEdge::a_from_b, "")
+      .field("a", &MapEdge::a, "One node, by its view.")
+      .field("b", &MapEdge::b, "The other.")
+      .field("a_from_b", &MapEdge::a_from_b, "Pose of b in the frame of a.")
       .field(
           "kind", [](const MapEdge& e) { return link_names[static_cast<std::size_t>(e.kind)]; },
           "'sequence', 'neighbour' or 'closure'.")
       .field("weight", &MapEdge::weight, "Small where the rest of the map contradicts.");
   Record<TopologicalMap>(m, "TopologicalMap", "A map of places with closed loops.")
       .field("nodes", &TopologicalMap::nodes, "Ascending by view.")
-      .field("edges", &TopologicalMap::edges, "")
+      .field("edges", &TopologicalMap::edges, "Each joins two nodes of the map.")
       .type()
       .def(
           "poses", [](const TopologicalMap& map) { return poses_of(map.nodes); },
           "(n, 3) of x_m, y_m, heading_rad, a row a node.");
   Record<MappedRun>(m, "MappedRun", "What a Mapper made of its observations.")
-      .field("map", &MappedRun::map, "")
+      .field("map", &MappedRun::map, "All nodes and edges.")
       .field("observations", &MappedRun::observations, "By node: its number, from 0.")
       .field("skipped", &MappedRun::skipped, "Observations that differed too little.")
       .field("scale_m", &MappedRun::scale_m, "Metres for a unit of length of the views.")
@@ -126,28 +127,32 @@ void bind_maps(py::module_& m) {
 
 void bind_lattices(py::module_& m) {
   Record<LatticeNode>(m, "LatticeNode", "A view in an arrangement.")
-      .field("view", &LatticeNode::view, "")
+      .field("view", &LatticeNode::view, "Its id in the memory.")
       .field("pose", &LatticeNode::pose, "In its component's frame.")
-      .field("component", &LatticeNode::component, "");
+      .field("component", &LatticeNode::component, "Index of its connected component.");
   Record<LatticeSpring>(m, "LatticeSpring", "What two views say of where they lie.")
       .field("a", &LatticeSpring::a, "Number of a node.")
-      .field("b", &LatticeSpring::b, "")
-      .field("dissimilarity", &LatticeSpring::dissimilarity, "")
+      .field("b", &LatticeSpring::b, "Number of the other, larger than a.")
+      .field("dissimilarity", &LatticeSpring::dissimilarity,
+             "Of the two views, over the components asked for.")
       .field("length", &LatticeSpring::length, "Rest length.")
-      .field("stiffness", &LatticeSpring::stiffness, "")
+      .field("stiffness", &LatticeSpring::stiffness, "K of [M04 eq. 5].")
       .field("weight", &LatticeSpring::weight, "Near 0: an outlier.");
   Record<LatticeComponent>(m, "LatticeComponent", "Views that springs join.")
-      .field("views", &LatticeComponent::views, "")
+      .field("views", &LatticeComponent::views, "Number of its nodes.")
       .field("handedness_known", &LatticeComponent::handedness_known,
              "False: it may be the mirror image.");
   Record<Lattice>(m, "Lattice", "Views with the poses that their springs give them.")
       .field("nodes", &Lattice::nodes, "One for each view, in its order.")
-      .field("springs", &Lattice::springs, "")
+      .field("springs", &Lattice::springs, "Ascending (a, b).")
       .field("components", &Lattice::components, "The largest first.")
-      .field("candidates", &Lattice::candidates, "")
+      .field("candidates", &Lattice::candidates,
+             "Pairs of views whose relative pose or dissimilarity was read; those that are no "
+             "springs were rejected.")
       .field("metric", &Lattice::metric, "Lengths are metres.")
-      .field("iterations", &Lattice::iterations, "")
-      .field("energy", &Lattice::energy, "")
+      .field("iterations", &Lattice::iterations, "Of the solver, over all rounds.")
+      .field("energy", &Lattice::energy,
+             "Sum over springs of weight times squared strain in deviations.")
       .type()
       .def(
           "poses", [](const Lattice& lattice) { return poses_of(lattice.nodes); },
@@ -193,7 +198,8 @@ void bind_lattices(py::module_& m) {
 
 void bind_merging(py::module_& m) {
   Record<SessionAlignment>(m, "SessionAlignment", "How the maps of two sessions lie to each other.")
-      .field("first_from_second", &SessionAlignment::first_from_second, "")
+      .field("first_from_second", &SessionAlignment::first_from_second,
+             "Takes a pose of the second map into the frame of the first.")
       .field("places", &SessionAlignment::places, "That lead to this frame.")
       .field("other_places", &SessionAlignment::other_places, "That lead to the next best.")
       .field("expected_places", &SessionAlignment::expected_places,

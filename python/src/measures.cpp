@@ -40,8 +40,9 @@ Trajectory trajectory_of(const Rows& rows) {
 
 void bind_measures(py::module_& m) {
   Record<Alignment>(m, "Alignment", "to = scale R(rotation) from + translation.")
-      .field("scale", &Alignment::scale, "")
-      .field("rotation_rad", &Alignment::rotation_rad, "")
+      .field("scale", &Alignment::scale,
+             "Metres of `to` for each unit of `from`; 1 unless the scale was free.")
+      .field("rotation_rad", &Alignment::rotation_rad, "Counter-clockwise, in [-pi, pi].")
       .field(
           "translation", [](const Alignment& a) { return a.translation; }, "(x_m, y_m)")
       .field("reflected", &Alignment::reflected, "A mirror image (y -> -y) comes first.")
@@ -51,22 +52,25 @@ void bind_measures(py::module_& m) {
       .field("with_reflection", &ShapeDifference::with_reflection,
              "When a mirror image is allowed.");
   Record<ErrorSummary>(m, "ErrorSummary", "Statistics of errors.")
-      .field("rms", &ErrorSummary::rms, "")
-      .field("mean", &ErrorSummary::mean, "")
-      .field("median", &ErrorSummary::median, "")
+      .field("rms", &ErrorSummary::rms, "Root mean square.")
+      .field("mean", &ErrorSummary::mean, "Arithmetic mean.")
+      .field("median", &ErrorSummary::median, "Half of the errors are at most this.")
       .field("p95", &ErrorSummary::p95, "95 % are at most this.")
-      .field("largest", &ErrorSummary::largest, "");
+      .field("largest", &ErrorSummary::largest, "The greatest error of all.");
   Record<TrajectoryError>(m, "TrajectoryError",
                           "How far an estimated trajectory is from the truth: ATE and RPE.")
       .field("pairs", &TrajectoryError::pairs, "Estimates with a true pose at their stamp.")
       .field("left_out", &TrajectoryError::left_out, "Estimates without one.")
-      .field("ground_truth_from_estimate", &TrajectoryError::ground_truth_from_estimate, "")
+      .field("ground_truth_from_estimate", &TrajectoryError::ground_truth_from_estimate,
+             "Identity without `align`; its rms_m is that of position_m.")
       .field("position_m", &TrajectoryError::position_m, "ATE, after alignment.")
       .field("heading_rad", &TrajectoryError::heading_rad, "After alignment.")
-      .field("relative_pairs", &TrajectoryError::relative_pairs, "")
+      .field("relative_pairs", &TrajectoryError::relative_pairs,
+             "0: the path is shorter than relative_distance_m.")
       .field("relative_position_m", &TrajectoryError::relative_position_m,
              "RPE over relative_distance_m.")
-      .field("relative_heading_rad", &TrajectoryError::relative_heading_rad, "");
+      .field("relative_heading_rad", &TrajectoryError::relative_heading_rad,
+             "Error of the turn over relative_distance_m, absolute.");
   m.def(
       "align",
       [](const py::object& from, const py::object& to, bool allow_scale, bool allow_reflection) {

@@ -117,14 +117,18 @@ void bind_visual_memory(py::module_& m) {
             return s.read([](const VisualMemory& memory) { return memory.shape(); });
           },
           "(rows, components)")
-      .def_property_readonly("full_scale",
-                             [](const SharedMemory& s) {
-                               return s.read([](const VisualMemory& v) { return v.full_scale(); });
-                             })
-      .def_property_readonly("elevations",
-                             [](const SharedMemory& s) {
-                               return s.read([](const VisualMemory& v) { return v.elevations(); });
-                             })
+      .def_property_readonly(
+          "full_scale",
+          [](const SharedMemory& s) {
+            return s.read([](const VisualMemory& v) { return v.full_scale(); });
+          },
+          "The magnitude that is packed as 255.")
+      .def_property_readonly(
+          "elevations",
+          [](const SharedMemory& s) {
+            return s.read([](const VisualMemory& v) { return v.elevations(); });
+          },
+          "(bottom, top) of the signatures' rows in radians; None: unknown.")
       .def("__len__",
            [](const SharedMemory& s) {
              return s.read([](const VisualMemory& v) { return v.size(); });
@@ -151,7 +155,7 @@ void bind_visual_memory(py::module_& m) {
       .def(
           "remove",
           [](SharedMemory& s, ViewId view) { s.change([&](VisualMemory& v) { v.remove(view); }); },
-          py::arg("view"))
+          py::arg("view"), "Also drops the links of the view.")
       .def_property_readonly(
           "views",
           [](const SharedMemory& s) {
@@ -171,25 +175,27 @@ void bind_visual_memory(py::module_& m) {
           [](const SharedMemory& s, ViewId view) {
             return s.read([&](const VisualMemory& v) { return v.info(view); });
           },
-          py::arg("view"))
+          py::arg("view"), "Name, pose and stamp of a view.")
       .def(
           "set_pose",
           [](SharedMemory& s, ViewId view, const std::optional<ReferencePose>& pose) {
             s.change([&](VisualMemory& v) { v.set_pose(view, pose); });
           },
-          py::arg("view"), py::arg("pose"))
+          py::arg("view"), py::arg("pose"),
+          "Replaces what is known of the pose; None: it is unknown.")
       .def(
           "packed",
           [](const SharedMemory& s, ViewId view) {
             return s.read([&](const VisualMemory& v) { return v.packed(view); });
           },
-          py::arg("view"))
+          py::arg("view"), "A copy of the view's bytes.")
       .def(
           "signature",
           [](const SharedMemory& s, ViewId view) {
             return s.read([&](const VisualMemory& v) { return v.signature(view); });
           },
-          py::arg("view"))
+          py::arg("view"),
+          "Magnitudes and phases as real numbers, to the precision of the packed form.")
       .def("poses", &poses_of, "(n, 3) of x_m, y_m, heading_rad by ascending id; nan: unknown.")
       .def(
           "link",
@@ -197,19 +203,25 @@ void bind_visual_memory(py::module_& m) {
             const Link link{a, b, link_kind(kind)};
             s.change([&](VisualMemory& v) { v.link(link); });
           },
-          py::arg("a"), py::arg("b"), py::arg("kind") = "sequence")
+          py::arg("a"), py::arg("b"), py::arg("kind") = "sequence",
+          "Links two different views; replaces the link that they have. `kind`: 'sequence', "
+          "'neighbour' or 'closure'.")
       .def(
           "unlink",
           [](SharedMemory& s, ViewId a, ViewId b) {
             s.change([&](VisualMemory& v) { v.unlink(a, b); });
           },
-          py::arg("a"), py::arg("b"))
-      .def_property_readonly("links",
-                             [](const SharedMemory& s) {
-                               return s.read([](const VisualMemory& v) {
-                                 return std::vector<Link>(v.links().begin(), v.links().end());
-                               });
-                             })
+          py::arg("a"), py::arg("b"),
+          "Drops the link of the two views, in whichever order; nothing happens where there is "
+          "none.")
+      .def_property_readonly(
+          "links",
+          [](const SharedMemory& s) {
+            return s.read([](const VisualMemory& v) {
+              return std::vector<Link>(v.links().begin(), v.links().end());
+            });
+          },
+          "All links, each once.")
       .def(
           "search", &search, py::arg("query"), py::arg("top") = 10, py::arg("components") = 0,
           py::arg("excluded_views") = std::vector<ViewId>{},
@@ -226,17 +238,19 @@ void bind_visual_memory(py::module_& m) {
 
 void bind_memory_file(py::module_& m) {
   Record<MemoryFileInfo>(m, "MemoryFileInfo", "Counts and sizes of a memory file.")
-      .field("views", &MemoryFileInfo::views, "")
-      .field("views_with_position", &MemoryFileInfo::views_with_position, "")
-      .field("views_with_heading", &MemoryFileInfo::views_with_heading, "")
-      .field("links", &MemoryFileInfo::links, "")
-      .field("thumbnails", &MemoryFileInfo::thumbnails, "")
-      .field("views_with_features", &MemoryFileInfo::views_with_features, "")
-      .field("feature_bytes", &MemoryFileInfo::feature_bytes, "")
-      .field("maps", &MemoryFileInfo::maps, "")
-      .field("routes", &MemoryFileInfo::routes, "")
-      .field("file_bytes", &MemoryFileInfo::file_bytes, "")
-      .field("format_version", &MemoryFileInfo::format_version, "");
+      .field("views", &MemoryFileInfo::views, "Reference views.")
+      .field("views_with_position", &MemoryFileInfo::views_with_position, "Of these, with x and y.")
+      .field("views_with_heading", &MemoryFileInfo::views_with_heading, "Of these, with a heading.")
+      .field("links", &MemoryFileInfo::links, "Between two views.")
+      .field("thumbnails", &MemoryFileInfo::thumbnails, "Views stored with a picture file.")
+      .field("views_with_features", &MemoryFileInfo::views_with_features,
+             "Views stored with local features.")
+      .field("feature_bytes", &MemoryFileInfo::feature_bytes, "Packed local features of all views.")
+      .field("maps", &MemoryFileInfo::maps, "Kept by name.")
+      .field("routes", &MemoryFileInfo::routes, "Kept by name.")
+      .field("file_bytes", &MemoryFileInfo::file_bytes,
+             "With what is still in the write-ahead log.")
+      .field("format_version", &MemoryFileInfo::format_version, "Of the file, >= 1.");
   Record<MemoryFault>(m, "MemoryFault", "What is wrong in a memory file.")
       .field("view", &MemoryFault::view, "Where it concerns one.")
       .field("what", &MemoryFault::what, "One line.");
@@ -248,7 +262,8 @@ void bind_memory_file(py::module_& m) {
       .field(
           "elevations", [](const MemoryHeader& h) { return h.elevations; },
           "(bottom, top) in radians, or None.")
-      .field("panorama_columns", &MemoryHeader::panorama_columns, "")
+      .field("panorama_columns", &MemoryHeader::panorama_columns,
+             "Of the panoramas that the signatures are taken from.")
       .field("source", &MemoryHeader::source, "How its pictures lay.")
       .field("created_s", &MemoryHeader::created_s, "Seconds since 1970, or None.");
 
@@ -262,25 +277,32 @@ void bind_memory_file(py::module_& m) {
            }),
            py::arg("path"), py::arg("write") = false, py::call_guard<py::gil_scoped_release>(),
            "Opens a memory file; with `write` it can be changed.")
-      .def_property_readonly("header",
-                             [](const SharedFile& s) {
-                               return s.read([](const MemoryFile& f) { return f.header(); });
-                             })
+      .def_property_readonly(
+          "header",
+          [](const SharedFile& s) {
+            return s.read([](const MemoryFile& f) { return f.header(); });
+          },
+          "As the file was made.")
       .def_property_readonly(
           "path",
-          [](const SharedFile& s) { return s.read([](const MemoryFile& f) { return f.path(); }); })
+          [](const SharedFile& s) { return s.read([](const MemoryFile& f) { return f.path(); }); },
+          "As it was given; of a server the address without its password.")
       .def(
           "load",
           [](SharedFile& s) {
             return s.change([](MemoryFile& f) { return std::make_shared<SharedMemory>(f.load()); });
           },
           "All views and links as a VisualMemory, which does not need the file any more.")
-      .def("info", [](SharedFile& s) { return s.change([](MemoryFile& f) { return f.info(); }); })
+      .def(
+          "info", [](SharedFile& s) { return s.change([](MemoryFile& f) { return f.info(); }); },
+          "Counts and sizes; nothing is checked.")
       .def(
           "verify",
           [](SharedFile& s) { return s.change([](MemoryFile& f) { return f.verify(); }); },
           "Everything that is wrong with the file; empty: intact.")
-      .def("names", [](SharedFile& s) { return s.change([](MemoryFile& f) { return f.names(); }); })
+      .def(
+          "names", [](SharedFile& s) { return s.change([](MemoryFile& f) { return f.names(); }); },
+          "Of all views, by ascending id.")
       .def(
           "find",
           [](SharedFile& s, const std::string& name) {
@@ -306,13 +328,14 @@ void bind_memory_file(py::module_& m) {
           [](SharedFile& s, ViewId view, const std::optional<ReferencePose>& pose) {
             s.change([&](MemoryFile& f) { f.set_pose(view, pose); });
           },
-          py::arg("view"), py::arg("pose"))
+          py::arg("view"), py::arg("pose"),
+          "Replaces what is known of the pose; None: it is unknown.")
       .def(
           "rename",
           [](SharedFile& s, ViewId view, const std::string& name) {
             s.change([&](MemoryFile& f) { f.rename(view, name); });
           },
-          py::arg("view"), py::arg("name"))
+          py::arg("view"), py::arg("name"), "Gives a view another name, which no other has.")
       .def(
           "remove",
           [](SharedFile& s, const std::vector<ViewId>& views) {
@@ -322,10 +345,14 @@ void bind_memory_file(py::module_& m) {
       .def(
           "undo", [](SharedFile& s) { s.change([](MemoryFile& f) { f.undo(); }); },
           "Takes back the last change that the command kept for this.")
-      .def("map_names",
-           [](SharedFile& s) { return s.change([](MemoryFile& f) { return f.map_names(); }); })
-      .def("route_names",
-           [](SharedFile& s) { return s.change([](MemoryFile& f) { return f.route_names(); }); })
+      .def(
+          "map_names",
+          [](SharedFile& s) { return s.change([](MemoryFile& f) { return f.map_names(); }); },
+          "Of the maps in the file, ascending.")
+      .def(
+          "route_names",
+          [](SharedFile& s) { return s.change([](MemoryFile& f) { return f.route_names(); }); },
+          "Of the routes in the file, ascending.")
       .def(
           "keep_models", [](SharedFile& s) { s.change([](MemoryFile& f) { keep_models(f); }); },
           "Learns what localisation needs of the views and keeps it in the file; to be called "

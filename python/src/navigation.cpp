@@ -26,7 +26,7 @@ RobotNavigatorOptions navigator_options(const std::optional<std::string>& edges,
 
 void bind_navigation(py::module_& m) {
   Record<Velocity>(m, "Velocity", "Speeds of a robot in its own frame.")
-      .field("forward_m_s", &Velocity::forward_m_s, "")
+      .field("forward_m_s", &Velocity::forward_m_s, "Along the heading, below 0 backwards.")
       .field("left_m_s", &Velocity::left_m_s, "0 for a differential drive.")
       .field("turn_rad_s", &Velocity::turn_rad_s, "Counter-clockwise.");
   Record<NavigationDecision>(m, "NavigationDecision", "One decision with its reasons.")
@@ -47,7 +47,8 @@ void bind_navigation(py::module_& m) {
              "Of what is seen from `nearest`, homing: from the goal.")
       .field("way", &NavigationDecision::way, "That is left along the edges, in their unit.")
       .field("components", &NavigationDecision::components, "Compared.")
-      .field("bytes_read", &NavigationDecision::bytes_read, "")
+      .field("bytes_read", &NavigationDecision::bytes_read,
+             "Of the loaded area's signatures and index, by this observation.")
       .field(
           "events",
           [](const NavigationDecision& d) {

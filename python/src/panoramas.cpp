@@ -79,19 +79,28 @@ void bind_cameras(py::module_& m) {
            "`model`: one of `camera_models`; `parameters`: a dictionary of its numbers, as a "
            "camera file names them; `image_size`: (width, height). Centre and radii in pixels are "
            "those of a mirror.")
-      .def_property_readonly("model", [](const Camera& c) { return model_name(c.model); })
-      .def_property_readonly("parameters", [](const Camera& c) { return parameters_of(c.model); })
+      .def_property_readonly(
+          "model", [](const Camera& c) { return model_name(c.model); }, "One of `camera_models`.")
+      .def_property_readonly(
+          "parameters", [](const Camera& c) { return parameters_of(c.model); },
+          "Of the model: a dictionary of numbers, as a camera file names them.")
       .def_property_readonly(
           "image_size",
           [](const Camera& c) { return std::pair(c.image_size.width, c.image_size.height); },
-          "(width, height)")
+          "(width, height) of every picture of this camera.")
       .def_property_readonly(
-          "centre", [](const Camera& c) { return std::pair(c.centre.u_px, c.centre.v_px); })
-      .def_readonly("rim_radius_px", &Camera::rim_radius_px)
-      .def_readonly("inner_radius_px", &Camera::inner_radius_px)
-      .def_property_readonly("direction", [](const Camera& c) { return name_of(c.direction); })
-      .def_readonly("forward_angle_rad", &Camera::forward_angle_rad)
-      .def_readonly("forward_column", &Camera::forward_column)
+          "centre", [](const Camera& c) { return std::pair(c.centre.u_px, c.centre.v_px); },
+          "(u, v) of the mirror in pixels.")
+      .def_readonly("rim_radius_px", &Camera::rim_radius_px, "Of a mirror: nothing is seen beyond.")
+      .def_readonly("inner_radius_px", &Camera::inner_radius_px,
+                    "Of a mirror: nothing is seen within.")
+      .def_property_readonly(
+          "direction", [](const Camera& c) { return name_of(c.direction); },
+          "How azimuth runs in the picture as it is shown: 'clockwise' or 'counter-clockwise'.")
+      .def_readonly("forward_angle_rad", &Camera::forward_angle_rad,
+                    "Of a mirror: image angle of forward, counter-clockwise from the right.")
+      .def_readonly("forward_column", &Camera::forward_column,
+                    "Equirectangular: fraction of the width that looks along the heading, 0 to 1.")
       .def_property_readonly(
           "visible_elevations", [](const Camera& c) { return visible_elevations(c); },
           "(lowest, highest) elevation in radians that is seen at every azimuth.")
@@ -152,9 +161,10 @@ void bind_cameras(py::module_& m) {
                        "sees at every azimuth.",
                        {options_of<UnwarperOptions>()})
               .c_str())
-      .def_property_readonly("rows", &Unwarper::rows)
-      .def_property_readonly("columns", &Unwarper::columns)
-      .def_property_readonly("elevations", &Unwarper::elevations)
+      .def_property_readonly("rows", &Unwarper::rows, "Of its panoramas.")
+      .def_property_readonly("columns", &Unwarper::columns, "Of its panoramas.")
+      .def_property_readonly("elevations", &Unwarper::elevations,
+                             "(bottom, top) of its panoramas in radians.")
       .def(
           "unwrap",
           [](const Unwarper& unwarper, const py::object& picture) {
@@ -175,8 +185,10 @@ void bind_panoramas(py::module_& m) {
       .def(py::init(&panorama_from_array), py::arg("values"), py::arg("elevations") = py::none(),
            "`values`: float32, or uint8 for 0 to 1, of (rows, columns), with any strides; copied. "
            "`elevations`: (bottom, top) of the band in radians; None: unknown.")
-      .def_property_readonly("rows", &Panorama::rows)
-      .def_property_readonly("columns", &Panorama::columns)
+      .def_property_readonly("rows", &Panorama::rows,
+                             "Values of a column, from the highest elevation to the lowest.")
+      .def_property_readonly("columns", &Panorama::columns,
+                             "Values of a row: azimuths of a full turn.")
       .def_property_readonly(
           "elevations", [](const Panorama& p) { return p.elevations(); },
           "(bottom, top) in radians, or None.")
@@ -255,16 +267,22 @@ void bind_panoramas(py::module_& m) {
           "itself is seen.")
       .def_property_readonly(
           "kind",
-          [](const PictureSource& s) { return kind_names[static_cast<std::size_t>(s.kind)]; })
-      .def_property_readonly("elevations",
-                             [](const PictureSource& s) { return s.layout.elevations; })
-      .def_property_readonly("kept_elevations",
-                             [](const PictureSource& s) { return s.layout.kept_elevations; })
-      .def_property_readonly("direction",
-                             [](const PictureSource& s) { return name_of(s.layout.direction); })
-      .def_property_readonly("forward_column",
-                             [](const PictureSource& s) { return s.layout.forward_column; })
-      .def_readonly("camera", &PictureSource::camera)
+          [](const PictureSource& s) { return kind_names[static_cast<std::size_t>(s.kind)]; },
+          "'panorama', 'equirectangular' or 'mirror'.")
+      .def_property_readonly(
+          "elevations", [](const PictureSource& s) { return s.layout.elevations; },
+          "(bottom, top) of the picture's edges in radians; None: unknown.")
+      .def_property_readonly(
+          "kept_elevations", [](const PictureSource& s) { return s.layout.kept_elevations; },
+          "(bottom, top) of the part to keep in radians; None: all.")
+      .def_property_readonly(
+          "direction", [](const PictureSource& s) { return name_of(s.layout.direction); },
+          "How columns run from left to right, seen from above: 'clockwise' or "
+          "'counter-clockwise'.")
+      .def_property_readonly(
+          "forward_column", [](const PictureSource& s) { return s.layout.forward_column; },
+          "Fraction of the width that shows the direction of the heading, 0 to 1.")
+      .def_readonly("camera", &PictureSource::camera, "Of the kind 'mirror', else None.")
       .def("__eq__", [](const PictureSource& a, const PictureSource& b) { return a == b; })
       .def("__repr__",
            [](const PictureSource& s) {

@@ -64,18 +64,25 @@ void bind_observations(py::module_& m) {
            "path of a picture. `odometry`: absolute, in a frame that drifts. `pose`: in the world "
            "frame, where it is known. `tilt`: (roll, pitch) in radians.")
       .def_property_readonly("picture", &picture_of, "A Panorama, or an array of pixels.")
-      .def_readonly("name", &Observation::name)
-      .def_readonly("stamp_s", &Observation::stamp_s)
-      .def_readonly("odometry", &Observation::odometry)
-      .def_readonly("pose", &Observation::pose)
-      .def_property_readonly("tilt", [](const Observation& o) { return o.tilt; })
+      .def_readonly("name", &Observation::name,
+                    "Of the view that a memory keeps; messages name it.")
+      .def_readonly("stamp_s", &Observation::stamp_s, "When it was taken, seconds, or None.")
+      .def_readonly("odometry", &Observation::odometry,
+                    "Absolute, in a frame that drifts against the world, or None.")
+      .def_readonly(
+          "pose", &Observation::pose,
+          "In the world frame, where it is known; no estimate of the picture's own place reads it.")
+      .def_property_readonly(
+          "tilt", [](const Observation& o) { return o.tilt; },
+          "(roll, pitch) in radians as an inertial sensor measured it, or None.")
       .def("__repr__", [](const Observation& o) { return "Observation('" + o.name + "')"; });
 }
 
 void bind_datasets(py::module_& m) {
   Record<DatasetEntry>(m, "DatasetEntry", "One picture of a data set and what is known of it.")
       .field("file", &DatasetEntry::file, "As the data set names it; unique.")
-      .field("stamp_s", &DatasetEntry::stamp_s, "")
+      .field("stamp_s", &DatasetEntry::stamp_s,
+             "When it was taken, seconds on the recording's clock, or None.")
       .field("pose", &DatasetEntry::pose, "In the world frame, or None.")
       .field("odometry", &DatasetEntry::odometry, "In the odometry frame, or None.")
       .field(
@@ -92,8 +99,8 @@ void bind_datasets(py::module_& m) {
            "A data set (a folder with dataset.toml) describes itself. `source` says how the "
            "pictures of a folder, a video, a recording of topics (MCAP, rosbag2, ROS 1 bag) or a "
            "single picture lie.")
-      .def_readonly("source", &Dataset::source)
-      .def_readonly("entries", &Dataset::entries)
+      .def_readonly("source", &Dataset::source, "How all pictures lie.")
+      .def_readonly("entries", &Dataset::entries, "In the order in which they were taken.")
       .def_readonly("left_out", &Dataset::left_out, "What lies in a folder and is no picture.")
       .def("__len__", [](const Dataset& d) { return d.entries.size(); })
       .def(

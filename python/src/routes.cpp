@@ -38,14 +38,14 @@ RouteFollowerOptions follower_options(const std::optional<std::string>& name, bo
 
 void bind_following(py::module_& m) {
   Record<AzimuthRange>(m, "AzimuthRange", "Azimuths in the robot's frame.")
-      .field("from_rad", &AzimuthRange::from_rad, "")
+      .field("from_rad", &AzimuthRange::from_rad, "In [-pi, pi).")
       .field("to_rad", &AzimuthRange::to_rad, "Counter-clockwise from the first.");
   Record<NamedStep>(m, "RouteStep", "Where a robot is beside a route.")
       .field("name", &NamedStep::name, "Of the picture, where it has one.")
       .field(
           "on_route", [](const NamedStep& s) { return s.fix.has_value(); },
           "Where not, all else is None.")
-      .field("pose", fix_field(&RouteFix::pose), "")
+      .field("pose", fix_field(&RouteFix::pose), "In the route's frame.")
       .field(
           "origin",
           [](const NamedStep& s) -> std::optional<std::string> {
@@ -61,9 +61,13 @@ void bind_following(py::module_& m) {
           "lateral_m",
           [](const NamedStep& s) { return of_fix<double>(s, &TrackedRouteFix::lateral_m); },
           "From the route to the robot; positive to the left.")
-      .field("correlation", fix_field(&RouteFix::correlation), "")
-      .field("residual", fix_field(&RouteFix::residual), "")
-      .field("columns", fix_field(&RouteFix::columns), "")
+      .field("correlation", fix_field(&RouteFix::correlation),
+             "Of what is seen and what the route shows from there, -1 to 1.")
+      .field("residual", fix_field(&RouteFix::residual),
+             "Robust root mean square of what the fit leaves, over the standard deviation of what "
+             "the route shows.")
+      .field("columns", fix_field(&RouteFix::columns),
+             "Directions in which the line of sight crosses the path.")
       .field(
           "covariance",
           [](const NamedStep& s) -> std::optional<py::array_t<double>> {
@@ -154,8 +158,9 @@ void bind_recording(py::module_& m) {
   py::class_<RoutePanorama>(
       m, "RoutePanorama", "What a robot saw at its camera's height along a route: a line a place.")
       .def("__len__", &RoutePanorama::size)
-      .def_property_readonly("columns", &RoutePanorama::columns)
-      .def_property_readonly("length_m", &RoutePanorama::length_m)
+      .def_property_readonly("columns", &RoutePanorama::columns,
+                             "Bytes of a line: azimuths of a full turn.")
+      .def_property_readonly("length_m", &RoutePanorama::length_m, "Of the way through all places.")
       .def(
           "lines",
           [](const RoutePanorama& route) {
@@ -175,10 +180,11 @@ void bind_recording(py::module_& m) {
                std::to_string(route.columns()) + " columns)";
       });
   Record<RecordedRoute>(m, "RecordedRoute", "What a memory file has of a route.")
-      .field("route", &RecordedRoute::route, "")
+      .field("route", &RecordedRoute::route, "All of its lines, those of earlier drives included.")
       .field("appended", &RecordedRoute::appended, "Lines.")
       .field("bytes", &RecordedRoute::bytes, "Of its lines and poses as they are kept.")
-      .field("bytes_per_km", &RecordedRoute::bytes_per_km, "");
+      .field("bytes_per_km", &RecordedRoute::bytes_per_km,
+             "Bytes for each kilometre; 0 for a route without length.");
   m.def(
       "record_route",
       [](const py::object& recording, const std::filesystem::path& memory, const std::string& name,

@@ -58,9 +58,13 @@ void bind_signatures(py::module_& m) {
            py::arg("magnitudes"), py::arg("phases_rad"), py::arg("elevations") = py::none(),
            "float32 arrays of (components, rows): magnitudes >= 0, phases in [-pi, pi), 0 where "
            "the magnitude is 0.")
-      .def_property_readonly("rows", &FourierSignature::rows)
-      .def_property_readonly("components", &FourierSignature::components)
-      .def_property_readonly("elevations", [](const FourierSignature& s) { return s.elevations(); })
+      .def_property_readonly("rows", &FourierSignature::rows,
+                             "Number of rows, from the highest elevation to the lowest.")
+      .def_property_readonly("components", &FourierSignature::components,
+                             "Number of frequencies, from 0 on.")
+      .def_property_readonly(
+          "elevations", [](const FourierSignature& s) { return s.elevations(); },
+          "(bottom, top) of the panorama's rows in radians; None: unknown.")
       .def_property_readonly(
           "magnitudes",
           [](const py::object& self) {
@@ -101,9 +105,12 @@ void bind_signatures(py::module_& m) {
                  values_of(angles)};
            }),
            py::arg("magnitudes"), py::arg("phases"), "uint8 arrays of (components, rows).")
-      .def_property_readonly("rows", [](const PackedSignature& s) { return s.shape.rows; })
-      .def_property_readonly("components",
-                             [](const PackedSignature& s) { return s.shape.components; })
+      .def_property_readonly(
+          "rows", [](const PackedSignature& s) { return s.shape.rows; },
+          "Number of rows, from the highest elevation to the lowest.")
+      .def_property_readonly(
+          "components", [](const PackedSignature& s) { return s.shape.components; },
+          "Number of frequencies, from 0 on.")
       .def_property_readonly(
           "magnitudes",
           [](const py::object& self) {
@@ -124,7 +131,8 @@ void bind_signatures(py::module_& m) {
              const std::optional<ElevationBand>& elevations) {
             return unpack(s, full_scale, elevations);
           },
-          py::arg("full_scale"), py::arg("elevations") = py::none())
+          py::arg("full_scale"), py::arg("elevations") = py::none(),
+          "With magnitudes and phases as real numbers; `full_scale` is what 255 stands for, > 0.")
       .def("__eq__", [](const PackedSignature& a, const PackedSignature& b) { return a == b; })
       .def("__repr__",
            [](const PackedSignature& s) {

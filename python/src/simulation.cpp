@@ -104,19 +104,24 @@ void bind_worlds(py::module_& m) {
                         "height are those that the scene is made for, unless they are given.",
                         of_world)
                .c_str())
-      .def_property_readonly("name", [](const SimulatedWorld& w) { return w.scene().name; })
+      .def_property_readonly(
+          "name", [](const SimulatedWorld& w) { return w.scene().name; },
+          "Of the built-in scene or of the file.")
       .def_property_readonly(
           "warnings", [](const SimulatedWorld& w) { return w.scene().warnings; },
           "What of a file could not be shown.")
       .def_property_readonly("source", &SimulatedWorld::source, "How its pictures lie.")
       .def_property_readonly(
           "camera_height_m",
-          [](const SimulatedWorld& w) { return w.options().frame.camera_height_m; })
+          [](const SimulatedWorld& w) { return w.options().frame.camera_height_m; },
+          "Of the viewpoint above the floor.")
       .def_property_readonly(
           "robot_radius_m",
-          [](const SimulatedWorld& w) { return w.options().free_space.robot_radius_m; })
-      .def_property_readonly("free_area_m2",
-                             [](const SimulatedWorld& w) { return w.free_space().area_m2(); })
+          [](const SimulatedWorld& w) { return w.options().free_space.robot_radius_m; },
+          "Of the robot, which is taken for a cylinder.")
+      .def_property_readonly(
+          "free_area_m2", [](const SimulatedWorld& w) { return w.free_space().area_m2(); },
+          "Where the robot can stand.")
       .def_property_readonly(
           "low", [](const SimulatedWorld& w) { return w.free_space().low(); },
           "Lower corner of the floor: (x_m, y_m).")
@@ -326,9 +331,12 @@ void bind_robots(py::module_& m) {
             return robot.read([](const Robot& r) { return r.base.odometry(); });
           },
           "Where its odometry says that it is, in a frame of its own.")
-      .def_property_readonly("time_s", [](const SharedRobot& robot) {
-        return robot.read([](const Robot& r) { return r.time_s; });
-      });
+      .def_property_readonly(
+          "time_s",
+          [](const SharedRobot& robot) {
+            return robot.read([](const Robot& r) { return r.time_s; });
+          },
+          "Seconds that it has driven.");
 }
 
 }  // namespace
