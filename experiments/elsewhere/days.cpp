@@ -193,7 +193,7 @@ void reproduce_days(const ElsewhereReproductionOptions& options, const std::stri
   Series without_learning{.label = "without"};
   DayAnswers with;
   DayAnswers without;
-  std::size_t most_views = robot.views();
+  std::size_t max_views = robot.views();
   const int asked_every = std::max(1, options.days / 6);
   for (int day = 1; day <= options.days; ++day) {
     changing.pass_day(moved_share);
@@ -219,7 +219,7 @@ void reproduce_days(const ElsewhereReproductionOptions& options, const std::stri
     Random walking(seed, 5);
     const auto path = errands(*today.free_space, options.day_pictures, walking);
     robot.learn(take_views(today, place.rendering, path, seed, {}, executor), seed, executor);
-    most_views = std::max(most_views, robot.views());
+    max_views = std::max(max_views, robot.views());
   }
   const auto asked = static_cast<std::size_t>(3 * options.queries);
   const std::string id = "elsewhere.days." + name;
@@ -239,7 +239,7 @@ void reproduce_days(const ElsewhereReproductionOptions& options, const std::stri
   }
   add_row(result, id + ".views",
           name + ": views of the memory, most on any day, over those at first",
-          static_cast<double>(most_views) / static_cast<double>(memory.size()), "",
+          static_cast<double>(max_views) / static_cast<double>(memory.size()), "",
           at_most(static_cast<double>(MemoryUpdateOptions{}.appearances)));
   result.rows.back().over = std::to_string(memory.size()) + " at first, " +
                             std::to_string(robot.added()) + " learnt, " +

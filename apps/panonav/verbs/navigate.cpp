@@ -335,12 +335,12 @@ std::optional<ViewId> goal_as_wished(RobotNavigator& robot, const RememberedPlac
   const auto wish = record.take_wish();
   if (!wish) return std::nullopt;
   std::optional<std::size_t> nearest;
-  double least_m = std::numeric_limits<double>::infinity();
+  double min_m = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < remembered.truth.size(); ++i) {
     const double away_m = distance(remembered.truth[i].position(), wish->position());
-    if (robot.graph().exits(i).empty() || !(away_m < least_m)) continue;
+    if (robot.graph().exits(i).empty() || !(away_m < min_m)) continue;
     nearest = i;
-    least_m = away_m;
+    min_m = away_m;
   }
   if (!nearest) return std::nullopt;
   const ViewId view = robot.graph().view(*nearest);

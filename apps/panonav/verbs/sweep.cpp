@@ -112,7 +112,7 @@ void check(const Sweep& sweep) {
   const Verb* const verb = verb_in(verbs, wanted.command);
   if (verb == nullptr || verb->name == "sweep") {
     throw UsageError("'" + readable_line(wanted.command.front()) +
-                     "' is no verb that can be swept; allowed: any of panonav --help but sweep");
+                     "' cannot be swept; allowed: any verb of panonav --help but sweep");
   }
   std::string allowed = "{job}, {out}";
   for (const std::string& column : table.columns()) {

@@ -76,7 +76,7 @@ struct RunChanges {
 /// run, carried there by odometry. At least three sure answers (known with 0.9 and more) within
 /// `reach_m` of travel, by pictures that lie two spacings apart, must agree on a pose, and four
 /// fifths of all sure answers there; the picture's own answer only makes the pose more precise. So
-/// a camera that was turned, a place that looks alike and a robot that is carried away say nothing.
+/// a camera that was turned, a place that resembles another and a kidnapped robot say nothing.
 /// `others` without the picture itself; `travelled_m`: from the picture to each of them.
 struct PoseWitness {
   Pose2 odometry;            ///< at the picture that was answered, in the odometry's frame

@@ -140,12 +140,12 @@ std::unique_ptr<MemoryTables::Transaction> PostgresqlTables::transaction(Kind ki
 
 // Says which areas are others now, where these are few.
 void PostgresqlTables::notify() {
-  constexpr std::size_t most_bytes = 4000;  // PostgreSQL takes up to 8000
+  constexpr std::size_t max_bytes = 4000;  // PostgreSQL takes up to 8000
   std::string said;
   for (const MemoryArea& area : std::exchange(areas_, {})) {
     if (!said.empty()) said += ' ';
     said += to_text(area.column) + "," + to_text(area.row);
-    if (said.size() > most_bytes) {
+    if (said.size() > max_bytes) {
       said.clear();
       break;
     }
