@@ -6,7 +6,9 @@ import json
 import os
 import pathlib
 import re
+import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -41,8 +43,8 @@ class Server:
     def __init__(self, folder):
         self.folder = folder
 
-    def start(self):
-        run(SERVER, self.folder, "start")
+    def start(self, *settings):
+        run(SERVER, self.folder, "start", *settings)
 
     def stop(self):
         run(SERVER, self.folder, "stop")
@@ -215,6 +217,46 @@ def wrong_addresses(server, folder):
     refused(PANONAV, "info", server.memory("hall", more="&sslmode=sometimes"), saying="sslmode")
 
 
+def certificate(folder, name, *more):
+    run("openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", f"/CN={name}",
+        "-keyout", folder / f"{name}.key", "-out", folder / f"{name}.crt", *more)
+
+
+def encrypted(server, folder):
+    """The settings of TLS reach libpq: over a network a server that takes nothing else, and who it must be."""
+    certificate(folder, "server", "-addext", "subjectAltName=DNS:localhost")
+    certificate(folder, "another")
+    for name in ("server.crt", "server.key"):
+        shutil.copy(folder / name, server.folder / "data" / name)
+    (server.folder / "data/server.key").chmod(0o600)
+    hba = server.folder / "data/pg_hba.conf"
+    before = hba.read_text()
+    hba.write_text("hostssl all all 127.0.0.1/32 trust\nlocal all all trust\n")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    server.stop()
+    server.start("ssl=on", "listen_addresses=127.0.0.1", f"port={port}")
+    refused(SERVER, server.folder, "start", "ssl=off", saying="runs already")
+
+    def memory(host, mode, root="server"):
+        return f"postgresql://panonav@{host}:{port}/panonav?memory=hall&hostaddr=127.0.0.1&sslmode={mode}" \
+            f"&sslrootcert={folder}/{root}.crt"
+    try:
+        assert "TLS" in run("psql", "-X", "-t", "-A", memory("localhost", "verify-full").replace("memory=hall&", ""),
+                            "-c", "SELECT version FROM pg_stat_ssl WHERE pid = pg_backend_pid()")
+        said = run(PANONAV, "info", memory("localhost", "verify-full"), "--json")
+        assert json.loads(said)["views"] > 0, said
+        refused(PANONAV, "info", memory("localhost", "disable"), saying="no encryption")
+        refused(PANONAV, "info", memory("localhost", "verify-full", "another"), saying="certificate verify failed")
+        refused(PANONAV, "info", memory("elsewhere", "verify-full"), saying='does not match host name "elsewhere"')
+        refused(PANONAV, "memorise", folder / "grid", memory("localhost", "verify-full", "absent"), saying="absent.crt")
+    finally:
+        server.stop()
+        hba.write_text(before)
+        server.start()
+
+
 def killed_server(server):
     """What was acknowledged is there once, the rest not at all or whole."""
     address = server.memory("appended")
@@ -268,6 +310,8 @@ def main():
             print("roles")
             wrong_addresses(server, folder)
             print("addresses")
+            encrypted(server, folder)
+            print("encrypted")
             killed_server(server)
             print("killed server")
         finally:
