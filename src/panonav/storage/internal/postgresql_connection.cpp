@@ -197,6 +197,11 @@ PostgresqlConnection::PostgresqlConnection(const ServerAddress& address) : shown
       "SET extra_float_digits = 1; SET standard_conforming_strings = on; "
       "SELECT set_config('synchronous_commit', 'on', false) "
       "WHERE current_setting('synchronous_commit') = 'off'");
+  // A robot that lost its network during a change holds the memory's lock until the server knows.
+  // Not every system has all of these settings.
+  try_execute("SET tcp_keepalives_idle = 10; SET tcp_keepalives_interval = 5");
+  try_execute("SET tcp_keepalives_count = 3");
+  try_execute("SET tcp_user_timeout = 20000");
 }
 
 std::string PostgresqlConnection::message() const {
