@@ -235,6 +235,7 @@ TEST(ViewServer, DoesNotWaitForSlowViewers) {
   ASSERT_TRUE(within(std::chrono::seconds(20), [&] { return server.viewers() == 2; }));
   RunMoment moment = moment_at(0.0);
   moment.particles.assign(4000, {1.0, 2.0, 3.0});  // 64 kB of text
+  const auto begun = Clock::now();
   Clock::duration adding{};
   constexpr int count = 300;
   for (int i = 0; i < count; ++i) {
@@ -246,6 +247,9 @@ TEST(ViewServer, DoesNotWaitForSlowViewers) {
     }
   }
   EXPECT_LT(adding, std::chrono::seconds(5));  // who does not read is let go after 5 s
+  if (Clock::now() - begun > std::chrono::seconds(4)) {
+    GTEST_SKIP() << "this machine is too slow: the viewer was let go before it began to read";
+  }
   ASSERT_TRUE(slow.hear_until("\"n\":" + std::to_string(count - 1) + ","));
   ASSERT_TRUE(slow.hear_until("\"probability\":0.75}\n\n"));
   const auto told = slow.events("moment");
