@@ -11,14 +11,8 @@
 namespace panonav::testing {
 namespace {
 
-PictureSource panoramas() {
-  PictureSource source;
-  source.layout.elevations = ElevationBand{radians(-20.0), radians(20.0)};
-  return source;
-}
-
 Observation seen_at(const ToyWorld& world, const Pose2& pose, std::size_t number) {
-  Observation seen(world.picture(pose, 96, 12));
+  Observation seen(landmark_picture(world, pose));
   seen.name = "view " + std::to_string(number);
   seen.stamp_s = 0.5 * static_cast<double>(number);
   seen.pose = ReferencePose{pose.x_m, pose.y_m, pose.heading_rad};
@@ -31,7 +25,7 @@ std::vector<bool> walk(const std::filesystem::path& memory, bool in_step, std::s
   LiveMemory live(memory, {.learn = true,
                            .min_interval_s = 0.5,
                            .in_step = in_step,
-                           .memoriser = {.source = panoramas()}});
+                           .memoriser = {.source = landmark_panoramas()}});
   RunRecorder recorder(record, {.wait = in_step, .max_waiting = 8});
   const ToyWorld world = landmark_world(5);
   std::vector<bool> known;
@@ -87,7 +81,7 @@ TEST(LiveMemory, TheAnsweredPanoramaIsKeptForWhoRecordsItAndIsWhatIsLearnt) {
   LiveMemory live(folder / "a.panonav", {.learn = true,
                                          .min_interval_s = 0.0,
                                          .in_step = false,
-                                         .memoriser = {.source = panoramas()}});
+                                         .memoriser = {.source = landmark_panoramas()}});
   const Observation elsewhere = seen_at(landmark_world(99), {0.3, 0.4, 0.5}, 1000);
   const auto answer = live.answer(elsewhere);
   ASSERT_TRUE(live.panorama());
@@ -110,7 +104,7 @@ TEST(LiveMemory, AViewThatCannotBeStoredIsSaidAtTheLatestAtTheEnd) {
   LiveMemory live(folder / "a.panonav", {.learn = true,
                                          .min_interval_s = 0.0,
                                          .in_step = false,
-                                         .memoriser = {.source = panoramas()}});
+                                         .memoriser = {.source = landmark_panoramas()}});
   // Another program has stored another picture under the name.
   Memoriser(folder / "a.panonav").add(seen_at(landmark_world(98), {0.2, 0.1, 0.0}, 1000));
   live.learn(seen_at(landmark_world(99), {0.3, 0.4, 0.5}, 1000));

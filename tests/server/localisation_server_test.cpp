@@ -26,17 +26,15 @@ std::string png_of(const Image& image) {
 }
 
 std::string picture_at(const ToyWorld& world, const Pose2& pose) {
-  return png_of(world.picture(pose, 96, 12));
+  return png_of(landmark_picture(world, pose));
 }
 
 void memorise(const std::filesystem::path& path, const ToyWorld& world, std::size_t from,
               std::size_t to) {
-  PictureSource source;
-  source.layout.elevations = ElevationBand{radians(-20.0), radians(20.0)};
-  Memoriser memoriser(path, {.source = source});
+  Memoriser memoriser(path, {.source = landmark_panoramas()});
   const auto poses = grid_poses(8);
   for (std::size_t i = from; i < to; ++i) {
-    Observation seen(world.picture(poses[i], 96, 12));
+    Observation seen(landmark_picture(world, poses[i]));
     seen.name = "a view/" + std::to_string(i);
     seen.pose = ReferencePose{poses[i].x_m, poses[i].y_m, poses[i].heading_rad};
     memoriser.add(std::move(seen));

@@ -9,6 +9,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/panorama/picture_source.hpp"
 #include "support/toy_world.hpp"
 
 namespace panonav::testing {
@@ -22,6 +23,18 @@ inline std::vector<Pose2> grid_poses(int side) {
   return poses;
 }
 
+/// How `landmark_picture`s are to be read.
+inline PictureSource landmark_panoramas() {
+  PictureSource source;
+  source.layout.elevations = ElevationBand{radians(-20.0), radians(20.0)};
+  return source;
+}
+
+inline Image landmark_picture(const ToyWorld& world, const Pose2& pose, int columns = 96,
+                              int rows = 12) {
+  return world.picture(pose, columns, rows);
+}
+
 inline std::string view_name(std::size_t index) {
   const std::string digits = std::to_string(index);
   return "view_" + std::string(3 - std::min<std::size_t>(3, digits.size()), '0') + digits + ".png";
@@ -29,7 +42,7 @@ inline std::string view_name(std::size_t index) {
 
 inline void write_picture(const std::filesystem::path& path, const ToyWorld& world,
                           const Pose2& pose, int columns = 96, int rows = 12) {
-  const Image image = world.picture(pose, columns, rows);
+  const Image image = landmark_picture(world, pose, columns, rows);
   write_png(path, image.view());
 }
 
