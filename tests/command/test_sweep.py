@@ -110,6 +110,8 @@ def main() -> int:
                            (["two.csv", "out", "--", "nothing", "{a}{b}"], "cannot be swept"),
                            (["two.csv", "full", "--", "info", "{a}{b}"], "is there and no sweep"),
                            (["two.csv", "new", "--continue", "--", "info", "{a}{b}"], "no sweep to continue"),
+                           (["--threads", "2", "two.csv", "out", "--", "info", "{a}{b}"],
+                            "--threads has no effect before --"),
                            (["none.csv", "out", "--", "info", "{a}"], "it has no rows"),
                            (["out.csv", "out", "--", "info", "{out}"], "a column is called out")):
             line = run(refused, *words, code=2)

@@ -337,6 +337,9 @@ Run declare_sweep(Arguments& arguments) {
   arguments.flag("--continue", wanted->continues,
                  "Go on with a sweep that was stopped, or help one that runs: jobs that are done "
                  "are not run again, those that failed are");
+  arguments.used_only(
+      {"--threads"}, [] { return false; },
+      "before --: one job runs at a time, on the threads that the command behind -- asks for");
   return [wanted](Session& session) { return sweep(*wanted, session); };
 }
 
