@@ -332,12 +332,14 @@ struct HttpServer::Implementation {
         }
         return;
       }
-      head.request.body = connection.in.substr(0, head.body_size);
-      connection.in.erase(0, head.body_size);
+      // What came so far of the next request is short, this one's body may be a picture.
+      std::string behind = connection.in.substr(head.body_size);
+      connection.in.resize(head.body_size);
+      head.request.body = std::exchange(connection.in, std::move(behind));
       connection.closing = !head.keep;
       HttpAnswer answer;
       try {
-        answer = handler(head.request);
+        answer = handler(std::move(head.request));
       } catch (const std::exception&) {
         answer = {.status = 500};
       }

@@ -59,8 +59,8 @@ struct HttpServerOptions {
 /// one replaces the oldest that never got an answer below 400, or is closed where there is none.
 class HttpServer {
  public:
-  /// Called on the server's thread; what it throws becomes status 500.
-  using Handler = std::function<HttpAnswer(const HttpRequest&)>;
+  /// Called on the server's thread, and may keep the request; what it throws becomes status 500.
+  using Handler = std::function<HttpAnswer(HttpRequest)>;
 
   /// Listens from here on. Throws Error where address and port are not to be had, ContractError
   /// where the port is out of range.

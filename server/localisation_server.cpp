@@ -224,7 +224,7 @@ struct LocalisationServer::Implementation {
                                      .max_body = max_picture_bytes,
                                      .max_bodies = max_bytes_on_the_way,
                                      .last_answers = std::chrono::seconds(5)},
-                   [this](const HttpRequest& request) { return answer(request); });
+                   [this](HttpRequest request) { return answer(std::move(request)); });
     for (int i = 0; i < (options.threads == 0 ? cores : options.threads); ++i) {
       workers.emplace_back([this] { work(); });
     }
@@ -245,8 +245,8 @@ struct LocalisationServer::Implementation {
 
   // ---- on the thread that speaks HTTP
 
-  HttpAnswer answer(const HttpRequest& request) {
-    HttpAnswer given = answer_to(request);
+  HttpAnswer answer(HttpRequest request) {
+    HttpAnswer given = answer_to(std::move(request));
     if (given.status >= 400) {
       const std::lock_guard lock(mutex);
       ++refused[given.status];
@@ -254,7 +254,7 @@ struct LocalisationServer::Implementation {
     return given;
   }
 
-  HttpAnswer answer_to(const HttpRequest& request) {
+  HttpAnswer answer_to(HttpRequest request) {
     constexpr std::string_view memories = "/v1/memories";
     const std::string_view path = request.path;
     if (path == "/health") {
@@ -295,7 +295,7 @@ struct LocalisationServer::Implementation {
     }
     if (below == "/localise") {
       if (request.method != "POST") return refusal(405, "allowed: POST, with a PNG or JPEG");
-      return enqueue(name, request.body);
+      return enqueue(name, std::move(request.body));
     }
     if (request.method != "GET") return refusal(405, "allowed: GET");
     if (below.empty()) return json_answer(describe(name));
@@ -309,19 +309,20 @@ struct LocalisationServer::Implementation {
     return refusal(404, "no such path; allowed: localise and views/NAME/picture");
   }
 
-  HttpAnswer enqueue(const std::string& name, const std::string& picture) {
+  HttpAnswer enqueue(const std::string& name, std::string picture) {
     auto job = std::make_shared<Job>();
     job->memory = name;
-    job->picture = picture;
+    const std::size_t bytes = picture.size();
+    job->picture = std::move(picture);
     {
       const std::lock_guard lock(mutex);
       if (ending || waiting.size() >= options.max_waiting ||
-          waiting_bytes + picture.size() > max_waiting_bytes) {
+          waiting_bytes + bytes > max_waiting_bytes) {
         return refusal(
             503, ending ? "the server is ending" : "too many pictures wait; try again in a moment");
       }
-      waiting_bytes += picture.size();
-      waiting.emplace_back(job, picture.size());
+      waiting_bytes += bytes;
+      waiting.emplace_back(job, bytes);
     }
     came.notify_one();
     return {.later = [job]() -> std::optional<HttpAnswer> {
