@@ -230,6 +230,25 @@ TEST_F(Kill, Rename) {
   kill_at_random({"rename"}, {view_name(3), "door"}, mapped(), true);
 }
 
+TEST_F(Kill, LocaliseLearn) {
+  const fs::path base = folder_ / "base.panonav";
+  write_dataset(folder_ / "grid", landmark_world(3), grid_poses(6));
+  run_well({"memorise", folder_ / "grid", base});
+  // Along y = 1 m, with something else in the middle.
+  std::vector<Pose2> drive;
+  for (int i = 0; i < 21; ++i) drive.push_back({0.125 * i, 1.05, 0.0});
+  write_dataset(folder_ / "drive", landmark_world(3), drive);
+  std::string csv = "file,odom_x_m,odom_y_m,odom_heading_deg\n";
+  for (std::size_t i = 0; i < drive.size(); ++i) {
+    if (i >= 9 && i < 13) {
+      write_picture(folder_ / "drive" / view_name(i), landmark_world(9), drive[i]);
+    }
+    csv += view_name(i) + "," + to_text(drive[i].x_m) + "," + to_text(drive[i].y_m) + ",0\n";
+  }
+  write_file(folder_ / "drive" / "poses.csv", std::string_view(csv));
+  kill_at_random({"localise"}, {folder_ / "drive", "--learn"}, base, true);
+}
+
 TEST_F(Kill, Prune) {
   kill_at_random({"prune"}, {"--max-difference", "0.05"}, mapped(), true);
 }

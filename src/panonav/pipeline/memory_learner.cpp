@@ -169,9 +169,9 @@ MemoryLearner::Changes MemoryLearner::finish(const std::string& what) {
         changes.views = there.size() - dropped.size() + added.size();
         planned.use.size = static_cast<int>(changes.views);
         self.file.set_parameter(use_parameter, to_parameter(planned.use));
+        if (!added.empty() || !dropped.empty()) keep_models(self.file);
       },
       what + ": " + as_text(changes));
-  if (changes.added + dropped.size() > 0) keep_models(self.file);
   return changes;
 }
 

@@ -46,8 +46,8 @@ class MemoryLearner {
     std::size_t forgotten = 0;   ///< views that were dropped because they had failed for long
     std::size_t views = 0;       ///< of the memory now
   };
-  /// Changes the file and learns its models anew. `what`: the run, for the history. Once. Throws
-  /// FileError; the file is as it was then.
+  /// Changes the file and learns its models anew, in one transaction. `what`: the run, for the
+  /// history. Once. Throws FileError; the file is as it was then.
   Changes finish(const std::string& what);
 
  private:
