@@ -31,6 +31,15 @@ constexpr double moved_share = 0.03;
 using FeatureMap = std::map<ViewId, std::optional<LocalFeatures>>;
 using Features = std::shared_ptr<const FeatureMap>;
 
+Features features_of(const PlaceRecording& place, const VisualMemory& memory) {
+  auto features = std::make_shared<FeatureMap>();
+  for (const ViewId view : memory.views()) {
+    const Point2 at = memory.info(view).pose->position();
+    (*features)[view] = extract_features(place.references[place.nearest_reference(at)].panorama);
+  }
+  return features;
+}
+
 /// A memory with all that localises in it and the features of its views.
 class RememberedPlace {
  public:
@@ -53,6 +62,18 @@ class RememberedPlace {
   Features features_;
   Localiser localiser_;
 };
+
+/// A memory that is made anew of a place as it is on that day.
+RememberedPlace remade(PlaceRecording today, std::uint64_t seed, Executor& executor) {
+  std::vector<Pose2> grid;
+  for (const auto& point : today.free_space->grid(spacing_m)) {
+    grid.push_back({point.position.x_m, point.position.y_m, 0.0});
+  }
+  today.references = take_views(today, today.rendering, grid, seed, {}, executor);
+  VisualMemory memory = memory_of_references(today, executor);
+  const Features features = features_of(today, memory);
+  return {std::move(memory), features};
+}
 
 /// A robot that goes to one random place after the other, with a picture each spacing.
 std::vector<Pose2> errands(const FreeSpace& space, int pictures, Random& random) {
@@ -181,11 +202,7 @@ void reproduce_days(const ElsewhereReproductionOptions& options, const std::stri
                                              .columns = columns},
                                             executor);
   const VisualMemory memory = memory_of_references(place, executor);
-  const auto features = std::make_shared<FeatureMap>();
-  for (const ViewId view : memory.views()) {
-    const Point2 at = memory.info(view).pose->position();
-    (*features)[view] = extract_features(place.references[place.nearest_reference(at)].panorama);
-  }
+  const Features features = features_of(place, memory);
   const RememberedPlace still(memory, features);
   LearningRobot robot(memory, features);
   Random light(options.seed, 91);
@@ -193,6 +210,7 @@ void reproduce_days(const ElsewhereReproductionOptions& options, const std::stri
   Series without_learning{.label = "without"};
   DayAnswers with;
   DayAnswers without;
+  DayAnswers anew;
   std::size_t max_views = robot.views();
   const int asked_every = std::max(1, options.days / 6);
   for (int day = 1; day <= options.days; ++day) {
@@ -212,6 +230,9 @@ void reproduce_days(const ElsewhereReproductionOptions& options, const std::stri
       const auto queries = take_views(today, place.rendering, poses, seed + 500, {}, executor);
       with = ask(robot.remembered(), queries, executor);
       without = ask(still, queries, executor);
+      if (day == options.days) {
+        anew = ask(remade(today, seed + 50'000, executor), queries, executor);
+      }
       add_point(with_learning, day, success_rate(with.right, queries.size()));
       add_point(without_learning, day, success_rate(without.right, queries.size()));
     }
@@ -229,6 +250,8 @@ void reproduce_days(const ElsewhereReproductionOptions& options, const std::stri
   add_rate(result, id + ".with", what + "single pictures localised within one spacing, learning",
            with.right, asked, at_least(0.98));
   add_rate(result, id + ".without", what + "the same without learning", without.right, asked);
+  add_rate(result, id + ".anew", what + "the same with a memory made anew that day", anew.right,
+           asked);
   add_rate(result, id + ".wrong", what + "answers farther off than one spacing, learning",
            with.wrong, asked);
   add_rate(result, id + ".wrong_without", what + "the same without learning", without.wrong, asked);
