@@ -63,8 +63,8 @@ class RememberedPlace {
   Localiser localiser_;
 };
 
-/// A memory that is made anew of a place as it is on that day.
-RememberedPlace remade(PlaceRecording today, std::uint64_t seed, Executor& executor) {
+/// A memory that is recorded again in a place as it is on that day.
+RememberedPlace recorded_again(PlaceRecording today, std::uint64_t seed, Executor& executor) {
   std::vector<Pose2> grid;
   for (const auto& point : today.free_space->grid(spacing_m)) {
     grid.push_back({point.position.x_m, point.position.y_m, 0.0});
@@ -210,7 +210,7 @@ void reproduce_days(const ElsewhereReproductionOptions& options, const std::stri
   Series without_learning{.label = "without"};
   DayAnswers with;
   DayAnswers without;
-  DayAnswers anew;
+  DayAnswers rerecorded;
   std::size_t max_views = robot.views();
   const int asked_every = std::max(1, options.days / 6);
   for (int day = 1; day <= options.days; ++day) {
@@ -231,7 +231,7 @@ void reproduce_days(const ElsewhereReproductionOptions& options, const std::stri
       with = ask(robot.remembered(), queries, executor);
       without = ask(still, queries, executor);
       if (day == options.days) {
-        anew = ask(remade(today, seed + 50'000, executor), queries, executor);
+        rerecorded = ask(recorded_again(today, seed + 50'000, executor), queries, executor);
       }
       add_point(with_learning, day, success_rate(with.right, queries.size()));
       add_point(without_learning, day, success_rate(without.right, queries.size()));
@@ -250,8 +250,8 @@ void reproduce_days(const ElsewhereReproductionOptions& options, const std::stri
   add_rate(result, id + ".with", what + "single pictures localised within one spacing, learning",
            with.right, asked, at_least(0.98));
   add_rate(result, id + ".without", what + "the same without learning", without.right, asked);
-  add_rate(result, id + ".anew", what + "the same with a memory made anew that day", anew.right,
-           asked);
+  add_rate(result, id + ".rerecorded", what + "the same with a memory recorded again that day",
+           rerecorded.right, asked);
   add_rate(result, id + ".wrong", what + "answers farther off than one spacing, learning",
            with.wrong, asked);
   add_rate(result, id + ".wrong_without", what + "the same without learning", without.wrong, asked);

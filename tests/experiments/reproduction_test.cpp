@@ -95,7 +95,7 @@ TEST_F(Reproductions, ElsewhereIsTheSameOnOneAndTwoThreads) {
        {"elsewhere.places.office.clean.known", "elsewhere.places.lab.radius",
         "elsewhere.places.other", "elsewhere.places.variant", "elsewhere.home.foreign",
         "elsewhere.home.noise_16", "elsewhere.tilt.lab.3", "elsewhere.tracks.office.ellipse",
-        "elsewhere.days.office.with", "elsewhere.days.office.anew",
+        "elsewhere.days.office.with", "elsewhere.days.office.rerecorded",
         "elsewhere.days.office.views"}) {
     EXPECT_TRUE(ids.contains(id)) << id;
   }
