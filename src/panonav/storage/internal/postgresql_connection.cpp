@@ -198,10 +198,13 @@ PostgresqlConnection::PostgresqlConnection(const ServerAddress& address) : shown
       "SELECT set_config('synchronous_commit', 'on', false) "
       "WHERE current_setting('synchronous_commit') = 'off'");
   // A robot that lost its network during a change holds the memory's lock until the server knows.
-  // Not every system has all of these settings.
-  try_execute("SET tcp_keepalives_idle = 10; SET tcp_keepalives_interval = 5");
-  try_execute("SET tcp_keepalives_count = 3");
-  try_execute("SET tcp_user_timeout = 20000");
+  // Not every system has all of these settings; one message, as a network may be slow.
+  try_execute(
+      "DO $$ DECLARE wanted text[]; BEGIN FOREACH wanted SLICE 1 IN ARRAY ARRAY["
+      "['tcp_keepalives_idle', '10'], ['tcp_keepalives_interval', '5'], "
+      "['tcp_keepalives_count', '3'], ['tcp_user_timeout', '20000']] LOOP "
+      "BEGIN PERFORM set_config(wanted[1], wanted[2], false); "
+      "EXCEPTION WHEN OTHERS THEN NULL; END; END LOOP; END $$");
 }
 
 std::string PostgresqlConnection::message() const {
