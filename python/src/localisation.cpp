@@ -1,6 +1,7 @@
 #include "bindings.hpp"
 #include "memories.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/pipeline/memory_learner.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
 #include "panonav/pipeline/tracker.hpp"
@@ -351,12 +352,69 @@ void bind_tracker(py::module_& m) {
           "(n, 4) of x_m, y_m, heading_rad, weight.");
 }
 
+void bind_learner(py::module_& m) {
+  using Changes = MemoryLearner::Changes;
+  Record<Changes>(m, "MemoryLearnerChanges", "What a run did to its memory.")
+      .field("seen", &Changes::seen, "Observations with odometry.")
+      .field("certain", &Changes::certain, "Of these, whose place was certain and new.")
+      .field("reinforced", &Changes::reinforced,
+             "Views of the memory that explained what the robot saw.")
+      .field("added", &Changes::added, "Views of this run.")
+      .field("replaced", &Changes::replaced, "Views that were dropped for added ones.")
+      .field("forgotten", &Changes::forgotten,
+             "Views that were dropped because they had failed for long.")
+      .field("views", &Changes::views, "Of the memory now.");
+  using SharedLearner = Shared<MemoryLearner>;
+  py::class_<SharedLearner>(
+      m, "MemoryLearner",
+      "Keeps a memory file true while its places change: hears what a robot saw on a run and what "
+      "the memory answered, and `finish` changes the file, in one step that MemoryFile.undo takes "
+      "back. It is for one run; recognisers that were made before know the former views.")
+      .def(py::init([](const std::filesystem::path& memory, const py::kwargs& keywords) {
+             MemoryUpdateOptions options;
+             Keywords(keywords).options(options).finish();
+             const py::gil_scoped_release free;
+             return std::make_unique<SharedLearner>(memory, options);
+           }),
+           py::arg("memory"),
+           with_options("`memory`: the path of a memory file that can be written, or the address "
+                        "of a memory on a server.",
+                        {options_of<MemoryUpdateOptions>()})
+               .c_str())
+      .def(
+          "see",
+          [](SharedLearner& learner, const py::object& observation, const Panorama& panorama,
+             const NamedPlace& place) {
+            const Observation seen = observation_from(observation);
+            learner.change([&](MemoryLearner& l) { l.see(seen, panorama, place); });
+          },
+          py::arg("observation"), py::arg("panorama"), py::arg("place"),
+          "The next observation of the run, which needs its odometry (another says nothing and is "
+          "left out), with its panorama (PlaceRecogniser.panorama) and its answer.")
+      .def_property_readonly(
+          "near_known_places",
+          [](const SharedLearner& learner) {
+            return learner.read([](const MemoryLearner& l) { return l.near_known_places(); });
+          },
+          "Whether the observation seen last is so near to one whose place was surely known that "
+          "it will be placed by odometry.")
+      .def(
+          "finish",
+          [](SharedLearner& learner, const std::string& what) {
+            return learner.change([&](MemoryLearner& l) { return l.finish(what); });
+          },
+          py::arg("what"),
+          "Changes the file and learns its models anew. `what`: the run, for the file's history. "
+          "Once.");
+}
+
 }  // namespace
 
 void bind_localisation(py::module_& m) {
   bind_places(m);
   bind_recogniser(m);
   bind_tracker(m);
+  bind_learner(m);
 }
 
 }  // namespace panonav::python

@@ -254,6 +254,11 @@ void bind_memory_file(py::module_& m) {
   Record<MemoryFault>(m, "MemoryFault", "What is wrong in a memory file.")
       .field("view", &MemoryFault::view, "Where it concerns one.")
       .field("what", &MemoryFault::what, "One line.");
+  Record<KeptChange>(m, "KeptChange", "A change of a memory that was kept for `undo`.")
+      .field("what", &KeptChange::what, "For people.")
+      .field("stamp_s", &KeptChange::stamp_s, "Seconds since 1970, or None.")
+      .field("bytes", &KeptChange::bytes, "That are kept for taking it back.")
+      .field("undoable", &KeptChange::undoable, "False: too old, only its description is left.");
   Record<MemoryHeader>(m, "MemoryHeader",
                        "What a memory file says of all its views: how pictures become signatures.")
       .field(
@@ -344,7 +349,11 @@ void bind_memory_file(py::module_& m) {
           py::arg("views"), "Also drops their links, thumbnails and features; all or none.")
       .def(
           "undo", [](SharedFile& s) { s.change([](MemoryFile& f) { f.undo(); }); },
-          "Takes back the last change that the command kept for this.")
+          "Takes back the newest change of `history`.")
+      .def(
+          "history",
+          [](SharedFile& s) { return s.change([](MemoryFile& f) { return f.history(); }); },
+          "The changes that were kept for `undo`, the newest first.")
       .def(
           "map_names",
           [](SharedFile& s) { return s.change([](MemoryFile& f) { return f.map_names(); }); },

@@ -333,6 +333,9 @@ TEST_F(MemoryLearning, WithoutOdometryNothingIsSaidAndNothingLearnt) {
   const auto changes = learner.finish("nothing");
   EXPECT_EQ(changes.seen, 0U);
   EXPECT_TRUE(file().history().empty());
+  EXPECT_THROW((void)learner.finish("nothing"), ContractError);
+  EXPECT_THROW(learner.see(seen, recogniser.encoder().panorama(seen), recogniser.localise(seen)),
+               ContractError);
 }
 
 TEST_F(MemoryLearning, MemoriesWithoutHeadingsAreRefused) {

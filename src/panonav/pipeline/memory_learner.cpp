@@ -101,6 +101,11 @@ struct MemoryLearner::Implementation {
   MemoryUpdate update;
   std::map<std::size_t, NewView> kept;  // by their numbers in the run
   std::size_t seen = 0;
+  bool finished = false;
+
+  void require_unfinished() const {
+    if (finished) throw ContractError("run", "finished", "one learner for each run");
+  }
 };
 
 MemoryLearner::MemoryLearner(const std::filesystem::path& memory,
@@ -113,6 +118,7 @@ MemoryLearner& MemoryLearner::operator=(MemoryLearner&&) noexcept = default;
 void MemoryLearner::see(const Observation& observation, const Panorama& panorama,
                         const Place& place) {
   auto& self = *implementation_;
+  self.require_unfinished();
   if (!observation.odometry) return;
   NewView view;
   view.info.name = observation.name;
@@ -138,6 +144,8 @@ bool MemoryLearner::near_known_places() const {
 
 MemoryLearner::Changes MemoryLearner::finish(const std::string& what) {
   auto& self = *implementation_;
+  self.require_unfinished();
+  self.finished = true;
   RunChanges planned = self.update.finish();
   Changes changes{.seen = self.seen, .certain = planned.certain, .views = self.memory.size()};
   if (planned.certain == 0) return changes;

@@ -30,7 +30,8 @@ class MemoryLearner {
   MemoryLearner& operator=(MemoryLearner&&) noexcept;
 
   /// The next observation, which needs its odometry (another says nothing and is left out), with
-  /// its panorama of the memory's shape and the answer of the memory.
+  /// its panorama of the memory's shape and the answer of the memory. Throws ContractError on
+  /// another shape and after `finish`.
   void see(const Observation& observation, const Panorama& panorama, const Place& place);
   /// The observation seen last is so near to one whose place was surely known that the update will
   /// place it by odometry.
@@ -47,7 +48,8 @@ class MemoryLearner {
     std::size_t views = 0;       ///< of the memory now
   };
   /// Changes the file and learns its models anew, in one transaction. `what`: the run, for the
-  /// history. Once. Throws FileError; the file is as it was then.
+  /// history. Once. Throws FileError; the file is as it was then. Throws ContractError the second
+  /// time.
   Changes finish(const std::string& what);
 
  private:
