@@ -52,6 +52,9 @@ void reproduce_floor(const ElsewhereReproductionOptions& options, const std::str
 /// without learning.
 void reproduce_days(const ElsewhereReproductionOptions& options, const std::string& place,
                     Executor& executor, Reproduction& result);
+/// Memories of two walks each, through one place and through two, made into one.
+void reproduce_merging(const ElsewhereReproductionOptions& options, Executor& executor,
+                       Reproduction& result);
 /// A recording, a data set's folder: each picture, turned, is asked of the memory of all others, of
 /// panonav, of rivals that need no library, and of those that the caller has beside them.
 void reproduce_leave_one_out(const ElsewhereReproductionOptions& options,

@@ -18,6 +18,8 @@ ElsewhereReproductionOptions quick_run(ElsewhereReproductionOptions options) {
   options.floors = false;
   options.days = 3;
   options.day_pictures = 20;
+  options.walks = 2;
+  options.walk_pictures = 60;
   return options;
 }
 
@@ -28,6 +30,8 @@ Reproduction reproduce_elsewhere(const ElsewhereReproductionOptions& options, Ex
   require(options.runs >= 2, "runs", options.runs, ">= 2");
   require(options.days >= 1, "days", options.days, ">= 1");
   require(options.day_pictures >= 4, "day_pictures", options.day_pictures, ">= 4");
+  require(options.walks >= 2, "walks", options.walks, ">= 2");
+  require(options.walk_pictures >= 32, "walk_pictures", options.walk_pictures, ">= 32");
   require(!options.built_in.empty(), "built-in scenes", 0.0, ">= 1");
   make_folder(options.out);
   Reproduction result;
@@ -62,6 +66,8 @@ Reproduction reproduce_elsewhere(const ElsewhereReproductionOptions& options, Ex
     stages.push_back({std::string("days in ") + name, 60.0,
                       [&, name] { reproduce_days(options, name, executor, result); }});
   }
+  stages.push_back(
+      {"merged memories", 200.0, [&] { reproduce_merging(options, executor, result); }});
   if (options.floors) {
     for (const std::string& world : all_worlds_in(options.data)) {
       for (const double spacing_m : {0.5, 0.3}) {
