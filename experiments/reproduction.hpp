@@ -171,7 +171,7 @@ struct ElsewhereReproductionOptions {
   int rows = 80;              ///< of the views
   bool floors = true;         ///< whole floors of the worlds are arranged
   int days = 30;              ///< that a place changes while its memory learns, >= 1
-  int day_pictures = 120;     ///< of a robot's errands on each of them, half a metre apart, >= 4
+  int day_pictures = 120;     ///< of a robot's way on each of them, half a metre apart, >= 4
   int walks = 20;             ///< through each place whose memories are merged, pair by pair, >= 2
   int walk_pictures = 600;    ///< of each of them, 10 cm apart, >= 32
   std::uint64_t seed = 5001;  ///< of the first variant; the others follow it

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "experiments/elsewhere/experiments.hpp"
@@ -75,29 +76,77 @@ RememberedPlace recorded_again(PlaceRecording today, std::uint64_t seed, Executo
   return {std::move(memory), features};
 }
 
-/// A robot that goes to one random place after the other, with a picture each spacing.
-std::vector<Pose2> errands(const FreeSpace& space, int pictures, Random& random) {
-  std::vector<Pose2> path;
-  Point2 at = space.random_pose(random).position();
-  double left_m = 0.0;  // to the next picture
-  while (static_cast<int>(path.size()) < pictures) {
-    const auto way = space.shortest_path(at, space.random_pose(random).position());
-    if (!way) continue;
-    for (const Point2 next : *way) {
-      const double heading_rad = std::atan2(next.y_m - at.y_m, next.x_m - at.x_m);
-      double leg_m = distance(at, next);
-      while (leg_m >= left_m && static_cast<int>(path.size()) < pictures) {
-        at = {at.x_m + left_m * std::cos(heading_rad), at.y_m + left_m * std::sin(heading_rad)};
-        leg_m -= left_m;
-        path.push_back({at.x_m, at.y_m, heading_rad});
-        left_m = spacing_m;
+/// How a robot spends its days.
+enum class DailyDrive {
+  errands,  ///< from one random place to the next
+  rounds,   ///< to the places that it has passed longest ago, the nearest of them first
+};
+
+/// A robot that drives through a place day by day and takes a picture each spacing.
+class DrivingRobot {
+ public:
+  explicit DrivingRobot(DailyDrive drive) : drive_(drive) {}
+
+  /// The poses of the day's pictures; the day begins anywhere.
+  std::vector<Pose2> pass_day(const FreeSpace& space, int pictures, Random& random) {
+    ++day_;
+    std::vector<GridPosition> grid;
+    if (drive_ == DailyDrive::rounds) grid = space.grid(spacing_m);
+    std::vector<Pose2> path;
+    Point2 at = space.random_pose(random).position();
+    double left_m = 0.0;  // to the next picture
+    while (static_cast<int>(path.size()) < pictures) {
+      Point2 goal = space.random_pose(random).position();
+      if (drive_ == DailyDrive::rounds) goal = longest_ago(grid, at).value_or(goal);
+      passed_[square_of(goal)] = day_;
+      const auto way = space.shortest_path(at, goal);
+      if (!way) continue;
+      for (const Point2 next : *way) {
+        const double heading_rad = std::atan2(next.y_m - at.y_m, next.x_m - at.x_m);
+        double leg_m = distance(at, next);
+        while (leg_m >= left_m && static_cast<int>(path.size()) < pictures) {
+          at = {at.x_m + left_m * std::cos(heading_rad), at.y_m + left_m * std::sin(heading_rad)};
+          leg_m -= left_m;
+          path.push_back({at.x_m, at.y_m, heading_rad});
+          for (const GridPosition& place : grid) {
+            if (distance(place.position, at) <= spacing_m) {
+              passed_[square_of(place.position)] = day_;
+            }
+          }
+          left_m = spacing_m;
+        }
+        left_m -= leg_m;
+        at = next;
       }
-      left_m -= leg_m;
-      at = next;
     }
+    return path;
   }
-  return path;
-}
+
+ private:
+  using Square = std::pair<long, long>;
+  static Square square_of(Point2 p) {
+    return {std::lround(p.x_m / spacing_m), std::lround(p.y_m / spacing_m)};
+  }
+  /// Empty where the robot is at the only place that there is.
+  [[nodiscard]] std::optional<Point2> longest_ago(const std::vector<GridPosition>& grid,
+                                                  Point2 at) const {
+    std::optional<Point2> best;
+    std::pair<int, double> least;
+    for (const GridPosition& place : grid) {
+      const auto found = passed_.find(square_of(place.position));
+      const double distance_m = distance(place.position, at);
+      const std::pair rank(found == passed_.end() ? 0 : found->second, distance_m);
+      if (distance_m < 0.5 * spacing_m || (best && least <= rank)) continue;
+      best = place.position;
+      least = rank;
+    }
+    return best;
+  }
+
+  DailyDrive drive_;
+  int day_ = 0;
+  std::map<Square, int> passed_;  ///< the day
+};
 
 /// Known places, and of these positions within one spacing of the truth.
 struct DayAnswers {
@@ -204,14 +253,36 @@ void reproduce_days(const ElsewhereReproductionOptions& options, const std::stri
   const VisualMemory memory = memory_of_references(place, executor);
   const Features features = features_of(place, memory);
   const RememberedPlace still(memory, features);
-  LearningRobot robot(memory, features);
+  struct Robot {
+    std::string id;
+    std::string what;
+    DrivingRobot driving;
+    LearningRobot learning;
+    std::size_t max_views;
+    DayAnswers answers;
+    Series series;
+  };
+  std::vector<Robot> robots;
+  robots.push_back({".with",
+                    "learning on errands",
+                    DrivingRobot(DailyDrive::errands),
+                    LearningRobot(memory, features),
+                    memory.size(),
+                    {},
+                    {}});
+  robots.push_back({".rounds",
+                    "learning on rounds",
+                    DrivingRobot(DailyDrive::rounds),
+                    LearningRobot(memory, features),
+                    memory.size(),
+                    {},
+                    {}});
+  for (Robot& robot : robots) robot.series.label = robot.what;
   Random light(options.seed, 91);
-  Series with_learning{.label = "with learning"};
-  Series without_learning{.label = "without"};
-  DayAnswers with;
+  Series without_learning{.label = "without learning"};
   DayAnswers without;
   DayAnswers rerecorded;
-  std::size_t max_views = robot.views();
+  const auto asked = static_cast<std::size_t>(3 * options.queries);
   const int asked_every = std::max(1, options.days / 6);
   for (int day = 1; day <= options.days; ++day) {
     changing.pass_day(moved_share);
@@ -224,61 +295,74 @@ void reproduce_days(const ElsewhereReproductionOptions& options, const std::stri
     if (day == 1 || day % asked_every == 0 || day == options.days) {
       Random random(seed, 6);
       std::vector<Pose2> poses;
-      for (int q = 0; q < 3 * options.queries; ++q) {
+      for (std::size_t q = 0; q < asked; ++q) {
         poses.push_back(today.free_space->random_pose(random));
       }
       const auto queries = take_views(today, place.rendering, poses, seed + 500, {}, executor);
-      with = ask(robot.remembered(), queries, executor);
       without = ask(still, queries, executor);
+      add_point(without_learning, day, success_rate(without.right, asked));
+      for (Robot& robot : robots) {
+        robot.answers = ask(robot.learning.remembered(), queries, executor);
+        add_point(robot.series, day, success_rate(robot.answers.right, asked));
+      }
       if (day == options.days) {
         rerecorded = ask(recorded_again(today, seed + 50'000, executor), queries, executor);
       }
-      add_point(with_learning, day, success_rate(with.right, queries.size()));
-      add_point(without_learning, day, success_rate(without.right, queries.size()));
     }
     if (day == options.days) break;
-    Random walking(seed, 5);
-    const auto path = errands(*today.free_space, options.day_pictures, walking);
-    robot.learn(take_views(today, place.rendering, path, seed, {}, executor), seed, executor);
-    max_views = std::max(max_views, robot.views());
+    for (Robot& robot : robots) {
+      Random driving(seed, 5);
+      const auto path = robot.driving.pass_day(*today.free_space, options.day_pictures, driving);
+      robot.learning.learn(take_views(today, place.rendering, path, seed, {}, executor), seed,
+                           executor);
+      robot.max_views = std::max(robot.max_views, robot.learning.views());
+    }
   }
-  const auto asked = static_cast<std::size_t>(3 * options.queries);
   const std::string id = "elsewhere.days." + name;
   const std::string what = name + ", day " + std::to_string(options.days) + ", " +
                            std::to_string(changing.moved()) + " of " +
                            std::to_string(changing.movable()) + " objects moved: ";
-  add_rate(result, id + ".with", what + "single pictures localised within one spacing, learning",
-           with.right, asked, at_least(0.98));
-  add_rate(result, id + ".without", what + "the same without learning", without.right, asked);
+  add_rate(result, id + ".without",
+           what + "single pictures localised within one spacing, without learning", without.right,
+           asked);
   add_rate(result, id + ".rerecorded", what + "the same with a memory recorded again that day",
            rerecorded.right, asked);
-  add_rate(result, id + ".wrong", what + "answers farther off than one spacing, learning",
-           with.wrong, asked);
-  add_rate(result, id + ".wrong_without", what + "the same without learning", without.wrong, asked);
-  if (!with.errors_m.empty() && !without.errors_m.empty()) {
-    add_median(result, id + ".error", what + "error of positions, learning", "m", with.errors_m);
-    add_median(result, id + ".error_without", what + "the same without learning", "m",
+  add_rate(result, id + ".wrong_without",
+           what + "answers farther off than one spacing, without learning", without.wrong, asked);
+  if (!without.errors_m.empty()) {
+    add_median(result, id + ".error_without", what + "error of positions, without learning", "m",
                without.errors_m);
   }
-  add_row(result, id + ".views",
-          name + ": views of the memory, most on any day, over those at first",
-          static_cast<double>(max_views) / static_cast<double>(memory.size()), "",
-          at_most(static_cast<double>(MemoryUpdateOptions{}.appearances)));
-  result.rows.back().over = std::to_string(memory.size()) + " at first, " +
-                            std::to_string(robot.added()) + " learnt, " +
-                            std::to_string(robot.dropped()) + " dropped";
-  add_plot(
-      result, options.out, "days_" + name + ".svg",
-      "Single pictures of " + name +
-          " that are localised within one spacing, while objects move and light changes.",
-      LinePlot{
-          .x_label = "day", .y_label = "localised", .series = {with_learning, without_learning}});
-  const auto astray = static_cast<std::size_t>(
-      std::ranges::count_if(robot.errors_m(), [](double error_m) { return error_m > spacing_m; }));
-  if (robot.added() > 0) {
-    add_rate(result, id + ".astray", name + ": views learnt farther off than one spacing", astray,
-             robot.added(), at_most(0.0));
+  for (const Robot& robot : robots) {
+    const std::string row = id + robot.id;
+    const std::string which = what + robot.what + ", ";
+    add_rate(result, row, which + "localised within one spacing", robot.answers.right, asked,
+             at_least(0.98));
+    add_rate(result, row + ".wrong", which + "answers farther off than that", robot.answers.wrong,
+             asked);
+    if (!robot.answers.errors_m.empty()) {
+      add_median(result, row + ".error", which + "error of positions", "m", robot.answers.errors_m);
+    }
+    add_row(result, row + ".views",
+            which + "views of the memory, most on any day, over those at first",
+            static_cast<double>(robot.max_views) / static_cast<double>(memory.size()), "",
+            at_most(static_cast<double>(MemoryUpdateOptions{}.appearances)));
+    result.rows.back().over = std::to_string(memory.size()) + " at first, " +
+                              std::to_string(robot.learning.added()) + " learnt, " +
+                              std::to_string(robot.learning.dropped()) + " dropped";
+    if (robot.learning.added() > 0) {
+      const auto astray = static_cast<std::size_t>(std::ranges::count_if(
+          robot.learning.errors_m(), [](double error_m) { return error_m > spacing_m; }));
+      add_rate(result, row + ".astray", which + "views learnt farther off than one spacing", astray,
+               robot.learning.added(), at_most(0.0));
+    }
   }
+  add_plot(result, options.out, "days_" + name + ".svg",
+           "Single pictures of " + name +
+               " that are localised within one spacing, while objects move and light changes.",
+           LinePlot{.x_label = "day",
+                    .y_label = "localised",
+                    .series = {robots[0].series, robots[1].series, without_learning}});
 }
 
 }  // namespace panonav

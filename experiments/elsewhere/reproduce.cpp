@@ -19,7 +19,7 @@ ElsewhereReproductionOptions quick_run(ElsewhereReproductionOptions options) {
   options.days = 3;
   options.day_pictures = 20;
   options.walks = 2;
-  options.walk_pictures = 60;
+  options.walk_pictures = 40;
   return options;
 }
 

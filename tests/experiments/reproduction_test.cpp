@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "panonav/core/error.hpp"
 #include "support/reproductions.hpp"
 
@@ -87,6 +89,8 @@ TEST_F(Reproductions, ElsewhereIsTheSameOnOneAndTwoThreads) {
                                 .rows = 20,
                                 .days = 3,
                                 .day_pictures = 12,
+                                .walks = 2,
+                                .walk_pictures = 40,
                                 .seed = 7},
                                executor);
   };
@@ -96,9 +100,11 @@ TEST_F(Reproductions, ElsewhereIsTheSameOnOneAndTwoThreads) {
         "elsewhere.places.other", "elsewhere.places.variant", "elsewhere.home.foreign",
         "elsewhere.home.noise_16", "elsewhere.tilt.lab.3", "elsewhere.tracks.office.ellipse",
         "elsewhere.days.office.with", "elsewhere.days.office.rerecorded",
-        "elsewhere.days.office.views"}) {
+        "elsewhere.days.office.with.views", "elsewhere.days.office.rounds"}) {
     EXPECT_TRUE(ids.contains(id)) << id;
   }
+  EXPECT_TRUE(std::ranges::any_of(
+      ids, [](const std::string& id) { return id.starts_with("elsewhere.merge.loop."); }));
 }
 
 TEST_F(Reproductions, RefuseWhatMakesNoSenseAndFoldersThatCannotBeMade) {
