@@ -12,7 +12,8 @@ namespace panonav::testing {
 namespace {
 
 /// Files that the program of each version of the format wrote, and that stay as they are:
-/// data/version_N.panonav. 7 keeps two changes. All have five views with numbers that
+/// data/version_N.panonav. 7 keeps two changes, and 8 is
+/// synchronised with a server besides. All have five views with numbers that
 /// follow from those of the view; 2 has a chain, from 3 on there is a map, from 4 on a route.
 class GoldenMemoryFiles : public ::testing::TestWithParam<int> {
  protected:
@@ -99,7 +100,7 @@ TEST_P(GoldenMemoryFiles, AreReadAndGrow) {
   more.info.name = "more.png";
   more.signature = file.load().packed(ViewId{1});
   EXPECT_EQ(file.append(more), ViewId{6});
-  EXPECT_EQ(file.info().format_version, 7);
+  EXPECT_EQ(file.info().format_version, 8);
   file.change([&] { file.remove(std::array{ViewId{6}}); }, "removed");
   EXPECT_TRUE(file.verify().empty());
   expect_views(file);
@@ -122,7 +123,7 @@ TEST(GoldenMemoryFile, TheChangeThatAnOlderVersionKeptIsTakenBack) {
   }
   MemoryFile file = MemoryFile::open(path, Access::read_write);
   file.change([&] { file.set_parameter("mark", "x"); }, "mark");
-  EXPECT_EQ(file.info().format_version, 7);
+  EXPECT_EQ(file.info().format_version, 8);
   ASSERT_EQ(file.history().size(), 2U);
   file.undo();
   EXPECT_EQ(file.undoable(), "forget: 1 views dropped");
@@ -132,7 +133,7 @@ TEST(GoldenMemoryFile, TheChangeThatAnOlderVersionKeptIsTakenBack) {
   EXPECT_TRUE(file.verify().empty());
 }
 
-INSTANTIATE_TEST_SUITE_P(Versions, GoldenMemoryFiles, ::testing::Range(1, 8));
+INSTANTIATE_TEST_SUITE_P(Versions, GoldenMemoryFiles, ::testing::Range(1, 9));
 
 }  // namespace
 }  // namespace panonav::testing

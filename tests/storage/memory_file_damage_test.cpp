@@ -164,8 +164,8 @@ TEST_F(MemoryFileDamage, ForeignFilesAreRefused) {
 
 TEST_F(MemoryFileDamage, NewerFilesAreRefused) {
   { (void)MemoryFile::create(path, small_header()); }
-  run_sql(path, "PRAGMA journal_mode=DELETE; PRAGMA user_version=8");
-  expect_refused_unchanged(path, "newer version: format version is 8; allowed: 1 .. 7");
+  run_sql(path, "PRAGMA journal_mode=DELETE; PRAGMA user_version=9");
+  expect_refused_unchanged(path, "newer version: format version is 9; allowed: 1 .. 8");
 }
 
 TEST_F(MemoryFileDamage, OtherTablesAreRefused) {

@@ -101,7 +101,7 @@ TEST_F(MemoryFileContent, ContentComesBack) {
   EXPECT_EQ(info.links, 1U);
   EXPECT_EQ(info.thumbnails, 13U);
   EXPECT_GT(info.file_bytes, 50 * 2 * header.shape.size());
-  EXPECT_EQ(info.format_version, 7);
+  EXPECT_EQ(info.format_version, 8);
   std::uint64_t positions = 0;
   std::uint64_t headings = 0;
   for (const ViewId view : expected.views()) {
@@ -350,7 +350,7 @@ TEST_F(MemoryFileContent, ChainsOfAnOlderVersionAreCountedAndStayAsTheyAre) {
     file.remove(file.views());
   }
   const MemoryFile file = MemoryFile::open(path, Access::read_only);
-  EXPECT_EQ(file.info().format_version, 7);
+  EXPECT_EQ(file.info().format_version, 8);
   EXPECT_EQ(file.info().unused_chains, 1U);
   EXPECT_TRUE(file.verify().empty());
   EXPECT_EQ(chains_in(path), before);
@@ -375,7 +375,7 @@ TEST_F(MemoryFileContent, AnOlderFileIsReadAsItIsAndGrowsWithItsFirstChange) {
   MemoryFile file = MemoryFile::open(path, Access::read_write);
   file.append(random_view(random, shape, 2));
   file.save_map("map", {});
-  EXPECT_EQ(file.info().format_version, 7);
+  EXPECT_EQ(file.info().format_version, 8);
   EXPECT_EQ(file.load().size(), 2U);
   EXPECT_TRUE(file.verify().empty());
 }
@@ -386,8 +386,8 @@ TEST_F(MemoryFileContent, LocalFeaturesAreKeptCheckedAndGoWithTheirView) {
   const SignatureShape shape = small_header().shape;
   (void)MemoryFile::create(path, small_header()).append(random_view(random, shape, 1));
   run_sql(path,
-          "PRAGMA journal_mode=DELETE; DROP TABLE features; DROP TABLE history; PRAGMA "
-          "user_version=5; PRAGMA "
+          "PRAGMA journal_mode=DELETE; DROP TABLE features; DROP TABLE history; DROP TABLE "
+          "synchronised; DROP TABLE synchronised_links; PRAGMA user_version=5; PRAGMA "
           "journal_mode=WAL");
   const ViewId old{1};
   {
@@ -403,7 +403,7 @@ TEST_F(MemoryFileContent, LocalFeaturesAreKeptCheckedAndGoWithTheirView) {
     const ViewId view = file.append(added);
     EXPECT_FALSE(file.features(old));
     EXPECT_EQ(file.features(view), added.features);
-    EXPECT_EQ(file.info().format_version, 7);
+    EXPECT_EQ(file.info().format_version, 8);
     EXPECT_EQ(file.info().views_with_features, 1U);
     EXPECT_EQ(file.info().feature_bytes, 72U);
     EXPECT_TRUE(file.verify().empty());

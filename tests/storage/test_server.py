@@ -19,7 +19,7 @@ PANONAV, TEST_STORAGE, SERVER = sys.argv[1:4]
 SHARED = ("MemoryFileContent.HeadersComeBack:MemoryFileContent.ContentComesBack:MemoryFileContent.IdsAre*:"
           "MemoryFileContent.Para*:MemoryFileContent.ABad*:MemoryFileContent.Readers*:MemoryFileContent.TwoW*:"
           "MapTables.*:RouteTables.W*:RouteTables.B*:MemoryFileUndo.*:"
-          "ViewsOfAMemoryFile.AreThose*:ViewsOfAMemoryFile.See*:MemoryOnServer.*"
+          "ViewsOfAMemoryFile.AreThose*:ViewsOfAMemoryFile.See*:MemoryOnServer.*:SynchronisedMemory.*"
           # What attacks a file, and how many changes a file keeps for undo: a server keeps the last one.
           "-*Tampered*:MemoryFileUndo.Damage*:MemoryFileUndo.BringsBackAll*:MemoryFileUndo.History*")
 
@@ -257,6 +257,141 @@ def encrypted(server, folder):
         server.start()
 
 
+def synchronised(server, folder):
+    """The verb: what it says, who may what, a server that is older than before, rows that nobody wrote."""
+    address = server.memory("fleet", more="&robot=one")
+    one, two = folder / "one.panonav", folder / "two.panonav"
+    run(PANONAV, "memorise", folder / "grid", one)
+    views = json.loads(run(PANONAV, "list", one, "--json"))["views"]
+
+    def sync(file, address, *more):
+        return json.loads(run(PANONAV, "synchronise", file, address, "--json", *more))
+
+    def names(memory):
+        return sorted(view["name"] for view in json.loads(run(PANONAV, "list", memory, "--json"))["views"])
+
+    first = sync(one, address)
+    assert first["uploaded"] == first["views"] == len(views) and first["seconds"] > 0, first
+    assert "nothing was new" in run(PANONAV, "synchronise", one, address)
+    second = sync(two, address)
+    assert second["downloaded"] == len(views), second
+    assert names(one) == names(two)
+    # The files answer alike, with models that were learnt again.
+    answers = [run(PANONAV, "localise", file, folder / "drive", "--json") for file in (one, two)]
+    assert re.sub("one.panonav", "two.panonav", answers[0]) == answers[1]
+    part = sync(folder / "part.panonav", address, "--around", "0", "0", "--within-m", "0")
+    assert 0 < part["downloaded"] < len(views), part
+    for words, saying in ((("--around", "1", "1"), "needs --within-m"), (("--within-m", "1"), "needs --around"),
+                          (("--around", "1", "1", "--within-m", "-1"), "radius_m is -1"),
+                          (("--around", "1", "1", "--within-m", "1e9"), "up to a million")):
+        done = subprocess.run([PANONAV, "synchronise", one, address, *words], capture_output=True, text=True)
+        assert done.returncode == 2 and saying in done.stderr, (words, done.stderr)
+    refused(PANONAV, "synchronise", one, two, saying="two.panonav.*address of a memory on a server")
+    refused(PANONAV, "synchronise", folder / "absent", server.memory("nothing"), saying="no memory 'nothing'")
+
+    # Whoever may only read takes, whoever may only add adds; the rest stays in the file.
+    reads, adds, curates = (server.memory("fleet", user) for user in ("reads", "adds", "curates"))
+    run(PANONAV, "copy", two, folder / "three.panonav")
+    three = folder / "three.panonav"
+    run(PANONAV, "memorise", folder / "drive", three)
+    run(PANONAV, "forget", three, "view_00001.png")
+    added = len(names(three)) - len(views) + 1
+    assert added > 10
+    said = sync(three, reads)
+    assert said["withheld"] == added and said["uploaded"] == 0 and said["downloaded"] == 1, said
+    run(PANONAV, "forget", three, "view_00001.png")
+    run(PANONAV, "rename", three, "view_00002.png", "renamed")
+    said = sync(three, adds)
+    assert said["uploaded"] == added and said["withheld"] == 2, said
+    assert "renamed" not in names(server.memory("fleet")) and "renamed" in names(three)
+    said = sync(three, curates)
+    assert (said["removed_on_server"], said["updated_on_server"], said["withheld"]) == (1, 1, 0), said
+    sync(one, address)
+    assert names(one) == names(three) == names(server.memory("fleet"))
+    # The other fleet has no such memory, and makes one of its own.
+    run(PANONAV, "copy", one, folder / "south.panonav")
+    assert sync(folder / "south.panonav", server.memory("fleet", "other"))["uploaded"] == len(names(one))
+    refused(PANONAV, "synchronise", one, server.memory("fleet", "other"), saying="with another memory than")
+    refused(PANONAV, "synchronise", one, server.memory("fleet", "stranger"), saying="permission denied")
+
+    # A server that comes back from a backup gets back what it had lost.
+    sync(two, address)
+    backup = folder / "backup"
+    backup.mkdir()
+    tables = ("memories", "views", "thumbnails", "features", "links", "uploads")
+    server.sql("; ".join(f"CREATE TABLE public.{table} AS SELECT * FROM panonav.{table}" for table in tables))
+    run(PANONAV, "simulate", "hall", folder / "more", "--random", "7", "--kind", "panorama", "--seed", "9")
+    for picture in (folder / "more").glob("view_*.png"):
+        picture.rename(picture.with_name("more_" + picture.name))
+    poses = folder / "more/poses.csv"
+    poses.write_text(poses.read_text().replace("view_", "more_view_"))
+    run(PANONAV, "memorise", folder / "more", one)
+    assert sync(one, address)["uploaded"] == 7
+    assert sync(two, address)["downloaded"] == 7
+    expected = names(two)
+    identity = "(SELECT id FROM panonav.memories WHERE name = 'fleet' AND fleet = '')"
+    server.sql("".join(f"DELETE FROM panonav.{table} WHERE memory = {identity}; INSERT INTO panonav.{table} SELECT * FROM "
+                       f"public.{table} WHERE memory = {identity};" for table in tables[1:]) +
+               f"UPDATE panonav.memories m SET last_view = b.last_view FROM public.memories b WHERE b.id = m.id")
+    run(PANONAV, "memorise", folder / "grid", folder / "four.panonav")
+    sync(folder / "four.panonav", address)  # knows nothing of it
+    run(PANONAV, "rename", folder / "four.panonav", "renamed", "by four")
+    back = sync(two, address)
+    assert back["restored"] and back["uploaded"] == 7 and back["removed_in_file"] == 0, back
+    again = sync(one, address)
+    assert again["uploaded"] == 0 and again["removed_in_file"] == 0, again
+    for file in (one, two, three, server.memory("fleet")):
+        if file in (one, two, three):
+            sync(file, address)
+        assert names(file) == expected, (file, names(file))
+    # Ids that were given again are other views.
+    server.sql("".join(f"DELETE FROM panonav.{table} WHERE memory = {identity}; INSERT INTO panonav.{table} SELECT * FROM "
+                       f"public.{table} WHERE memory = {identity};" for table in tables[1:]) +
+               f"UPDATE panonav.memories m SET last_view = b.last_view FROM public.memories b WHERE b.id = m.id")
+    run(PANONAV, "simulate", "hall", folder / "others", "--random", "30", "--kind", "panorama", "--seed", "11")
+    for picture in (folder / "others").glob("view_*.png"):
+        picture.rename(picture.with_name("other_" + picture.name))
+    poses = folder / "others/poses.csv"
+    poses.write_text(poses.read_text().replace("view_", "other_view_"))
+    run(PANONAV, "memorise", folder / "others", server.memory("fleet"))
+    back = sync(two, address)
+    assert back["restored"] and back["uploaded"] == 7 and back["downloaded"] == 30, back
+    sync(one, address)
+    assert names(one) == names(two) == names(server.memory("fleet")) and set(expected) < set(names(one))
+
+    # What nobody of us wrote is refused and changes nothing.
+    before = names(one)
+    server.sql(f"UPDATE panonav.views SET signature = signature || '\\x00' WHERE memory = {identity} AND id = 3; UPDATE "
+               f"panonav.views SET checksum = 5 WHERE memory = {identity} AND id = 3")
+    refused(PANONAV, "synchronise", one, address, saying="is damaged: view 3 does not match")
+    refused(PANONAV, "synchronise", folder / "new.panonav", address, saying="is damaged: view 3 does not match")
+    assert names(one) == before
+    server.sql(f"DELETE FROM panonav.views WHERE memory = {identity} AND id = 3")
+    assert sync(one, address)["removed_in_file"] == 1
+    run(PANONAV, "verify", one)
+    server.sql("; ".join(f"DROP TABLE public.{table}" for table in tables))
+
+
+def older_schema(server, folder):
+    """A server that an older panonav made: used as it is, and brought to this version by whoever may."""
+    server.sql("DROP TABLE panonav.uploads; ALTER TABLE panonav.memories DROP COLUMN identity; UPDATE "
+               "panonav.schema_version SET version = 1")
+    before = run(PANONAV, "list", server.memory("hall"), "--json")
+    refused(PANONAV, "synchronise", folder / "hall.panonav", server.memory("hall", "adds"),
+            saying="schema's version is 1; allowed: 2")
+    run(PANONAV, "memorise", folder / "grid", server.memory("old", "adds"))  # as before
+    assert server.sql("SELECT version FROM panonav.schema_version") == "1"
+    run(PANONAV, "copy", folder / "hall.panonav", folder / "migrated.panonav")
+    run(PANONAV, "synchronise", folder / "migrated.panonav", server.memory("hall"))
+    assert server.sql("SELECT version FROM panonav.schema_version") == "2"
+    assert json.loads(before)["views"] == json.loads(run(PANONAV, "list", server.memory("hall"), "--json"))["views"]
+    assert server.sql("SELECT count(DISTINCT identity) = count(*) FROM panonav.memories") == "t"
+    run(PANONAV, "synchronise", folder / "adds.panonav", server.memory("hall", "adds"))
+    server.sql("UPDATE panonav.schema_version SET version = 3")
+    refused(PANONAV, "info", server.memory("hall"), saying="newer version: schema version is 3; allowed: 1 .. 2")
+    server.sql("UPDATE panonav.schema_version SET version = 2")
+
+
 def killed_server(server):
     """What was acknowledged is there once, the rest not at all or whole."""
     address = server.memory("appended")
@@ -308,6 +443,10 @@ def main():
             print("served")
             roles(server, folder)
             print("roles")
+            synchronised(server, folder)
+            print("synchronised")
+            older_schema(server, folder)
+            print("older schema")
             wrong_addresses(server, folder)
             print("addresses")
             encrypted(server, folder)

@@ -93,7 +93,8 @@ inline void make_version_1(const std::filesystem::path& path) {
   run_sql(path,
           "PRAGMA journal_mode=DELETE; DROP TABLE log; DROP TABLE undo; DROP TABLE history; DROP "
           "TABLE maps; DROP TABLE "
-          "routes; DROP TABLE route_blocks; DROP TABLE features; PRAGMA user_version=1; PRAGMA "
+          "routes; DROP TABLE route_blocks; DROP TABLE features; DROP TABLE "
+          "synchronised; DROP TABLE synchronised_links; PRAGMA user_version=1; PRAGMA "
           "journal_mode=WAL");
 }
 

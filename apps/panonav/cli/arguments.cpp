@@ -194,8 +194,13 @@ void Arguments::option(const std::string& flag, std::optional<double>& value,
 
 void Arguments::option(const std::string& flag, std::optional<std::pair<double, double>>& value,
                        const std::string& help) {
-  add(flag, "LOW HIGH", help, [&value, name = long_form(flag)](auto words) {
-    value = {number_from_text(name, words[0]), number_from_text(name, words[1])};
+  option(flag, "LOW HIGH", value, help);
+}
+
+void Arguments::option(const std::string& flag, const std::string& words,
+                       std::optional<std::pair<double, double>>& value, const std::string& help) {
+  add(flag, words, help, [&value, name = long_form(flag)](auto typed) {
+    value = {number_from_text(name, typed[0]), number_from_text(name, typed[1])};
   });
 }
 

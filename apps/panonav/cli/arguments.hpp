@@ -79,6 +79,9 @@ class Arguments {
   /// Exactly two numbers, low and high.
   void option(const std::string& flag, std::optional<std::pair<double, double>>& value,
               const std::string& help);
+  /// Exactly two numbers; `words` stands for them in texts, "X_M Y_M".
+  void option(const std::string& flag, const std::string& words,
+              std::optional<std::pair<double, double>>& value, const std::string& help);
   /// Exactly two names; `words` stands for them in texts, "ODOM BASE".
   void option(const std::string& flag, const std::string& words,
               std::optional<std::pair<std::string, std::string>>& value, const std::string& help);

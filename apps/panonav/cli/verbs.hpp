@@ -40,6 +40,7 @@ namespace panonav::command {
 [[nodiscard]] Verb show_verb();
 [[nodiscard]] Verb simulate_verb();
 [[nodiscard]] Verb sweep_verb();
+[[nodiscard]] Verb synchronise_verb();
 [[nodiscard]] Verb track_verb();
 [[nodiscard]] Verb run_verb();
 [[nodiscard]] Verb undo_verb();

@@ -21,7 +21,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view recordings_parameter = "recordings";
 
 void add_optional(RecordBytes& bytes, const std::optional<double>& value) {
   if (value) {

@@ -158,7 +158,8 @@ class SettingsReader {
   bool has(const std::string& key) const { return settings_.contains(key); }
   void require_all_used() const {
     for (const auto& [key, value] : settings_) {
-      if (!key.starts_with("parameter.") && !used_.contains(key)) {
+      if (!key.starts_with("parameter.") && !key.starts_with("synchronised.") &&
+          !used_.contains(key)) {
         throw ContractError("setting " + key, "unknown", "the settings in docs/formats.md");
       }
     }

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/storage/internal/memory_rows.hpp"
 #include "panonav/storage/internal/write_ahead_log.hpp"
 
@@ -29,7 +30,7 @@ struct Table {
 
 // Links have a < b. Every checksum is XXH64 over the other fields of its row (docs/formats.md). The
 // table `log` comes first, so that new files have it on their second page.
-constexpr std::array<Table, 11> tables{{
+constexpr std::array<Table, 13> tables{{
     {"log",
      "CREATE TABLE log(id INTEGER PRIMARY KEY, before BLOB NOT NULL, now BLOB NOT NULL) STRICT", 5},
     {"undo",
@@ -52,6 +53,15 @@ constexpr std::array<Table, 11> tables{{
      "CREATE TABLE settings(key TEXT NOT NULL PRIMARY KEY, value ANY NOT NULL, checksum INTEGER "
      "NOT NULL) STRICT, WITHOUT ROWID",
      1},
+    {"synchronised",
+     "CREATE TABLE synchronised(view INTEGER PRIMARY KEY, server_view INTEGER, local_checksum "
+     "INTEGER NOT NULL, server_checksum INTEGER NOT NULL, signature INTEGER NOT NULL, uploaded "
+     "INTEGER NOT NULL, sent INTEGER, checksum INTEGER NOT NULL) STRICT",
+     8},
+    {"synchronised_links",
+     "CREATE TABLE synchronised_links(a INTEGER NOT NULL, b INTEGER NOT NULL, kind INTEGER NOT "
+     "NULL, checksum INTEGER NOT NULL, PRIMARY KEY(a, b)) STRICT, WITHOUT ROWID",
+     8},
     {"thumbnails",
      "CREATE TABLE thumbnails(view INTEGER PRIMARY KEY, picture BLOB NOT NULL, checksum INTEGER "
      "NOT NULL) STRICT",
@@ -237,7 +247,7 @@ Settings read_settings(Database& database) {
     std::string key(rows.text(0));
     SettingValue value = value_in(rows, 1);
     if (rows.integer(2) != setting_checksum(key, value)) {
-      database.fail_damaged("checksum of setting " + key);
+      database.fail_damaged("checksum of setting " + readable_line(key));
     }
     settings.emplace(std::move(key), std::move(value));
   }

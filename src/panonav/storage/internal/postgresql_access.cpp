@@ -16,7 +16,8 @@ namespace panonav {
 PostgresqlConnection connect_to_memories(const ServerAddress& address, bool make_schema) {
   PostgresqlConnection connection(address);
   int version = schema_version(connection);
-  if (version < postgresql_schema_version && make_schema) {
+  if (version < postgresql_schema_version && make_schema &&
+      (version == 0 || may_migrate_schema(connection))) {
     migrate_schema(connection);
     version = postgresql_schema_version;
   }

@@ -21,7 +21,7 @@ namespace {
 
 // Numbers of PostgreSQL's own types, which never change.
 constexpr unsigned bytea_type = 17, int8_type = 20, text_type = 25, float8_type = 701,
-                   int8_array_type = 1016;
+                   int8_array_type = 1016, text_array_type = 1009;
 
 std::uint64_t big_endian_word(std::string_view bytes) {
   std::uint64_t word = 0;
@@ -94,6 +94,58 @@ PostgresqlValues& PostgresqlValues::add(std::span<const std::int64_t> values) {
     append_big_endian(bytes, static_cast<std::uint64_t>(value), 8);
   }
   return *this;
+}
+
+PostgresqlValues& PostgresqlValues::add(std::span<const std::string> texts) {
+  std::string& bytes = next(text_array_type).bytes;
+  append_big_endian(bytes, texts.empty() ? 0 : 1, 4);
+  append_big_endian(bytes, 0, 4);
+  append_big_endian(bytes, text_type, 4);
+  if (!texts.empty()) {
+    append_big_endian(bytes, texts.size(), 4);
+    append_big_endian(bytes, 1, 4);
+  }
+  for (const std::string& text : texts) {
+    append_big_endian(bytes, text.size(), 4);
+    bytes += text;
+  }
+  return *this;
+}
+
+CopyRows& CopyRows::begin_row(int fields) {
+  append_big_endian(bytes_, static_cast<std::uint64_t>(fields), 2);
+  return *this;
+}
+
+CopyRows& CopyRows::add(std::int64_t value) {
+  append_big_endian(bytes_, 8, 4);
+  append_big_endian(bytes_, static_cast<std::uint64_t>(value), 8);
+  return *this;
+}
+
+CopyRows& CopyRows::add(const std::optional<double>& value) {
+  if (!value) return add_null();
+  return add(std::bit_cast<std::int64_t>(*value + 0.0));
+}
+
+CopyRows& CopyRows::add(std::string_view text) {
+  append_big_endian(bytes_, text.size(), 4);
+  bytes_ += text;
+  return *this;
+}
+
+CopyRows& CopyRows::add(std::span<const std::uint8_t> bytes) {
+  return add(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+}
+
+CopyRows& CopyRows::add_null() {
+  append_big_endian(bytes_, 0xFFFFFFFFU, 4);
+  return *this;
+}
+
+std::string_view CopyRows::finish() {
+  append_big_endian(bytes_, 0xFFFFU, 2);
+  return bytes_;
 }
 
 PostgresqlValues::Bound PostgresqlValues::bound() const {

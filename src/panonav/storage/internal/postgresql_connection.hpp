@@ -25,6 +25,7 @@ class PostgresqlValues {
   PostgresqlValues& add(std::string_view text);
   PostgresqlValues& add(std::span<const std::uint8_t> bytes);
   PostgresqlValues& add(std::span<const std::int64_t> values);
+  PostgresqlValues& add(std::span<const std::string> texts);
   /// No text.
   PostgresqlValues& add_null();
 
@@ -113,5 +114,22 @@ class PostgresqlConnection {
 
 /// Numbers as PostgreSQL sends them: the most significant byte first.
 void append_big_endian(std::string& bytes, std::uint64_t value, int size);
+
+/// Rows in COPY's binary form, for `copy_in`.
+class CopyRows {
+ public:
+  /// The next row, which has as many fields as are added before the next one begins.
+  CopyRows& begin_row(int fields);
+  CopyRows& add(std::int64_t value);
+  CopyRows& add(const std::optional<double>& value);
+  CopyRows& add(std::string_view text);
+  CopyRows& add(std::span<const std::uint8_t> bytes);
+  CopyRows& add_null();
+  /// All rows; none may be added after it.
+  [[nodiscard]] std::string_view finish();
+
+ private:
+  std::string bytes_{"PGCOPY\n\377\r\n\0\0\0\0\0\0\0\0\0", 19};  // flags, nothing more
+};
 
 }  // namespace panonav

@@ -12,6 +12,23 @@
 
 namespace panonav {
 
+/// name, x_m, y_m, heading_rad, stamp_s: the next values of a statement, or fields of a row.
+template <class Fields>
+void add_info(Fields& fields, const ReferenceInfo& info) {
+  const auto& pose = info.pose;
+  fields.add(std::string_view(info.name))
+      .add(pose ? std::optional(pose->x_m) : std::nullopt)
+      .add(pose ? std::optional(pose->y_m) : std::nullopt)
+      .add(pose ? pose->heading_rad : std::nullopt)
+      .add(info.stamp_s);
+}
+
+[[nodiscard]] inline std::vector<std::int64_t> numbers_of(std::span<const ViewId> views) {
+  std::vector<std::int64_t> numbers;
+  for (const ViewId view : views) numbers.push_back(view.value);
+  return numbers;
+}
+
 /// The rows of one memory on a server, by a connection of its own.
 class PostgresqlTables final : public MemoryTables {
  public:
@@ -77,6 +94,19 @@ class PostgresqlTables final : public MemoryTables {
   /// Ends the transaction in which the memory was made.
   void commit_made() { connection_.execute("COMMIT"); }
 
+  /// For what only a server is asked (server_exchange.hpp).
+  [[nodiscard]] PostgresqlConnection& connection() noexcept { return connection_; }
+  [[nodiscard]] std::int64_t memory() const noexcept { return memory_; }
+  /// A writing transaction that others do not wait for until `lock_statement` has run.
+  [[nodiscard]] std::unique_ptr<Transaction> unlocked_transaction();
+  [[nodiscard]] std::string lock_statement() const;
+  /// Views say which connection added them: its number. Within a writing transaction.
+  std::int64_t session();
+  /// The notification of the transaction will say so.
+  void changed_at(const std::optional<double>& x_m, const std::optional<double>& y_m) {
+    if (x_m && y_m) areas_.insert(area_of(*x_m, *y_m));
+  }
+
  private:
   class Part;
   /// With the memory as $1.
@@ -87,10 +117,6 @@ class PostgresqlTables final : public MemoryTables {
   [[nodiscard]] ViewId id_in(const Rows& rows, int row, int column) const;
   [[nodiscard]] ViewRow view_in(const Rows& rows) const;
   [[nodiscard]] std::vector<std::string> texts(const std::string& sql);
-  void require_session();
-  void changed_at(const std::optional<double>& x_m, const std::optional<double>& y_m) {
-    if (x_m && y_m) areas_.insert(area_of(*x_m, *y_m));
-  }
   void changed_rows(const Rows& rows);
   void notify();
 
@@ -108,8 +134,9 @@ struct FoundMemory {
   std::string channel;
 };
 
-/// A connection to a database whose schema is of this version; with `make_schema` it is made or
-/// brought to it. Throws FileError on a newer one.
+/// A connection to a database with the schema. With `make_schema` it is made where there is none,
+/// and an older one is brought to this version where the login may; otherwise it may be older.
+/// Throws FileError on a newer one.
 [[nodiscard]] PostgresqlConnection connect_to_memories(const ServerAddress& address,
                                                        bool make_schema);
 [[nodiscard]] std::optional<FoundMemory> find_memory(PostgresqlConnection& connection,

@@ -209,6 +209,26 @@ GRANT DELETE ON panonav.memories, panonav.settings, panonav.views, panonav.thumb
   panonav.features, panonav.links, panonav.maps, panonav.routes, panonav.route_blocks
   TO panonav_curator;
 GRANT INSERT, UPDATE, DELETE ON panonav.undo, panonav.undo_rows TO panonav_curator;
+)sql",
+                                                                        R"sql(
+-- Which memory this is, whatever its name is and whichever server it lies on.
+ALTER TABLE panonav.memories ADD COLUMN identity text COLLATE "C" NOT NULL
+  DEFAULT replace(gen_random_uuid()::text, '-', '');
+
+-- What was taken last from a view of a robot's file, in the transaction that took it. A row stays
+-- when somebody removes the view: a robot that missed the answer does not bring it back.
+CREATE TABLE panonav.uploads(
+  memory bigint REFERENCES panonav.memories ON DELETE CASCADE,
+  file text COLLATE "C", view bigint, signature bigint,
+  server_view bigint NOT NULL, local_checksum bigint NOT NULL, server_checksum bigint NOT NULL,
+  sent bigint NOT NULL,
+  PRIMARY KEY (memory, file, view, signature, server_view));
+ALTER TABLE panonav.uploads ENABLE ROW LEVEL SECURITY;
+CREATE POLICY own_fleet ON panonav.uploads USING (memory IN (SELECT id FROM panonav.memories));
+GRANT SELECT ON panonav.uploads TO panonav_reader;
+GRANT INSERT ON panonav.uploads TO panonav_contributor;
+GRANT UPDATE ON panonav.uploads TO panonav_curator;
+UPDATE panonav.schema_version SET version = 2;
 )sql"};
 
 }  // namespace
@@ -228,6 +248,14 @@ int schema_version(PostgresqlConnection& connection) {
   }
   return static_cast<int>(
       connection.run("SELECT version::int8 FROM panonav.schema_version").integer(0, 0));
+}
+
+bool may_migrate_schema(PostgresqlConnection& connection) {
+  return connection
+             .run(
+                 "SELECT count(*) FROM pg_namespace WHERE nspname = 'panonav' AND "
+                 "pg_has_role(nspowner, 'USAGE')")
+             .integer(0, 0) != 0;
 }
 
 void migrate_schema(PostgresqlConnection& connection) {

@@ -2,7 +2,6 @@
 
 #include "panonav/storage/internal/postgresql_tables.hpp"
 
-#include <bit>
 #include <cmath>
 #include <type_traits>
 #include <utility>
@@ -18,57 +17,6 @@ namespace {
 constexpr const char* view_fields =
     "v.id, v.name, v.x_m, v.y_m, v.heading_rad, v.stamp_s, v.signature, v.checksum";
 
-std::vector<std::int64_t> numbers_of(std::span<const ViewId> views) {
-  std::vector<std::int64_t> numbers;
-  for (const ViewId view : views) numbers.push_back(view.value);
-  return numbers;
-}
-
-void add_info(PostgresqlValues& values, const ReferenceInfo& info) {
-  const auto& pose = info.pose;
-  values.add(std::string_view(info.name))
-      .add(pose ? std::optional(pose->x_m) : std::nullopt)
-      .add(pose ? std::optional(pose->y_m) : std::nullopt)
-      .add(pose ? pose->heading_rad : std::nullopt)
-      .add(info.stamp_s);
-}
-
-/// A row of COPY's binary form: the number of its fields, then each field's length and bytes.
-class CopyRow {
- public:
-  CopyRow(std::string& bytes, int fields) : bytes_(bytes) {
-    append_big_endian(bytes_, static_cast<std::uint64_t>(fields), 2);
-  }
-  void add(std::int64_t value) {
-    append_big_endian(bytes_, 8, 4);
-    append_big_endian(bytes_, static_cast<std::uint64_t>(value), 8);
-  }
-  void add(const std::optional<double>& value) {
-    if (!value) return add_null();
-    add(std::bit_cast<std::int64_t>(*value + 0.0));
-  }
-  void add(std::string_view text) {
-    append_big_endian(bytes_, text.size(), 4);
-    bytes_ += text;
-  }
-  void add(std::span<const std::uint8_t> bytes) {
-    add(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
-  }
-  void add_null() { append_big_endian(bytes_, 0xFFFFFFFFU, 4); }
-  /// Bytes beside a view with their checksum, or two nulls.
-  void add_beside(ViewId view, std::span<const std::uint8_t> bytes) {
-    if (bytes.empty()) {
-      add_null();
-      return add_null();
-    }
-    add(bytes);
-    add(bytes_checksum(view, bytes));
-  }
-
- private:
-  std::string& bytes_;
-};
-
 std::string table_of(BesideViews table) {
   return table == BesideViews::thumbnails ? "panonav.thumbnails" : "panonav.features";
 }
@@ -77,7 +25,7 @@ std::string table_of(BesideViews table) {
 
 class PostgresqlTables::Part final : public MemoryTables::Transaction {
  public:
-  Part(PostgresqlTables& tables, Kind kind)
+  Part(PostgresqlTables& tables, Kind kind, bool locked)
       : tables_(tables),
         within_another_(tables.connection_.in_transaction()),
         writes_(kind == Kind::writing) {
@@ -87,12 +35,10 @@ class PostgresqlTables::Part final : public MemoryTables::Transaction {
       if (open_) connection.execute("SAVEPOINT part");
       return;
     }
-    // One writes at a time, so that ids have no gaps and ascend as views become visible.
-    constexpr std::int64_t locks = 5786634408840658944;  // as for the schema, which is number 0
     try {
-      connection.execute(writes_ ? "BEGIN; SELECT pg_advisory_xact_lock(" +
-                                       std::to_string(locks + tables_.memory_) + ")"
-                                 : "BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY");
+      connection.execute(!writes_ ? "BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY"
+                         : locked ? "BEGIN; " + tables_.lock_statement()
+                                  : "BEGIN");
     } catch (...) {
       connection.try_execute("ROLLBACK");
       throw;
@@ -135,7 +81,17 @@ PostgresqlTables::PostgresqlTables(const ServerAddress& address, PostgresqlConne
       channel_(std::move(channel)) {}
 
 std::unique_ptr<MemoryTables::Transaction> PostgresqlTables::transaction(Kind kind) {
-  return std::make_unique<Part>(*this, kind);
+  return std::make_unique<Part>(*this, kind, true);
+}
+
+std::unique_ptr<MemoryTables::Transaction> PostgresqlTables::unlocked_transaction() {
+  return std::make_unique<Part>(*this, Kind::writing, false);
+}
+
+// One writes at a time, so that ids have no gaps and ascend as views become visible.
+std::string PostgresqlTables::lock_statement() const {
+  constexpr std::int64_t locks = 5786634408840658944;  // as for the schema, which is number 0
+  return "SELECT pg_advisory_xact_lock(" + std::to_string(locks + memory_) + ")";
 }
 
 // Says which areas are others now, where these are few.
@@ -261,8 +217,8 @@ std::uint32_t PostgresqlTables::last_id() {
 }
 
 // Views say which connection added them.
-void PostgresqlTables::require_session() {
-  if (session_) return;
+std::int64_t PostgresqlTables::session() {
+  if (session_) return *session_;
   const std::string insert_robot = "INSERT INTO panonav.robots(fleet, name) SELECT fleet, " +
                                    std::string(robot_ ? "$2" : "session_user::text") +
                                    " FROM panonav.memories WHERE id = $1 ON CONFLICT DO NOTHING";
@@ -277,11 +233,12 @@ void PostgresqlTables::require_session() {
   const Rows rows = connection_.run(insert_session, values);
   if (rows.size() == 0) fail_damaged("no session");
   session_ = rows.integer(0, 0);
+  return *session_;
 }
 
 void PostgresqlTables::insert(std::span<const ViewId> ids, std::span<const NewView> views) {
   if (views.empty()) return;
-  require_session();
+  session();
   // COPY does not look at rows' owners (row-level security), so they are first brought to a table
   // of the connection's own.
   if (!has_incoming_) {
@@ -299,29 +256,29 @@ void PostgresqlTables::insert(std::span<const ViewId> ids, std::span<const NewVi
   RecordBytes scratch;
   bool thumbnails = false;
   bool features = false;
-  // "PGCOPY", flags, nothing more; at the end -1.
-  std::string rows("PGCOPY\n\377\r\n\0\0\0\0\0\0\0\0\0", 19);
+  CopyRows rows;
+  const auto add_beside = [&](ViewId view, const std::vector<std::uint8_t>& bytes) {
+    if (bytes.empty()) {
+      rows.add_null().add_null();
+    } else {
+      rows.add(std::span<const std::uint8_t>(bytes)).add(bytes_checksum(view, bytes));
+    }
+  };
   for (std::size_t i = 0; i < views.size(); ++i) {
     const NewView& view = views[i];
     const auto& pose = view.info.pose;
     pack_signature(view.signature, signature);
-    CopyRow row(rows, 12);
-    row.add(std::int64_t{ids[i].value});
-    row.add(std::string_view(view.info.name));
-    row.add(pose ? std::optional(pose->x_m) : std::nullopt);
-    row.add(pose ? std::optional(pose->y_m) : std::nullopt);
-    row.add(pose ? pose->heading_rad : std::nullopt);
-    row.add(view.info.stamp_s);
-    row.add(std::span<const std::uint8_t>(signature));
-    row.add(view_checksum(scratch, ids[i], view.info, signature));
-    row.add_beside(ids[i], view.thumbnail);
-    row.add_beside(ids[i], view.features);
+    rows.begin_row(12).add(std::int64_t{ids[i].value});
+    add_info(rows, view.info);
+    rows.add(std::span<const std::uint8_t>(signature));
+    rows.add(view_checksum(scratch, ids[i], view.info, signature));
+    add_beside(ids[i], view.thumbnail);
+    add_beside(ids[i], view.features);
     thumbnails = thumbnails || !view.thumbnail.empty();
     features = features || !view.features.empty();
     if (pose) changed_at(pose->x_m, pose->y_m);
   }
-  append_big_endian(rows, 0xFFFFU, 2);
-  connection_.copy_in("COPY pg_temp.panonav_incoming FROM STDIN (FORMAT binary)", rows);
+  connection_.copy_in("COPY pg_temp.panonav_incoming FROM STDIN (FORMAT binary)", rows.finish());
   std::string sql =
       "SAVEPOINT rows; INSERT INTO panonav.views(memory, id, name, x_m, y_m, "
       "heading_rad, stamp_s, session, signature, checksum) SELECT " +

@@ -11,6 +11,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/storage/internal/memory_rows.hpp"
 #include "panonav/storage/internal/memory_schema.hpp"
+#include "panonav/storage/internal/synchronised_tables.hpp"
 
 namespace panonav {
 
@@ -434,6 +435,10 @@ std::set<ViewId> SqliteTables::verify_structure(const Check& check) {
     });
   }
   check([&] { static_cast<void>(last_id()); });
+  if (has_synchronised_tables(database_)) {
+    check([&] { static_cast<void>(read_synchronised_views(*this)); });
+    check([&] { static_cast<void>(read_synchronised_links(*this)); });
+  }
   // From the table and from the index of the names: a view that either has lost is found in the
   // other.
   std::set<ViewId> views;

@@ -66,6 +66,9 @@ class SqliteTables final : public MemoryTables {
   [[nodiscard]] std::set<ViewId> verify_structure(const Check& check) override;
   [[nodiscard]] MemoryFileInfo info() override;
 
+  /// For the tables that only a file has (synchronised_tables.hpp).
+  [[nodiscard]] Database& database() noexcept { return database_; }
+
  private:
   [[nodiscard]] ViewId id_in(const Statement& row, int column) const;
   [[nodiscard]] ViewRow view_in(const Statement& row) const;

@@ -1,0 +1,140 @@
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "cli/arguments.hpp"
+#include "cli/json.hpp"
+#include "cli/session.hpp"
+#include "cli/verbs.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/storage/memory_synchronisation.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+struct SynchroniseArguments {
+  std::string memory;
+  std::string server;
+  std::optional<std::pair<double, double>> around;
+  std::optional<double> within_m;
+};
+
+SynchronisationOptions options_of(const SynchroniseArguments& wanted) {
+  SynchronisationOptions options;
+  if (wanted.around.has_value() != wanted.within_m.has_value()) {
+    throw UsageError(wanted.around ? "--around needs --within-m" : "--within-m needs --around");
+  }
+  if (wanted.around) {
+    options.areas = areas_around(wanted.around->first, wanted.around->second, *wanted.within_m);
+  }
+  return options;
+}
+
+std::string counted(const SynchronisationReport& report) {
+  const std::array<std::pair<std::size_t, const char*>, 12> counts{{
+      {report.uploaded, "uploaded"},
+      {report.downloaded, "downloaded"},
+      {report.adopted, "that both had"},
+      {report.updated_on_server, "changed on the server"},
+      {report.updated_in_file, "changed in the file"},
+      {report.removed_on_server, "removed on the server"},
+      {report.removed_in_file, "removed from the file"},
+      {report.left, "left, as they lie outside of its areas"},
+      {report.renamed, "renamed, as others had their names"},
+      {report.links_uploaded, "links changed on the server"},
+      {report.links_downloaded, "links changed in the file"},
+      {report.withheld, "changes kept back, as this login may not make them there"},
+  }};
+  std::string text;
+  for (const auto& [count, what] : counts) {
+    if (count == 0) continue;
+    text += (text.empty() ? "" : "; ") + std::to_string(count) + " " + what;
+  }
+  return text.empty() ? "nothing was new" : text;
+}
+
+ExitCode synchronise(const SynchroniseArguments& wanted, Session& session) {
+  const SynchronisationReport report = [&] {
+    std::optional<Progress> progress;
+    std::size_t expected = 0;
+    return synchronise_memory(wanted.memory, wanted.server, options_of(wanted),
+                              [&](std::size_t total) {
+                                if (!progress || std::exchange(expected, total) != total) {
+                                  progress.emplace(session, "synchronising", total);
+                                }
+                                progress->advance();
+                              });
+  }();
+  {
+    MemoryFile file = MemoryFile::open(wanted.memory, Access::read_write);
+    keep_models(file);
+  }
+  if (session.json()) {
+    session.print(json_line(ordered_json{{"memory", wanted.memory},
+                                         {"server", wanted.server},
+                                         {"views", report.views},
+                                         {"uploaded", report.uploaded},
+                                         {"downloaded", report.downloaded},
+                                         {"adopted", report.adopted},
+                                         {"updated_on_server", report.updated_on_server},
+                                         {"updated_in_file", report.updated_in_file},
+                                         {"removed_on_server", report.removed_on_server},
+                                         {"removed_in_file", report.removed_in_file},
+                                         {"renamed", report.renamed},
+                                         {"conflicts", report.conflicts},
+                                         {"withheld", report.withheld},
+                                         {"left", report.left},
+                                         {"links_uploaded", report.links_uploaded},
+                                         {"links_downloaded", report.links_downloaded},
+                                         {"restored", report.restored},
+                                         {"seconds", report.seconds}}));
+    return ExitCode::done;
+  }
+  session.print(wanted.memory + " and " + wanted.server + ": " + counted(report) + ". " +
+                wanted.memory + " holds " + std::to_string(report.views) + " views.");
+  if (report.conflicts > 0) {
+    session.note("of " + std::to_string(report.conflicts) +
+                 " views changes of this file were dropped, as others had changed or removed them "
+                 "first");
+  }
+  if (report.restored) {
+    session.note(
+        "the server had lost views that it had acknowledged; those of this file were uploaded "
+        "again");
+  }
+  return ExitCode::done;
+}
+
+Run declare_synchronise(Arguments& arguments) {
+  auto wanted = std::make_shared<SynchroniseArguments>();
+  arguments.positional("MEMORY", wanted->memory,
+                       "The robot's memory file; where there is none it is made");
+  arguments.positional("ADDRESS", wanted->server,
+                       "Address of a memory on a server; where there is none it is made");
+  arguments.option("--around", "X_M Y_M", wanted->around,
+                   "Keep only the areas (squares of 10 m) around this position");
+  arguments.option("--within-m", wanted->within_m, "Distance from that position, metres");
+  return [wanted](Session& session) { return synchronise(*wanted, session); };
+}
+
+}  // namespace
+
+Verb synchronise_verb() {
+  return {
+      "synchronise", "Bring a robot's memory file and a memory on a server to the same views",
+      "Uploads what the file has and the server lacks, each view once, and takes what others\n"
+      "did since: views with pictures and features, poses, names, removals and links. What the\n"
+      "server acknowledged first holds; a removal wins over a change; two replacements of one\n"
+      "view stand beside each other; a name that another view has becomes ROBOT/NAME. Maps,\n"
+      "routes and what was learnt stay with the file. When the link breaks nothing is lost or\n"
+      "doubled: the same command goes on (docs/scale.md).",
+      "  panonav synchronise robot.panonav 'postgresql://robots.example/panonav?memory=office'\n"
+      "  panonav synchronise robot.panonav ADDRESS --around 12.5 40 --within-m 60 --json",
+      declare_synchronise};
+}
+
+}  // namespace panonav::command
