@@ -8,12 +8,16 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
+#include <cmath>
 #include <functional>
+#include <iostream>
 #include <map>
 #include <set>
 
 #include "panonav/core/error.hpp"
-#include "panonav/storage/memory_address.hpp"
+#include "panonav/storage/checksum.hpp"
+#include "panonav/storage/memory_changes.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "panonav/storage/memory_synchronisation.hpp"
 #include "support/memory_samples.hpp"
@@ -665,6 +669,115 @@ TEST_F(SynchronisedMemory, AFullDiskOfTheFileLosesNothing) {
   EXPECT_TRUE(open("b").verify().empty());
   (void)sync("b");
   EXPECT_TRUE(is_same(content(folder / "b"), all));
+}
+
+/// What bench/synchronise_faults.py starts, kills and counts: a robot that changes its file, tells
+/// each change before and after it was made, and synchronises now and then, for ever or for
+/// PANONAV_TEST_STEPS steps.
+TEST_F(SynchronisedMemory, ARobotWorksUntilItIsKilled) {
+  const char* file_path = std::getenv("PANONAV_TEST_ROBOT");
+  if (file_path == nullptr) GTEST_SKIP() << "no PANONAV_TEST_ROBOT";
+  const auto setting = [](const char* name) { return std::string(std::getenv(name)); };
+  const std::string address = setting("PANONAV_TEST_SERVER");
+  const std::string robot = setting("PANONAV_TEST_NAME");
+  int next = std::stoi(setting("PANONAV_TEST_FIRST"));  // numbers of views that nobody had
+  const int steps = std::stoi(setting("PANONAV_TEST_STEPS"));
+  Random random(static_cast<std::uint64_t>(next));
+  const auto say = [](const auto&... words) {
+    ((std::cout << words << ' '), ...);
+    std::cout << std::endl;
+  };
+  const auto name_of = [](const PackedSignature& signature) {
+    return checksum(signature.magnitudes, checksum(signature.phases));
+  };
+  const auto synchronise = [&] {
+    try {
+      const auto report = synchronise_memory(file_path, address);
+      say("synchronised", report.seconds, report.uploaded, report.downloaded, report.conflicts);
+    } catch (const FileError& error) {
+      say("refused", error.what());
+    }
+  };
+  if (!std::filesystem::exists(file_path)) synchronise();
+  if (!std::filesystem::exists(file_path) && robot == "0") {
+    (void)MemoryFile::create(file_path, small_header());
+  }
+  for (int step = 0; steps == 0 || step < steps; ++step) {
+    try {
+      MemoryFile file = MemoryFile::open(file_path, Access::read_write);
+      const auto add = [&] {
+        const int number = next++;
+        NewView view = named("r" + robot + "_" + std::to_string(number), number);
+        if (random.index(10) == 0) view.info.name = "door_" + std::to_string(random.index(10));
+        if (file.find(view.info.name)) view.info.name += "_" + std::to_string(number);
+        // The clock may be wrong: only people look at it.
+        view.info.stamp_s =
+            std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch())
+                .count();
+        say("adding", name_of(view.signature));
+        file.append(view);
+        return name_of(view.signature);
+      };
+      const std::vector<ViewId> views = file.views();
+      const auto any = [&] { return views[random.index(views.size())]; };
+      const auto told = [&](ViewId view) {
+        return name_of(file.load(std::vector{view}).packed(view));
+      };
+      const std::uint64_t kind = views.size() < 5 ? 0 : random.index(20);
+      if (kind < 12) {
+        for (std::uint64_t i = random.index(3) + 1; i > 0; --i) say("added", add());
+      } else if (kind < 15) {
+        const ViewId view = any();
+        const auto which = told(view);
+        const double x_m = next++;
+        say("moving", which, x_m);
+        file.set_pose(view, ReferencePose{x_m, 0.0, std::nullopt});
+        say("moved", which, x_m);
+      } else if (kind == 15) {
+        const ViewId view = any();
+        const auto which = told(view);
+        say("removing", which);
+        file.remove(std::vector{view});
+        say("removed", which);
+      } else if (kind == 16) {
+        const ViewId view = any();
+        const auto which = told(view);
+        say("removing", which);
+        std::uint64_t instead = 0;
+        file.change(
+            [&] {
+              file.remove(std::vector{view});
+              instead = add();
+            },
+            "learnt");
+        say("removed", which);
+        say("added", instead);
+      } else {
+        const ViewId a = any();
+        const ViewId b = any();
+        if (a != b) file.link(std::vector<Link>{{a, b, LinkKind(random.index(3))}});
+      }
+    } catch (const FileError& error) {
+      say("refused", error.what());
+    }
+    if (random.index(3) == 0 || step + 1 == steps) synchronise();
+    ::usleep(static_cast<useconds_t>(random.uniform(0.0, 4e5)));
+  }
+}
+
+/// Tells bench/synchronise_faults.py what a memory holds.
+TEST_F(SynchronisedMemory, AMemoryIsTold) {
+  const char* memory = std::getenv("PANONAV_TEST_TOLD");
+  if (memory == nullptr) GTEST_SKIP() << "no PANONAV_TEST_TOLD";
+  for (const auto& [name, seen] : content(memory)) {
+    std::cout << "view " << name << ' '
+              << checksum(seen.signature.magnitudes, checksum(seen.signature.phases)) << ' '
+              << (seen.info.pose ? seen.info.pose->x_m : -1.0) << ' '
+              << seen.info.stamp_s.value_or(-1.0) << ' ' << seen.thumbnail.has_value()
+              << seen.features.has_value();
+    for (const auto& [other, kind] : seen.links) std::cout << ' ' << other << ':' << kind;
+    std::cout << '\n';
+  }
 }
 
 }  // namespace

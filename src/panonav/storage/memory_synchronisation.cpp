@@ -285,19 +285,10 @@ class Synchronisation {
       const auto row = views_.find(view);
       const bool is_new = row == views_.end();
       if (!is_new && row->second.local_checksum == checksum) continue;
-      if (is_new ? server_.may_add() : server_.may_change()) {
-        wanted.push_back(view);
-      } else {
-        ++report_.withheld;
-      }
+      if (is_new ? server_.may_add() : server_.may_change()) wanted.push_back(view);
     }
     for (const auto& [view, row] : views_) {
-      if (local_.contains(view)) continue;
-      if (server_.may_change()) {
-        removed_.push_back(view);
-      } else {
-        ++report_.withheld;
-      }
+      if (!local_.contains(view) && server_.may_change()) removed_.push_back(view);
     }
     std::map<ViewId, std::string> names;
     {
@@ -662,11 +653,7 @@ class Synchronisation {
     }
     for (const auto& [ends, kind] : links_) {
       if (own.contains(ends) || !is_in_file(ends.first) || !is_in_file(ends.second)) continue;
-      if (server_.may_change()) {
-        others.push_back({{ends.first, ends.second, kind}, std::nullopt});
-      } else {
-        ++report_.withheld;
-      }
+      if (server_.may_change()) others.push_back({{ends.first, ends.second, kind}, std::nullopt});
     }
     if (added.empty() && others.empty()) return;
     const auto writing = server_.tables().transaction(Kind::writing);
@@ -960,6 +947,26 @@ class Synchronisation {
     restored_ = false;
     if (changes_anything || !is_written()) commit(*writing);
     report_.views = local_.size();
+    report_.withheld = withheld();
+  }
+
+  /// Changes of the file that the login may not make on the server.
+  std::size_t withheld() {
+    std::size_t count = 0;
+    if (!server_.may_add()) {
+      for (const auto& [view, checksum] : local_) count += views_.contains(view) ? 0 : 1;
+    }
+    if (server_.may_change()) return count;
+    for (const auto& [view, row] : views_) {
+      const auto found = local_.find(view);
+      count += found == local_.end() || found->second != row.local_checksum ? 1 : 0;
+    }
+    const SynchronisedLinks own = local_links();
+    for (const auto& [ends, kind] : links_) {
+      const bool is_there = is_in_file(ends.first) && is_in_file(ends.second);
+      count += is_there && !own.contains(ends) ? 1 : 0;
+    }
+    return count;
   }
 
   /// Whether the links of a view were asked for: only of views that lie in the areas.
