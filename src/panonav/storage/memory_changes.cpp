@@ -21,16 +21,16 @@ MemoryArea area_of(double x_m, double y_m) {
 
 struct MemoryChanges::Implementation {
   explicit Implementation(const ServerAddress& address)
-      : connection(connect_to_memories(address, false)) {
-    const auto found = find_memory(connection, address);
+      : memories(connect_to_memories(address, false)) {
+    const auto found = find_memory(memories, address);
     if (!found) refuse_no_memory(address);
-    connection.execute("LISTEN \"" + found->channel + "\"");  // of the server's making
+    memories.connection.execute("LISTEN \"" + found->channel + "\"");  // of the server's making
   }
-  PostgresqlConnection connection;
+  MemoriesConnection memories;
 };
 
 std::optional<MemoryChange> MemoryChanges::wait(std::chrono::milliseconds longest) {
-  const auto said = implementation_->connection.wait_for_notification(
+  const auto said = implementation_->memories.connection.wait_for_notification(
       std::chrono::duration<double>(longest).count());
   if (!said) return std::nullopt;
   MemoryChange change;

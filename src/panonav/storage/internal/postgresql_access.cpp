@@ -13,7 +13,7 @@
 
 namespace panonav {
 
-PostgresqlConnection connect_to_memories(const ServerAddress& address, bool make_schema) {
+MemoriesConnection connect_to_memories(const ServerAddress& address, bool make_schema) {
   PostgresqlConnection connection(address);
   int version = schema_version(connection);
   if (version < postgresql_schema_version && make_schema &&
@@ -26,16 +26,15 @@ PostgresqlConnection connect_to_memories(const ServerAddress& address, bool make
                                                 std::to_string(version) + "; allowed: 1 .. " +
                                                 std::to_string(postgresql_schema_version));
   }
-  return connection;
+  return {std::move(connection), version};
 }
 
-std::optional<FoundMemory> find_memory(PostgresqlConnection& connection,
-                                       const ServerAddress& address) {
-  if (schema_version(connection) == 0) return std::nullopt;
+std::optional<FoundMemory> find_memory(MemoriesConnection& memories, const ServerAddress& address) {
+  if (memories.schema_version == 0) return std::nullopt;
   PostgresqlValues values;
   values.add(std::string_view(address.memory));
   if (address.fleet) values.add(std::string_view(*address.fleet));
-  const PostgresqlRows rows = connection.run(
+  const PostgresqlRows rows = memories.connection.run(
       std::string("SELECT id, channel FROM panonav.memories WHERE name = $1 AND fleet = ") +
           (address.fleet ? "$2" : "panonav.fleet()"),
       values);
@@ -50,14 +49,14 @@ void refuse_no_memory(const ServerAddress& address) {
 }
 
 bool postgresql_memory_exists(const ServerAddress& address) {
-  PostgresqlConnection connection = connect_to_memories(address, false);
-  return find_memory(connection, address).has_value();
+  MemoriesConnection memories = connect_to_memories(address, false);
+  return find_memory(memories, address).has_value();
 }
 
 void make_postgresql_memory(const ServerAddress& address, const MemoryHeader& header,
                             const std::function<void(MemoryTables&)>& fill) {
   validate(header);
-  PostgresqlConnection connection = connect_to_memories(address, true);
+  PostgresqlConnection connection = connect_to_memories(address, true).connection;
   connection.execute("BEGIN");
   PostgresqlValues values;
   values.add(std::string_view(address.memory));
@@ -78,17 +77,17 @@ void make_postgresql_memory(const ServerAddress& address, const MemoryHeader& he
 }
 
 std::unique_ptr<MemoryTables> open_postgresql_tables(const ServerAddress& address, Access access) {
-  PostgresqlConnection connection = connect_to_memories(address, false);
-  const auto found = find_memory(connection, address);
+  MemoriesConnection memories = connect_to_memories(address, false);
+  const auto found = find_memory(memories, address);
   if (!found) refuse_no_memory(address);
   if (access == Access::read_write &&
-      connection.run("SELECT has_table_privilege('panonav.views', 'INSERT')::int4::int8")
+      memories.connection.run("SELECT has_table_privilege('panonav.views', 'INSERT')::int4::int8")
               .integer(0, 0) == 0) {
     throw FileError(address.shown.native(),
                     "cannot be changed: this login is no member of panonav_contributor, which "
                     "adds, or of panonav_curator, which also changes and removes");
   }
-  return std::make_unique<PostgresqlTables>(address, std::move(connection), found->id,
+  return std::make_unique<PostgresqlTables>(address, std::move(memories.connection), found->id,
                                             found->channel);
 }
 

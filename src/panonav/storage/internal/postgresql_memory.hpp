@@ -137,9 +137,13 @@ struct FoundMemory {
 /// A connection to a database with the schema. With `make_schema` it is made where there is none,
 /// and an older one is brought to this version where the login may; otherwise it may be older.
 /// Throws FileError on a newer one.
-[[nodiscard]] PostgresqlConnection connect_to_memories(const ServerAddress& address,
-                                                       bool make_schema);
-[[nodiscard]] std::optional<FoundMemory> find_memory(PostgresqlConnection& connection,
+struct MemoriesConnection {
+  PostgresqlConnection connection;
+  int schema_version = 0;  ///< 0: there is none
+};
+[[nodiscard]] MemoriesConnection connect_to_memories(const ServerAddress& address,
+                                                     bool make_schema);
+[[nodiscard]] std::optional<FoundMemory> find_memory(MemoriesConnection& memories,
                                                      const ServerAddress& address);
 [[noreturn]] void refuse_no_memory(const ServerAddress& address);
 

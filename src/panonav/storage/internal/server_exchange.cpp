@@ -52,19 +52,19 @@ const std::string block_of_l = "l.a >> " + std::to_string(block_bits);
 }  // namespace
 
 std::unique_ptr<ServerExchange> ServerExchange::connect(const ServerAddress& address) {
-  PostgresqlConnection connection = connect_to_memories(address, true);
-  const int version = schema_version(connection);
-  if (version < postgresql_schema_version) {
+  MemoriesConnection memories = connect_to_memories(address, true);
+  if (memories.schema_version < postgresql_schema_version) {
     throw FileError(address.shown.native(),
-                    "cannot be synchronised: the schema's version is " + std::to_string(version) +
+                    "cannot be synchronised: the schema's version is " +
+                        std::to_string(memories.schema_version) +
                         "; allowed: " + std::to_string(postgresql_schema_version) +
                         ", to which the owner of the schema brings it with panonav memorise or "
                         "synchronise");
   }
-  const auto found = find_memory(connection, address);
+  const auto found = find_memory(memories, address);
   if (!found) return nullptr;
   return std::unique_ptr<ServerExchange>(
-      new ServerExchange(address, std::move(connection), *found));
+      new ServerExchange(address, std::move(memories.connection), *found));
 }
 
 ServerExchange::ServerExchange(const ServerAddress& address, PostgresqlConnection connection_,
