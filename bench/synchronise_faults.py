@@ -195,6 +195,7 @@ class Robot:
         self.clock = clock_folder / f"clock_{number}"
         self.clock.write_text("+0")
         self.process = None
+        self.said = collections.deque(maxlen=6)
 
     def address(self):
         return self.server.address(self.link.port) + f"&robot=r{self.number}"
@@ -215,6 +216,7 @@ class Robot:
     def listen(self, process):
         for line in process.stdout:
             if line.endswith("\n"):  # a line that was cut was not told
+                self.said.append(line)
                 self.ledger.take(self.number, line)
 
     def kill(self):
@@ -293,6 +295,9 @@ def experiment(arguments, folder):
                     recoveries[kind].append(time.monotonic() - end)
                     return
             time.sleep(0.02)
+        for robot in who:
+            if ledger.last_synchronised.get(robot.number, 0) <= end:
+                print(f"robot {robot.number}, exit code {robot.process.poll()}, said", *robot.said)
         raise RuntimeError(f"no recovery after: {kind}")
 
     for kind in faults_of(arguments.faults, kinds, rng):

@@ -4,6 +4,7 @@
 #include "memories.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
 #include "panonav/pipeline/named_view.hpp"
+#include "panonav/storage/memory_synchronisation.hpp"
 
 namespace panonav::python {
 
@@ -372,11 +373,69 @@ void bind_memory_file(py::module_& m) {
       });
 }
 
+void bind_synchronisation(py::module_& m) {
+  using Report = SynchronisationReport;
+  Record<Report>(m, "SynchronisationReport", "What synchronise_memory did.")
+      .field("views", &Report::views, "Of the file, afterwards.")
+      .field("uploaded", &Report::uploaded, "Views that the server got.")
+      .field("downloaded", &Report::downloaded, "Views that the file got.")
+      .field("adopted", &Report::adopted, "Views that both had already, by name and signature.")
+      .field("updated_on_server", &Report::updated_on_server,
+             "Views with another name, pose or stamp there.")
+      .field("updated_in_file", &Report::updated_in_file, "The same of the file.")
+      .field("removed_on_server", &Report::removed_on_server, "Views that the file had removed.")
+      .field("removed_in_file", &Report::removed_in_file, "Views that others had removed.")
+      .field("renamed", &Report::renamed, "Views of the file whose names others had.")
+      .field("conflicts", &Report::conflicts,
+             "Changes of the file that were dropped, because others were first.")
+      .field("withheld", &Report::withheld,
+             "Changes of the file that the login may not make on the server.")
+      .field("left", &Report::left, "Views that left the file, as they lie outside of its areas.")
+      .field("links_uploaded", &Report::links_uploaded,
+             "Links added, changed and removed on the server.")
+      .field("links_downloaded", &Report::links_downloaded,
+             "Links added, changed and removed in the file.")
+      .field("restored", &Report::restored,
+             "Whether the server had lost views, which were uploaded again.")
+      .field("seconds", &Report::seconds, "From the beginning to the end.");
+  using Areas = std::vector<std::pair<double, double>>;
+  m.def(
+      "areas_around",
+      [](double x_m, double y_m, double radius_m) {
+        Areas areas;
+        for (const MemoryArea& area : areas_around(x_m, y_m, radius_m)) {
+          areas.emplace_back(area.column, area.row);
+        }
+        return areas;
+      },
+      py::arg("x_m"), py::arg("y_m"), py::arg("radius_m"),
+      "(column, row) of the squares of 10 m that touch the circle around a position.");
+  m.def(
+      "synchronise_memory",
+      [](const std::filesystem::path& file, const std::string& server,
+         const std::optional<Areas>& areas) {
+        SynchronisationOptions options;
+        if (areas) {
+          options.areas.emplace();
+          for (const auto& [column, row] : *areas) options.areas->push_back({column, row});
+        }
+        const py::gil_scoped_release free;
+        return synchronise_memory(file, server, options, [](std::size_t) { check_signals(); });
+      },
+      py::arg("file"), py::arg("server"), py::arg("areas") = py::none(),
+      "Brings a robot's memory file and a memory on a PostgreSQL server to the same views, links, "
+      "names and poses, as `panonav synchronise` does; where one of the two is not there it is "
+      "made. `areas`: (column, row) of the squares of 10 m that the file keeps; None: all. When "
+      "the link breaks, FileError is raised, nothing is lost or doubled, and the next call goes "
+      "on.");
+}
+
 }  // namespace
 
 void bind_memories(py::module_& m) {
   bind_visual_memory(m);
   bind_memory_file(m);
+  bind_synchronisation(m);
 }
 
 }  // namespace panonav::python

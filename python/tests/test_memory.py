@@ -1,11 +1,15 @@
 """Memories: exact search from any number of threads, bulk appending, lifetimes, files."""
 import concurrent.futures
 import gc
+import pathlib
+import shutil
+import subprocess
 
 import numpy
 import pytest
 
 import panonav
+from conftest import command_json
 
 
 @pytest.fixture(scope="module")
@@ -130,3 +134,43 @@ def test_files(office, tmp_path):
         panonav.Dataset(tmp_path / "missing")
     with pytest.raises(panonav.FileError, match="PictureSource"):
         panonav.Dataset(tmp_path)
+
+
+def test_areas_around_a_position():
+    assert panonav.areas_around(5.0, -5.0, 0.0) == [(0.0, -1.0)]
+    assert len(panonav.areas_around(5.0, 5.0, 10.0)) == 9
+    with pytest.raises(panonav.ContractError, match="radius_m"):
+        panonav.areas_around(0.0, 0.0, -1.0)
+
+
+def test_synchronise_memory(office, tmp_path):
+    """As the command does it, with a server in a folder."""
+    def memory_of(name):
+        path = tmp_path / name
+        shutil.copy(office / "office.panonav", path)
+        return path
+    file = memory_of("one.panonav")
+    with pytest.raises(panonav.ContractError, match="address of a memory on a server"):
+        panonav.synchronise_memory(file, str(tmp_path / "two.panonav"))
+    server = pathlib.Path(__file__).parents[2] / "apps/panonav/panonav-postgresql"
+    started = subprocess.run([server, tmp_path / "s", "start"], capture_output=True, text=True)
+    if started.returncode:
+        pytest.skip(started.stderr)
+    try:
+        address = f"postgresql://panonav@/panonav?host={tmp_path / 's'}&memory=office"
+        try:
+            report = panonav.synchronise_memory(file, address)
+        except panonav.FileError as error:
+            pytest.skip(str(error)) if "without PostgreSQL" in str(error) else pytest.fail(str(error))
+        views = panonav.MemoryFile(file).names()
+        assert report.uploaded == report.views == len(views) > 10 and report.downloaded == 0
+        told, = command_json("synchronise", tmp_path / "two.panonav", address)
+        assert told["downloaded"] == len(views)
+        part = panonav.synchronise_memory(tmp_path / "part.panonav", address, panonav.areas_around(900.0, 0.0, 1.0))
+        assert part.downloaded == part.views == 0
+        again = panonav.synchronise_memory(memory_of("three.panonav"), address)
+        assert again.adopted == len(views) and again.uploaded == 0 and not again.restored
+    finally:
+        subprocess.run([server, tmp_path / "s", "stop"], check=True)
+    with pytest.raises(panonav.FileError, match="cannot be opened"):
+        panonav.synchronise_memory(file, address)
