@@ -289,7 +289,7 @@ def experiment(arguments, folder):
     def recovered(kind, who):
         """Seconds from the end of a fault until all these robots have synchronised again."""
         end = time.monotonic()
-        while time.monotonic() - end < 120:
+        while time.monotonic() - end < 300:
             with ledger.lock:
                 if all(ledger.last_synchronised.get(robot.number, 0) > end for robot in who):
                     recoveries[kind].append(time.monotonic() - end)

@@ -353,6 +353,20 @@ TEST_F(SynchronisedMemory, WhatBothHadIsNotDoubled) {
   EXPECT_EQ(on_server().views().size(), 302U);
 }
 
+// A name that makes way for another must not be one that comes with it.
+TEST_F(SynchronisedMemory, NamesThatComeTogetherMakeWay) {
+  share({"a", "b"}, 3);
+  open("a").append(std::vector{named("b/door", 100), named("door", 101)});
+  (void)sync("a");
+  open("b").append(named("door", 102));
+  const SynchronisationReport taken = sync("b");
+  EXPECT_EQ(taken.renamed, 1U);
+  (void)sync("a");
+  EXPECT_EQ(names(folder / "b"), (std::set<std::string>{"view_0.png", "view_1.png", "view_2.png",
+                                                        "b/door", "door", "b/door (2)"}));
+  EXPECT_TRUE(is_same(content(folder / "a"), content(folder / "b")));
+}
+
 // In whatever order robots work and synchronise, they end at the same, and nothing that was added
 // and not removed is missing or there twice.
 TEST_F(SynchronisedMemory, EveryOrderConverges) {

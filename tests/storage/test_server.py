@@ -320,6 +320,18 @@ def synchronised(server, folder):
     assert (said["removed_on_server"], said["updated_on_server"], said["withheld"]) == (1, 1, 0), said
     sync(one, address)
     assert names(one) == names(three) == names(server.memory("fleet"))
+    # A view that makes way for another's name takes none that comes with it.
+    run(PANONAV, "rename", server.memory("fleet", "curates"), "of_three_view_00001.png", "red/door")
+    run(PANONAV, "rename", server.memory("fleet", "curates"), "of_three_view_00002.png", "door")
+    five = folder / "five.panonav"
+    run(PANONAV, "copy", one, five)
+    run(PANONAV, "forget", five, *[name for name in names(five) if name != "view_00005.png"])
+    run(PANONAV, "rename", five, "view_00005.png", "door")
+    said = sync(five, reads + "&robot=red")
+    assert (said["renamed"], said["withheld"], said["views"]) == (1, 1, len(names(one)) + 1), said
+    assert {"door", "red/door", "red/door (2)"} < set(names(five))
+    run(PANONAV, "rename", server.memory("fleet", "curates"), "red/door", "of_three_view_00001.png")
+    run(PANONAV, "rename", server.memory("fleet", "curates"), "door", "of_three_view_00002.png")
     # The other fleet has no such memory, and makes one of its own.
     run(PANONAV, "copy", one, folder / "south.panonav")
     assert sync(folder / "south.panonav", server.memory("fleet", "other"))["uploaded"] == len(names(one))

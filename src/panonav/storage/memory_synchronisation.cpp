@@ -244,12 +244,8 @@ class Synchronisation {
     }
     if (asked.empty()) return;
     std::map<std::pair<ViewId, std::int64_t>, Upload> answers;
-    {
-      const auto asking =
-          server_.tables().transaction(server_.may_add() ? Kind::writing : Kind::reading);
-      for (const Upload& upload : server_.uploads(state_.file, asked)) {
-        answers[{upload.view, upload.signature}] = upload;
-      }
+    for (const Upload& upload : server_.settled_uploads(state_.file, asked)) {
+      answers[{upload.view, upload.signature}] = upload;
     }
     for (const ViewId view : asked) {
       SynchronisedView row = views_.at(view);
@@ -411,9 +407,7 @@ class Synchronisation {
     return sent;
   }
 
-  void lock() { server_.tables().connection().execute(server_.tables().lock_statement()); }
-
-  /// Under the lock: the memory is still the same. Returns the last id that was given.
+  /// The memory is still the same. Returns the last id that was given.
   std::uint32_t require_same_memory() {
     const ServerExchange::State there = server_.state();
     if (there.identity != state_.memory) {
@@ -466,64 +460,38 @@ class Synchronisation {
   }
 
   void upload_part(const std::vector<ViewId>& ids, const std::vector<NewView>& views) {
-    std::vector<std::string> names;
-    for (const NewView& view : views) names.push_back(view.info.name);
-    const auto writing = server_.tables().unlocked_transaction();
-    server_.stage(views);  // the slow part, for which nobody waits
-    lock();
-    std::uint32_t last = require_same_memory();
-    std::map<std::pair<ViewId, std::int64_t>, Upload> known;
-    for (const Upload& upload : server_.uploads(state_.file, ids)) {
-      known[{upload.view, upload.signature}] = upload;
-    }
-    std::vector<ViewId> known_there;
-    for (const auto& [key, upload] : known) known_there.push_back(upload.server_view);
-    const auto is_there = server_.checksums(known_there);
-    std::set<std::string> taken;
-    for (const ServerView& view : server_.named(names)) taken.insert(view.info.name);
-    std::vector<ServerExchange::Staged> added;
-    std::vector<Upload> answered;
+    server_.stage(views);
+    std::uint32_t last = server_.reserve_ids(ids.size());
+    std::vector<ServerExchange::Staged> staged;
     Bytes signature;
     for (std::size_t i = 0; i < ids.size(); ++i) {
       const SynchronisedView& row = views_.at(ids[i]);
-      // One that was removed there since comes back: the file would know if it had to go.
-      if (const auto before = known.find({ids[i], row.signature});
-          before != known.end() && is_there.contains(before->second.server_view)) {
-        answered.push_back(before->second);
-        continue;
-      }
-      if (taken.contains(names[i])) continue;  // since just now: the next time finds another name
       const NewView& view = views[i];
       const ViewId id{++last};
       pack_signature(view.signature, signature);
-      const Upload upload{ids[i],
-                          row.signature,
-                          id,
-                          row.local_checksum,
-                          view_checksum(scratch_, id, view.info, signature),
-                          sent_};
-      added.push_back(
-          {i, upload, bytes_checksum(id, view.thumbnail), bytes_checksum(id, view.features)});
-      answered.push_back(upload);
+      staged.push_back({i,
+                        {ids[i], row.signature, id, row.local_checksum,
+                         view_checksum(scratch_, id, view.info, signature), sent_},
+                        bytes_checksum(id, view.thumbnail),
+                        bytes_checksum(id, view.features)});
       if (view.info.pose) server_.tables().changed_at(view.info.pose->x_m, view.info.pose->y_m);
     }
-    server_.insert(state_.file, added);
-    if (!added.empty()) writing->commit();
-    for (const Upload& upload : answered) {
+    // Views whose names were taken just now are not among them: the next time finds other names.
+    for (const Upload& upload : server_.take_views(state_.file, sent_, staged)) {
       SynchronisedView row = views_.at(upload.view);
+      if (upload.signature != row.signature) continue;
       take_answer(row, upload, upload.sent == sent_);
       put(upload.view, row);
+      report_.uploaded += upload.sent == sent_ ? 1 : 0;
       if (advance_) advance_(expected_);
     }
     state_.last_view = std::max(state_.last_view, std::int64_t{last});
-    report_.uploaded += added.size();
   }
 
   void upload_changes() {
     in_parts(sent_views(false), rows_at_once, [&](std::span<const ViewId> part) {
       std::vector<ViewId> ids, server_ids;
       std::vector<LocalRow> rows;
-      std::vector<std::string> names;
       {
         const auto reading = file_.transaction(Kind::reading);
         local_ = read_view_checksums(file_);
@@ -532,44 +500,33 @@ class Synchronisation {
           if (!row) continue;
           ids.push_back(view);
           server_ids.push_back(*views_.at(view).server_view);
-          names.push_back(row->info.name);
           rows.push_back(std::move(*row));
         }
       }
-      const auto writing = server_.tables().transaction(Kind::writing);
-      require_same_memory();
-      const auto there = server_.checksums(server_ids);
-      std::map<std::string, ViewId> taken;
-      for (const ServerView& view : server_.named(names)) taken[view.info.name] = view.id;
-      std::vector<ServerView> changes;
-      std::vector<Upload> uploads;
+      std::vector<ServerExchange::ChangedView> changes;
       for (std::size_t i = 0; i < ids.size(); ++i) {
         SynchronisedView row = views_.at(ids[i]);
-        const auto checksum = there.find(server_ids[i]);
-        const auto other = taken.find(names[i]);
-        // Somebody was first: `download` sees what.
-        if (checksum == there.end() || checksum->second != row.server_checksum ||
-            (other != taken.end() && other->second != server_ids[i])) {
-          row.sent.reset();
-          put(ids[i], row);
-          continue;
-        }
         changes.push_back(
-            {server_ids[i], rows[i].info,
-             view_checksum(scratch_, server_ids[i], rows[i].info, rows[i].signature)});
-        uploads.push_back({ids[i], row.signature, server_ids[i], rows[i].checksum,
-                           changes.back().checksum, sent_});
+            {{ids[i], row.signature, server_ids[i], rows[i].checksum,
+              view_checksum(scratch_, server_ids[i], rows[i].info, rows[i].signature), sent_},
+             rows[i].info,
+             row.server_checksum});
       }
       if (changes.empty()) return;
-      server_.update(state_.file, changes, uploads);
-      server_.clear_recordings();
-      writing->commit();
-      for (const Upload& upload : uploads) {
+      const auto taken = server_.take_changes(state_.file, sent_, changes);
+      // Where somebody was first, `download` sees what.
+      for (const ViewId view : ids) {
+        SynchronisedView row = views_.at(view);
+        row.sent.reset();
+        put(view, row);
+      }
+      for (const Upload& upload : taken) {
         SynchronisedView row = views_.at(upload.view);
+        if (upload.signature != row.signature) continue;
         take_answer(row, upload, true);
         put(upload.view, row);
       }
-      report_.updated_on_server += changes.size();
+      report_.updated_on_server += taken.size();
     });
   }
 
@@ -584,30 +541,52 @@ class Synchronisation {
         server_ids.push_back(*row->second.server_view);
         rows[*row->second.server_view] = row->second;
       }
-      const auto writing = server_.tables().transaction(Kind::writing);
-      require_same_memory();
-      std::vector<ViewId> same, changed;
-      for (const auto& [id, checksum] : server_.checksums(server_ids)) {
-        (checksum == rows.at(id).server_checksum ? same : changed).push_back(id);
-      }
+      const auto there = server_.checksums(server_ids);
       // A restored server may have given the id to another view.
+      std::map<ViewId, std::int64_t> same;
+      std::vector<ViewId> changed;
+      for (const auto& [id, checksum] : there) {
+        if (checksum == rows.at(id).server_checksum) {
+          same[id] = checksum;
+        } else {
+          changed.push_back(id);
+        }
+      }
       for (const auto& [id, signature] : server_.signatures(changed)) {
-        if (signature == rows.at(id).signature) same.push_back(id);
+        if (signature == rows.at(id).signature) same[id] = there.at(id);
       }
-      if (!same.empty()) {
-        server_.tables().remove(same);
-        forget_in_maps(server_.tables(), same);
-        server_.clear_recordings();
-        writing->commit();
-      }
+      const std::vector<ViewId> removed = remove_there(same);
+      report_.removed_on_server += removed.size();
       for (const ViewId id : server_ids) {
-        drop(by_server_.at(id));
-        std::erase_if(links_, [&](const auto& link) {
-          return link.first.first == id || link.first.second == id;
-        });
+        // One that was changed just now is for the next time.
+        if (same.contains(id) && !std::ranges::binary_search(removed, id)) continue;
+        forget(id);
       }
-      report_.removed_on_server += same.size();
     });
+  }
+
+  /// Ascending.
+  std::vector<ViewId> remove_there(const std::map<ViewId, std::int64_t>& checksums) {
+    std::vector<ViewId> removed;
+    if (checksums.empty()) return removed;
+    if (server_.tables().map_names().empty()) {
+      removed = server_.take_removals(checksums);
+    } else {
+      // Maps are changed by this program: others wait for its link.
+      const auto writing = server_.tables().transaction(Kind::writing);
+      std::vector<ViewId> wanted;
+      for (const auto& [id, checksum] : checksums) wanted.push_back(id);
+      for (const auto& [id, checksum] : server_.checksums(wanted)) {
+        if (checksum == checksums.at(id)) removed.push_back(id);
+      }
+      server_.tables().remove(removed);
+      forget_in_maps(server_.tables(), removed);
+      const std::string key = "parameter." + std::string(recordings_parameter);
+      server_.tables().write_setting(key, std::string());
+      writing->commit();
+    }
+    std::ranges::sort(removed);
+    return removed;
   }
 
   /// The file's links whose ends the server has, by its ids.
@@ -656,10 +635,7 @@ class Synchronisation {
       if (server_.may_change()) others.push_back({{ends.first, ends.second, kind}, std::nullopt});
     }
     if (added.empty() && others.empty()) return;
-    const auto writing = server_.tables().transaction(Kind::writing);
-    require_same_memory();
-    report_.links_uploaded += server_.add_links(added) + server_.change_links(others);
-    writing->commit();
+    report_.links_uploaded += server_.take_links(added, others);
     for (const Link& link : added) links_[{link.a, link.b}] = link.kind;
     for (const auto& link : others) {
       if (link.wanted) {
@@ -830,8 +806,10 @@ class Synchronisation {
       between.name = "\x01" + std::to_string(change.view.value);
       file_.write_info(change.view, between, 0);
     }
+    std::set<std::string> names;
+    for (const Change& change : taken) names.insert(change.there->info.name);
     for (const Change& change : taken) {
-      make_way(change.there->info.name, change.view);
+      make_way(change.there->info.name, change.view, names);
       write_info(change.view, change.there->info, change.row.signature);
       SynchronisedView next = views_.at(change.view);
       next.local_checksum = local_.at(change.view);
@@ -850,15 +828,16 @@ class Synchronisation {
     });
   }
 
-  /// A view of the file that has a name of the server's gets another one; the next synchronisation
-  /// uploads it.
-  void make_way(const std::string& name, std::optional<ViewId> but) {
+  /// A view of the file that has a name of the server's gets another one, which is none of those
+  /// that are to come; the next synchronisation uploads it.
+  void make_way(const std::string& name, std::optional<ViewId> but,
+                const std::set<std::string>& to_come) {
     const auto other = file_.find(name);
     if (!other || other == but) return;
     auto row = read_row(*other).value();
     for (int count = 1;; ++count) {
       row.info.name = own_name(name, count);
-      if (!file_.find(row.info.name)) break;
+      if (!file_.find(row.info.name) && !to_come.contains(row.info.name)) break;
     }
     write_info(*other, row.info, row.signature);
     clear_recordings();
@@ -870,6 +849,8 @@ class Synchronisation {
     std::vector<ViewId> ids;
     std::vector<NewView> added;
     std::uint32_t last = file_.last_id();
+    std::set<std::string> names;
+    for (const WholeServerView& whole : views) names.insert(whole.view.info.name);
     for (WholeServerView& whole : views) {
       NewView& view = whole.view;
       if (view.signature.magnitudes.size() != header_.shape.size()) {
@@ -893,7 +874,7 @@ class Synchronisation {
         ++report_.adopted;
         continue;
       }
-      make_way(view.info.name, std::nullopt);
+      make_way(view.info.name, std::nullopt, names);
       if (last >= UINT32_MAX - 1) file_.fail_damaged("there is no id left for another view");
       const ViewId id{++last};
       next.local_checksum = view_checksum(scratch_, id, view.info, signature);

@@ -97,10 +97,10 @@ class PostgresqlTables final : public MemoryTables {
   /// For what only a server is asked (server_exchange.hpp).
   [[nodiscard]] PostgresqlConnection& connection() noexcept { return connection_; }
   [[nodiscard]] std::int64_t memory() const noexcept { return memory_; }
-  /// A writing transaction that others do not wait for until `lock_statement` has run.
-  [[nodiscard]] std::unique_ptr<Transaction> unlocked_transaction();
-  [[nodiscard]] std::string lock_statement() const;
-  /// Views say which connection added them: its number. Within a writing transaction.
+  /// What a notification says of the areas that were changed since it was asked last: empty for
+  /// many.
+  [[nodiscard]] std::string take_areas();
+  /// Views say which connection added them: its number.
   std::int64_t session();
   /// The notification of the transaction will say so.
   void changed_at(const std::optional<double>& x_m, const std::optional<double>& y_m) {

@@ -25,7 +25,7 @@ std::string table_of(BesideViews table) {
 
 class PostgresqlTables::Part final : public MemoryTables::Transaction {
  public:
-  Part(PostgresqlTables& tables, Kind kind, bool locked)
+  Part(PostgresqlTables& tables, Kind kind)
       : tables_(tables),
         within_another_(tables.connection_.in_transaction()),
         writes_(kind == Kind::writing) {
@@ -35,10 +35,12 @@ class PostgresqlTables::Part final : public MemoryTables::Transaction {
       if (open_) connection.execute("SAVEPOINT part");
       return;
     }
+    // One writes at a time, so that ids have no gaps and ascend as views become visible.
+    constexpr std::int64_t locks = 5786634408840658944;  // as for the schema, which is number 0
     try {
-      connection.execute(!writes_ ? "BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY"
-                         : locked ? "BEGIN; " + tables_.lock_statement()
-                                  : "BEGIN");
+      connection.execute(writes_ ? "BEGIN; SELECT pg_advisory_xact_lock(" +
+                                       std::to_string(locks + tables_.memory_) + ")"
+                                 : "BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY");
     } catch (...) {
       connection.try_execute("ROLLBACK");
       throw;
@@ -81,31 +83,22 @@ PostgresqlTables::PostgresqlTables(const ServerAddress& address, PostgresqlConne
       channel_(std::move(channel)) {}
 
 std::unique_ptr<MemoryTables::Transaction> PostgresqlTables::transaction(Kind kind) {
-  return std::make_unique<Part>(*this, kind, true);
+  return std::make_unique<Part>(*this, kind);
 }
 
-std::unique_ptr<MemoryTables::Transaction> PostgresqlTables::unlocked_transaction() {
-  return std::make_unique<Part>(*this, Kind::writing, false);
-}
-
-// One writes at a time, so that ids have no gaps and ascend as views become visible.
-std::string PostgresqlTables::lock_statement() const {
-  constexpr std::int64_t locks = 5786634408840658944;  // as for the schema, which is number 0
-  return "SELECT pg_advisory_xact_lock(" + std::to_string(locks + memory_) + ")";
-}
-
-// Says which areas are others now, where these are few.
-void PostgresqlTables::notify() {
+std::string PostgresqlTables::take_areas() {
   constexpr std::size_t max_bytes = 4000;  // PostgreSQL takes up to 8000
   std::string said;
   for (const MemoryArea& area : std::exchange(areas_, {})) {
     if (!said.empty()) said += ' ';
     said += to_text(area.column) + "," + to_text(area.row);
-    if (said.size() > max_bytes) {
-      said.clear();
-      break;
-    }
+    if (said.size() > max_bytes) return {};
   }
+  return said;
+}
+
+void PostgresqlTables::notify() {
+  const std::string said = take_areas();
   connection_.run("SELECT pg_notify($1, $2)",
                   Values().add(std::string_view(channel_)).add(std::string_view(said)));
 }

@@ -2,6 +2,8 @@
 
 #include "panonav/storage/internal/server_exchange.hpp"
 
+#include <array>
+
 #include "panonav/core/error.hpp"
 #include "panonav/storage/internal/memory_rows.hpp"
 #include "panonav/storage/internal/postgresql_schema.hpp"
@@ -106,30 +108,46 @@ ServerView ServerExchange::view_in(const PostgresqlRows& rows, int row) const {
   return view;
 }
 
+void ServerExchange::refuse_removed() const {
+  throw FileError(tables_.path().native(),
+                  "was removed from its server, or belongs to another fleet now");
+}
+
 ServerExchange::State ServerExchange::state() {
   const PostgresqlRows rows =
       connection().run("SELECT identity, last_view FROM panonav.memories WHERE id = $1", values());
-  if (rows.size() == 0) {
-    throw FileError(tables_.path().native(),
-                    "was removed from its server, or belongs to another fleet now");
-  }
+  if (rows.size() == 0) refuse_removed();
   return {std::string(rows.text(0, 0)), rows.integer(0, 1)};
 }
 
-std::vector<Upload> ServerExchange::uploads(const std::string& file,
-                                            std::span<const ViewId> views) {
+constexpr const char* upload_fields =
+    "SELECT u.view, u.signature, u.server_view, u.local_checksum, u.server_checksum, u.sent FROM ";
+
+std::vector<Upload> ServerExchange::uploads_in(const PostgresqlRows& rows) const {
   std::vector<Upload> uploads;
-  if (views.empty()) return uploads;
-  const auto numbers = numbers_of(views);
-  const PostgresqlRows rows = connection().run(
-      "SELECT view, signature, server_view, local_checksum, server_checksum, sent FROM "
-      "panonav.uploads WHERE memory = $1 AND file = $2 AND view = ANY($3) ORDER BY server_view",
-      values().add(std::string_view(file)).add(Numbers(numbers)));
   for (int i = 0; i < rows.size(); ++i) {
     uploads.push_back({id_in(rows, i, 0), rows.integer(i, 1), id_in(rows, i, 2), rows.integer(i, 3),
                        rows.integer(i, 4), rows.integer(i, 5)});
   }
   return uploads;
+}
+
+std::vector<Upload> ServerExchange::uploads(const std::string& file,
+                                            std::span<const ViewId> views) {
+  if (views.empty()) return {};
+  const auto numbers = numbers_of(views);
+  return uploads_in(connection().run(
+      upload_fields + std::string("panonav.uploads u WHERE u.memory = $1 AND u.file = $2 AND "
+                                  "u.view = ANY($3) ORDER BY u.server_view"),
+      values().add(std::string_view(file)).add(Numbers(numbers))));
+}
+
+std::vector<Upload> ServerExchange::settled_uploads(const std::string& file,
+                                                    std::span<const ViewId> views) {
+  const auto numbers = numbers_of(views);
+  return uploads_in(
+      connection().run(upload_fields + std::string("panonav.uploads_of($1, $2, $3) u"),
+                       values().add(std::string_view(file)).add(Numbers(numbers))));
 }
 
 std::vector<ServerView> ServerExchange::named(std::span<const std::string> names) {
@@ -274,11 +292,11 @@ std::vector<WholeServerView> ServerExchange::whole(std::span<const ViewId> ids) 
 
 void ServerExchange::stage(std::span<const NewView> views) {
   connection().execute(
-      "CREATE TEMPORARY TABLE IF NOT EXISTS panonav_staged(number bigint, name text COLLATE "
-      "\"C\", x_m double precision, y_m double precision, heading_rad double precision, stamp_s "
-      "double precision, signature bytea, thumbnail bytea, features bytea) ON COMMIT DELETE ROWS;"
+      "CREATE TEMPORARY TABLE IF NOT EXISTS panonav_staged(number bigint, name text COLLATE \"C\", "
+      "x_m double precision, y_m double precision, heading_rad double precision, stamp_s double "
+      "precision, signature bytea, thumbnail bytea, features bytea);"
       "ALTER TABLE pg_temp.panonav_staged ALTER signature SET STORAGE PLAIN, ALTER thumbnail SET "
-      "STORAGE EXTERNAL, ALTER features SET STORAGE EXTERNAL");
+      "STORAGE EXTERNAL, ALTER features SET STORAGE EXTERNAL; TRUNCATE pg_temp.panonav_staged");
   CopyRows rows;
   std::vector<std::uint8_t> signature;
   const auto add_beside = [&](const std::vector<std::uint8_t>& bytes) {
@@ -301,72 +319,73 @@ void ServerExchange::stage(std::span<const NewView> views) {
 
 namespace {
 
-/// Uploads as one array for each column.
-struct UploadColumns {
-  explicit UploadColumns(std::span<const Upload> uploads) {
-    for (const Upload& upload : uploads) {
-      views.push_back(upload.view.value);
-      signatures.push_back(upload.signature);
-      server_views.push_back(upload.server_view.value);
-      local_checksums.push_back(upload.local_checksum);
-      server_checksums.push_back(upload.server_checksum);
-      sent.push_back(upload.sent);
-    }
-  }
-  void add_to(PostgresqlValues& values) const {
-    values.add(Numbers(views))
-        .add(Numbers(signatures))
-        .add(Numbers(server_views))
-        .add(Numbers(local_checksums))
-        .add(Numbers(server_checksums))
-        .add(Numbers(sent));
-  }
-  std::vector<std::int64_t> views, signatures, server_views, local_checksums, server_checksums,
-      sent;
-};
+std::int64_t empty_recordings_checksum() {
+  return setting_checksum("parameter." + std::string(recordings_parameter), std::string());
+}
 
 }  // namespace
 
-void ServerExchange::insert(const std::string& file, std::span<const Staged> added) {
-  if (added.empty()) return;
-  const std::int64_t session = tables_.session();
-  std::vector<Upload> uploads;
-  std::vector<std::int64_t> numbers, thumbnails, features;
-  for (const Staged& staged : added) {
-    uploads.push_back(staged.upload);
-    numbers.push_back(static_cast<std::int64_t>(staged.number));
-    thumbnails.push_back(staged.thumbnail_checksum);
-    features.push_back(staged.features_checksum);
+std::uint32_t ServerExchange::reserve_ids(std::size_t count) {
+  const PostgresqlRows rows = connection().run("SELECT panonav.reserve_ids($1, $2)",
+                                               values().add(static_cast<std::int64_t>(count)));
+  if (rows.is_null(0, 0)) refuse_removed();
+  const std::int64_t last = rows.integer(0, 0);
+  if (last < 0 || last + static_cast<std::int64_t>(count) >= std::int64_t{UINT32_MAX}) {
+    tables_.fail_damaged("there is no id left for another view");
   }
-  PostgresqlValues given = values();
-  given.add(session).add(std::string_view(file));
-  UploadColumns(uploads).add_to(given);
-  given.add(Numbers(numbers)).add(Numbers(thumbnails)).add(Numbers(features));
-  connection().run(
-      "WITH n AS (SELECT * FROM unnest($4, $5, $6, $7, $8, $9, $10, $11, $12) n(view, signature, "
-      "id, local_checksum, checksum, sent, number, thumbnail_checksum, features_checksum)), "
-      "added AS (INSERT INTO panonav.views(memory, id, name, x_m, y_m, heading_rad, stamp_s, "
-      "session, signature, checksum) SELECT $1, n.id, s.name, s.x_m, s.y_m, s.heading_rad, "
-      "s.stamp_s, $2, s.signature, n.checksum FROM pg_temp.panonav_staged s JOIN n USING "
-      "(number)), "
-      "thumbnails AS (INSERT INTO panonav.thumbnails(memory, view, bytes, checksum) SELECT $1, "
-      "n.id, s.thumbnail, n.thumbnail_checksum FROM pg_temp.panonav_staged s JOIN n USING (number) "
-      "WHERE s.thumbnail IS NOT NULL), "
-      "features AS (INSERT INTO panonav.features(memory, view, bytes, checksum) SELECT $1, n.id, "
-      "s.features, n.features_checksum FROM pg_temp.panonav_staged s JOIN n USING (number) WHERE "
-      "s.features IS NOT NULL), "
-      "taken AS (INSERT INTO panonav.uploads(memory, file, view, signature, server_view, "
-      "local_checksum, server_checksum, sent) SELECT $1, $3, view, signature, id, local_checksum, "
-      "checksum, sent FROM n) "
-      "UPDATE panonav.memories SET last_view = (SELECT max(id) FROM n) WHERE id = $1",
-      given);
+  return static_cast<std::uint32_t>(last);
 }
 
-void ServerExchange::update(const std::string& file, std::span<const ServerView> views,
-                            std::span<const Upload> uploads) {
-  if (views.empty()) return;
-  std::vector<std::int64_t> ids;
-  for (const ServerView& view : views) ids.push_back(view.id.value);
+std::vector<Upload> ServerExchange::take_views(const std::string& file, std::int64_t sent,
+                                               std::span<const Staged> staged) {
+  std::vector<std::int64_t> views, signatures, ids, local_checksums, server_checksums, numbers,
+      thumbnails, features;
+  for (const Staged& view : staged) {
+    views.push_back(view.upload.view.value);
+    signatures.push_back(view.upload.signature);
+    ids.push_back(view.upload.server_view.value);
+    local_checksums.push_back(view.upload.local_checksum);
+    server_checksums.push_back(view.upload.server_checksum);
+    numbers.push_back(static_cast<std::int64_t>(view.number));
+    thumbnails.push_back(view.thumbnail_checksum);
+    features.push_back(view.features_checksum);
+  }
+  const std::int64_t session = tables_.session();
+  const std::string said = tables_.take_areas();
+  return uploads_in(connection().run(
+      upload_fields +
+          std::string("panonav.take_views($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, "
+                      "$13) u"),
+      values()
+          .add(std::string_view(file))
+          .add(session)
+          .add(sent)
+          .add(std::string_view(said))
+          .add(Numbers(views))
+          .add(Numbers(signatures))
+          .add(Numbers(ids))
+          .add(Numbers(local_checksums))
+          .add(Numbers(server_checksums))
+          .add(Numbers(numbers))
+          .add(Numbers(thumbnails))
+          .add(Numbers(features))));
+}
+
+std::vector<Upload> ServerExchange::take_changes(const std::string& file, std::int64_t sent,
+                                                 std::span<const ChangedView> changes) {
+  std::vector<std::int64_t> views, signatures, ids, local_checksums, former, server_checksums;
+  CopyRows rows;
+  for (const ChangedView& view : changes) {
+    views.push_back(view.upload.view.value);
+    signatures.push_back(view.upload.signature);
+    ids.push_back(view.upload.server_view.value);
+    local_checksums.push_back(view.upload.local_checksum);
+    former.push_back(view.former_checksum);
+    server_checksums.push_back(view.upload.server_checksum);
+    rows.begin_row(6).add(std::int64_t{view.upload.server_view.value});
+    add_info(rows, view.info);
+    if (view.info.pose) tables_.changed_at(view.info.pose->x_m, view.info.pose->y_m);
+  }
   const PostgresqlRows before =
       connection().run("SELECT x_m, y_m FROM panonav.views WHERE memory = $1 AND id = ANY($2)",
                        values().add(Numbers(ids)));
@@ -376,100 +395,73 @@ void ServerExchange::update(const std::string& file, std::span<const ServerView>
   connection().execute(
       "CREATE TEMPORARY TABLE IF NOT EXISTS panonav_changed(id bigint, name text COLLATE \"C\", "
       "x_m double precision, y_m double precision, heading_rad double precision, stamp_s double "
-      "precision, checksum bigint) ON COMMIT DELETE ROWS");
-  CopyRows rows;
-  for (const ServerView& view : views) {
-    rows.begin_row(7).add(std::int64_t{view.id.value});
-    add_info(rows, view.info);
-    rows.add(view.checksum);
-    if (view.info.pose) tables_.changed_at(view.info.pose->x_m, view.info.pose->y_m);
-  }
+      "precision); TRUNCATE pg_temp.panonav_changed");
   connection().copy_in("COPY pg_temp.panonav_changed FROM STDIN (FORMAT binary)", rows.finish());
+  const std::string said = tables_.take_areas();
+  return uploads_in(connection().run(
+      upload_fields +
+          std::string("panonav.take_changes($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11) u"),
+      values()
+          .add(std::string_view(file))
+          .add(sent)
+          .add(std::string_view(said))
+          .add(empty_recordings_checksum())
+          .add(Numbers(views))
+          .add(Numbers(signatures))
+          .add(Numbers(ids))
+          .add(Numbers(local_checksums))
+          .add(Numbers(former))
+          .add(Numbers(server_checksums))));
+}
+
+std::vector<ViewId> ServerExchange::take_removals(const std::map<ViewId, std::int64_t>& checksums) {
+  std::vector<std::int64_t> ids, sums;
+  for (const auto& [id, checksum] : checksums) {
+    ids.push_back(id.value);
+    sums.push_back(checksum);
+  }
+  const PostgresqlRows there =
+      connection().run("SELECT x_m, y_m FROM panonav.views WHERE memory = $1 AND id = ANY($2)",
+                       values().add(Numbers(ids)));
+  for (int i = 0; i < there.size(); ++i) tables_.changed_at(there.real(i, 0), there.real(i, 1));
+  const std::string said = tables_.take_areas();
+  const PostgresqlRows rows = connection().run("SELECT panonav.take_removals($1, $2, $3, $4, $5)",
+                                               values()
+                                                   .add(std::string_view(said))
+                                                   .add(empty_recordings_checksum())
+                                                   .add(Numbers(ids))
+                                                   .add(Numbers(sums)));
+  std::vector<ViewId> removed;
+  for (int i = 0; i < rows.size(); ++i) removed.push_back(id_in(rows, i, 0));
+  return removed;
+}
+
+std::size_t ServerExchange::take_links(std::span<const Link> added,
+                                       std::span<const ChangedLink> changed) {
+  // a, b, kind, checksum; a, b, former kind, kind, checksum; a, b
+  std::array<std::vector<std::int64_t>, 11> columns;
+  const auto kind_of = [](LinkKind kind) { return std::int64_t{static_cast<int>(kind)}; };
+  for (const Link& link : added) {
+    columns[0].push_back(link.a.value);
+    columns[1].push_back(link.b.value);
+    columns[2].push_back(kind_of(link.kind));
+    columns[3].push_back(link_checksum(link));
+  }
+  for (const ChangedLink& link : changed) {
+    const Link& former = link.former;
+    const std::size_t first = link.wanted ? 4 : 9;
+    columns[first].push_back(former.a.value);
+    columns[first + 1].push_back(former.b.value);
+    if (!link.wanted) continue;
+    columns[6].push_back(kind_of(former.kind));
+    columns[7].push_back(kind_of(*link.wanted));
+    columns[8].push_back(link_checksum({former.a, former.b, *link.wanted}));
+  }
   PostgresqlValues given = values();
-  given.add(std::string_view(file));
-  UploadColumns(uploads).add_to(given);
-  connection().run(
-      "WITH changed AS (UPDATE panonav.views v SET name = c.name, x_m = c.x_m, y_m = c.y_m, "
-      "heading_rad = c.heading_rad, stamp_s = c.stamp_s, checksum = c.checksum FROM "
-      "pg_temp.panonav_changed c WHERE v.memory = $1 AND v.id = c.id) "
-      "INSERT INTO panonav.uploads(memory, file, view, signature, server_view, local_checksum, "
-      "server_checksum, sent) SELECT $1, $2, * FROM unnest($3, $4, $5, $6, $7, $8) ON CONFLICT "
-      "(memory, file, view, signature, server_view) DO UPDATE SET "
-      "local_checksum = excluded.local_checksum, server_checksum = excluded.server_checksum, sent "
-      "= "
-      "excluded.sent",
-      given);
-}
-
-void ServerExchange::clear_recordings() {
-  const std::string key = "parameter." + std::string(recordings_parameter);
-  connection().run(
-      "UPDATE panonav.settings SET text_value = '', checksum = $3 WHERE memory = $1 AND key = $2 "
-      "AND "
-      "text_value <> ''",
-      values().add(std::string_view(key)).add(setting_checksum(key, std::string())));
-}
-
-std::size_t ServerExchange::add_links(std::span<const Link> links) {
-  if (links.empty()) return 0;
-  std::vector<std::int64_t> a, b, kinds, checksums;
-  for (const Link& link : links) {
-    a.push_back(link.a.value);
-    b.push_back(link.b.value);
-    kinds.push_back(static_cast<int>(link.kind));
-    checksums.push_back(link_checksum(link));
-  }
+  for (const auto& column : columns) given.add(Numbers(column));
   const PostgresqlRows rows = connection().run(
-      "WITH added AS (INSERT INTO panonav.links(memory, a, b, kind, checksum) SELECT $1, n.* FROM "
-      "unnest($2, $3, $4, $5) n(a, b, kind, checksum) WHERE EXISTS (SELECT FROM panonav.views v "
-      "WHERE v.memory = $1 AND v.id = n.a) AND EXISTS (SELECT FROM panonav.views v WHERE v.memory "
-      "= $1 AND v.id = n.b) ON CONFLICT DO NOTHING RETURNING 1) SELECT count(*) FROM added",
-      values().add(Numbers(a)).add(Numbers(b)).add(Numbers(kinds)).add(Numbers(checksums)));
+      "SELECT panonav.take_links($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12)", given);
   return static_cast<std::size_t>(rows.integer(0, 0));
-}
-
-std::size_t ServerExchange::change_links(std::span<const ChangedLink> links) {
-  std::vector<std::int64_t> a, b, former, wanted, checksums;
-  std::vector<std::int64_t> removed_a, removed_b;
-  for (const ChangedLink& link : links) {
-    const auto kind = static_cast<int>(link.former.kind);
-    if (link.wanted) {
-      a.push_back(link.former.a.value);
-      b.push_back(link.former.b.value);
-      former.push_back(kind);
-      wanted.push_back(static_cast<int>(*link.wanted));
-      checksums.push_back(link_checksum({link.former.a, link.former.b, *link.wanted}));
-    } else {
-      removed_a.push_back(link.former.a.value);
-      removed_b.push_back(link.former.b.value);
-    }
-  }
-  std::int64_t changed = 0;
-  if (!a.empty()) {
-    changed += connection()
-                   .run(
-                       "WITH changed AS (UPDATE panonav.links l SET kind = n.wanted, checksum = "
-                       "n.checksum FROM unnest($2, $3, $4, $5, $6) n(a, b, former, wanted, "
-                       "checksum) WHERE l.memory = $1 AND l.a = n.a AND l.b = n.b AND l.kind = "
-                       "n.former RETURNING 1) SELECT count(*) FROM changed",
-                       values()
-                           .add(Numbers(a))
-                           .add(Numbers(b))
-                           .add(Numbers(former))
-                           .add(Numbers(wanted))
-                           .add(Numbers(checksums)))
-                   .integer(0, 0);
-  }
-  if (!removed_a.empty()) {
-    changed += connection()
-                   .run(
-                       "WITH removed AS (DELETE FROM panonav.links l USING unnest($2, $3) n(a, b) "
-                       "WHERE l.memory = $1 AND l.a = n.a AND l.b = n.b RETURNING 1) SELECT "
-                       "count(*) FROM removed",
-                       values().add(Numbers(removed_a)).add(Numbers(removed_b)))
-                   .integer(0, 0);
-  }
-  return static_cast<std::size_t>(changed);
 }
 
 }  // namespace panonav

@@ -94,37 +94,50 @@ class ServerExchange {
   /// Those that are there, with thumbnails and features, in one message.
   [[nodiscard]] std::vector<WholeServerView> whole(std::span<const ViewId> views);
 
-  /// Brings views to a table of the connection's own; nobody waits for it. Their numbers are their
-  /// places in `views`.
+  // What follows is taken by one statement each, outside of transactions: nobody waits for the
+  // link.
+
+  /// The same as `uploads`, once nobody is writing.
+  [[nodiscard]] std::vector<Upload> settled_uploads(const std::string& file,
+                                                    std::span<const ViewId> views);
+  /// Brings views to a table of the connection's own. Their numbers are their places in `views`.
   void stage(std::span<const NewView> views);
+  /// The last id before those that nobody else gets.
+  [[nodiscard]] std::uint32_t reserve_ids(std::size_t count);
   struct Staged {
     std::size_t number = 0;  ///< as it was staged
-    Upload upload;           ///< its `server_view` is the new id
+    Upload upload;           ///< its `server_view` is a reserved id
     std::int64_t thumbnail_checksum = 0, features_checksum = 0;
   };
-  /// Adds staged views, whose ids ascend from the last, and says so in `uploads`.
-  void insert(const std::string& file, std::span<const Staged> added);
-  /// Gives views other names, poses and stamps, and says so in `uploads`.
-  void update(const std::string& file, std::span<const ServerView> views,
-              std::span<const Upload> uploads);
-  /// Adds links of views that are there where these have none; returns how many.
-  std::size_t add_links(std::span<const Link> links);
-  /// Gives links another kind where they still have the former one, and removes those whose wanted
-  /// kind is empty; returns how many.
+  /// Adds staged views, but for those that were taken before and are there, and those whose name is
+  /// taken. Returns what is there of the file's views, by ascending id.
+  [[nodiscard]] std::vector<Upload> take_views(const std::string& file, std::int64_t sent,
+                                               std::span<const Staged> views);
+  struct ChangedView {
+    Upload upload;
+    ReferenceInfo info;
+    std::int64_t former_checksum = 0;  ///< as the file knows it
+  };
+  /// Gives views other names, poses and stamps where nobody was first. Returns what was taken.
+  [[nodiscard]] std::vector<Upload> take_changes(const std::string& file, std::int64_t sent,
+                                                 std::span<const ChangedView> views);
+  /// Removes views that have these checksums, with all that belongs to them. Returns which.
+  [[nodiscard]] std::vector<ViewId> take_removals(const std::map<ViewId, std::int64_t>& checksums);
   struct ChangedLink {
     Link former;
-    std::optional<LinkKind> wanted;
+    std::optional<LinkKind> wanted;  ///< empty: it is removed
   };
-  std::size_t change_links(std::span<const ChangedLink> links);
-
-  /// The marks of recordings that were memorised on the server (`recordings_parameter`).
-  void clear_recordings();
+  /// Adds links of views that are there where these have none, and gives links another kind where
+  /// they still have the former one. Returns how many.
+  std::size_t take_links(std::span<const Link> added, std::span<const ChangedLink> changed);
 
  private:
   ServerExchange(const ServerAddress& address, PostgresqlConnection connection,
                  const FoundMemory& found);
   [[nodiscard]] PostgresqlConnection& connection() noexcept { return tables_.connection(); }
   [[nodiscard]] PostgresqlValues values() const;
+  [[noreturn]] void refuse_removed() const;
+  [[nodiscard]] std::vector<Upload> uploads_in(const PostgresqlRows& rows) const;
   [[nodiscard]] ServerView view_in(const PostgresqlRows& rows, int row) const;
   [[nodiscard]] ViewId id_in(const PostgresqlRows& rows, int row, int column) const;
 
