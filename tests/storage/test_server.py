@@ -389,7 +389,9 @@ def synchronised(server, folder):
 
 def older_schema(server, folder):
     """A server that an older panonav made: used as it is, and brought to this version by whoever may."""
-    server.sql("DROP TABLE panonav.uploads; ALTER TABLE panonav.memories DROP COLUMN identity; UPDATE "
+    server.sql("DROP TABLE panonav.uploads CASCADE; DROP FUNCTION panonav.reserve_ids, panonav.lock_memory, "
+               "panonav.clear_recordings, panonav.notify_changes, panonav.take_removals, panonav.take_links; DROP INDEX "
+               "panonav.views_by_checksum; ALTER TABLE panonav.memories DROP COLUMN identity; UPDATE "
                "panonav.schema_version SET version = 1")
     before = run(PANONAV, "list", server.memory("hall"), "--json")
     refused(PANONAV, "synchronise", folder / "hall.panonav", server.memory("hall", "adds"),
