@@ -211,11 +211,13 @@ class Robot:
                 "PANONAV_TEST_NAME": str(self.number), "PANONAV_TEST_FIRST": str(100000 * (len(Robot.processes) + 1)),
                 "PANONAV_TEST_STEPS": str(steps)})
         Robot.processes.append(self.process)
-        threading.Thread(target=self.listen, args=(self.process,), daemon=True).start()
+        self.listener = threading.Thread(target=self.listen, args=(self.process,), daemon=True)
+        self.listener.start()
 
     def listen(self, process):
         for line in process.stdout:
-            if line.endswith("\n"):  # a line that was cut was not told
+            # A line that was cut was not told; the others are those of the test's own.
+            if line.endswith("\n") and line[0].islower():
                 self.said.append(line)
                 self.ledger.take(self.number, line)
 
@@ -354,9 +356,12 @@ def experiment(arguments, folder):
         rounds += 1
         new = 0
         for robot in robots:
-            said = json.loads(subprocess.run([arguments.panonav, "synchronise", robot.file, robot.address(), "--json"],
-                                             capture_output=True, text=True, check=True).stdout)
-            new += sum(said[key] for key in said if isinstance(said[key], int) and key != "views")
+            robot.start(steps=-1)
+            robot.process.wait(timeout=300)
+            robot.listener.join()
+            words = robot.said[-1].split()
+            assert words[0] == "synchronised", robot.said
+            new += sum(int(word) for word in words[2:])
         if new == 0 or rounds == 6:
             break
     converging_s = time.monotonic() - begin

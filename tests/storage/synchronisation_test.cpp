@@ -687,7 +687,7 @@ TEST_F(SynchronisedMemory, AFullDiskOfTheFileLosesNothing) {
 
 /// What bench/synchronise_faults.py starts, kills and counts: a robot that changes its file, tells
 /// each change before and after it was made, and synchronises now and then, for ever or for
-/// PANONAV_TEST_STEPS steps.
+/// PANONAV_TEST_STEPS steps; with -1 it synchronises once.
 TEST_F(SynchronisedMemory, ARobotWorksUntilItIsKilled) {
   const char* file_path = std::getenv("PANONAV_TEST_ROBOT");
   if (file_path == nullptr) GTEST_SKIP() << "no PANONAV_TEST_ROBOT";
@@ -707,7 +707,12 @@ TEST_F(SynchronisedMemory, ARobotWorksUntilItIsKilled) {
   const auto synchronise = [&] {
     try {
       const auto report = synchronise_memory(file_path, address);
-      say("synchronised", report.seconds, report.uploaded, report.downloaded, report.conflicts);
+      const std::size_t others = report.adopted + report.updated_on_server +
+                                 report.updated_in_file + report.removed_on_server +
+                                 report.removed_in_file + report.renamed + report.links_uploaded +
+                                 report.links_downloaded;
+      say("synchronised", report.seconds, report.uploaded, report.downloaded, report.conflicts,
+          others);
     } catch (const FileError& error) {
       say("refused", error.what());
     }
@@ -716,6 +721,7 @@ TEST_F(SynchronisedMemory, ARobotWorksUntilItIsKilled) {
   if (!std::filesystem::exists(file_path) && robot == "0") {
     (void)MemoryFile::create(file_path, small_header());
   }
+  if (steps < 0) synchronise();
   for (int step = 0; steps == 0 || step < steps; ++step) {
     try {
       MemoryFile file = MemoryFile::open(file_path, Access::read_write);
