@@ -112,6 +112,40 @@ TEST_P(Distance, SketchBoundsFollowTheirDefinition) {
   EXPECT_GT(above_zero, 100);
 }
 
+TEST_P(Distance, CellBoundsFollowTheirDefinition) {
+  Random random(14);
+  for (const std::size_t pairs : {1U, 2U, 7U, 16U, 128U}) {
+    const std::size_t blocks = 1 + random.index(5);
+    const auto codes = random_bytes(random, blocks * pairs * cell_block);
+    auto tables = random_bytes(random, pairs * 32);
+    if (pairs == 128) std::ranges::fill(tables, 255);  // the largest sum
+    std::vector<std::uint32_t> expected;
+    for (std::size_t view = 0; view < blocks * cell_block; ++view) {
+      expected.push_back(0);
+      for (std::size_t pair = 0; pair < pairs; ++pair) {
+        const std::size_t row = (view / cell_block * pairs + pair) * cell_block;
+        const std::uint8_t code = codes[row + cell_place(view % cell_block)];
+        expected.back() +=
+            std::min(255, tables[pair * 32 + code % 16] + tables[pair * 32 + 16 + code / 16]);
+      }
+    }
+    std::vector<std::uint32_t> ascending = expected;
+    std::ranges::sort(ascending);
+    for (const std::uint32_t limit : {ascending[ascending.size() / 3], 0U, 65535U, 100000U}) {
+      std::vector<std::uint16_t> bounds(expected.size());
+      std::vector<std::uint32_t> indices(expected.size());
+      indices.resize(kernels.cell_bounds(codes.data(), blocks, {tables.data(), pairs, limit},
+                                         bounds.data(), indices.data()));
+      std::vector<std::uint32_t> wanted;
+      for (std::uint32_t view = 0; view < expected.size(); ++view) {
+        EXPECT_EQ(bounds[view], expected[view]) << pairs << " pairs, view " << view;
+        if (expected[view] <= limit) wanted.push_back(view);
+      }
+      EXPECT_EQ(indices, wanted) << pairs << " pairs, limit " << limit;
+    }
+  }
+}
+
 TEST_P(Distance, SketchBoundsOfPickedViewsAreThoseOfTheInterleavedOnes) {
   Random random(13);
   for (std::size_t groups = 8; groups <= 40; groups += 8) {
@@ -136,6 +170,12 @@ TEST_P(Distance, SketchBoundsOfPickedViewsAreThoseOfTheInterleavedOnes) {
     std::vector<std::uint32_t> bounds(indices.size());
     kernels.sketch_bounds_at(apart.data(), made.slacks.data(), indices.data(), indices.size(),
                              made.query, bounds.data());
+    for (std::size_t i = 0; i < indices.size(); ++i) EXPECT_EQ(bounds[i], all[indices[i]]);
+    // Without slacks each view has the largest one.
+    const std::vector<std::int32_t> largest(all.size(), made.query.max_slack);
+    scalar.sketch_bounds(made.sketches.data(), largest.data(), octets, made.query, all.data());
+    kernels.sketch_bounds_at(apart.data(), nullptr, indices.data(), indices.size(), made.query,
+                             bounds.data());
     for (std::size_t i = 0; i < indices.size(); ++i) EXPECT_EQ(bounds[i], all[indices[i]]);
   }
 }

@@ -22,9 +22,18 @@ struct DistanceKernels {
 
   /// The same for views indices[0 .. count - 1] out of sketches that lie one after the other, each
   /// with its groups one after the other: bounds[i] belongs to view indices[i]. query.groups is a
-  /// multiple of 8.
+  /// multiple of 8. `slacks` null: query.max_slack of every view.
   void (*sketch_bounds_at)(const uint8_t* sketches, const int32_t* slacks, const uint32_t* indices,
                            size_t count, const SketchQuery& query, uint32_t* bounds);
+
+  /// For each view v of `blocks` blocks of `cell_block` views: bounds[v] = the sum over pairs of
+  /// dimensions of min(255, tables[32 * pair + first code] + tables[32 * pair + 16 + second code]).
+  /// Writes the positions of those <= query.limit, ascending, to `indices`, which has room for all,
+  /// and returns their number. A block consists of `pairs` rows of `cell_block` bytes; byte
+  /// cell_place(v) of each is of view v: the code of an even dimension in its lower four bits, that
+  /// of the next one in the upper four.
+  size_t (*cell_bounds)(const uint8_t* codes, size_t blocks, const CellQuery& query,
+                        uint16_t* bounds, uint32_t* indices);
 
   /// Writes the positions of the values <= limit, ascending, and returns their number. `indices`
   /// has room for `count` entries and 16 more.

@@ -23,6 +23,8 @@ struct DistanceBody {
   static void sketch_bounds_at(const uint8_t* sketches, const int32_t* slacks,
                                const uint32_t* indices, size_t count, const SketchQuery& query,
                                uint32_t* bounds);
+  static size_t cell_bounds(const uint8_t* codes, size_t blocks, const CellQuery& query,
+                            uint16_t* bounds, uint32_t* indices);
   static size_t collect_at_most(const uint32_t* values, size_t count, uint32_t limit,
                                 uint32_t* indices);
 };

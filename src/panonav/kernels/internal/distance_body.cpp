@@ -139,11 +139,64 @@ void DistanceBody<set>::sketch_bounds_at(const uint8_t* sketches, const int32_t*
       const Register sad = Vector::sad(x, Vector::load(query.values + group * 8));
       sums = sums + Vector::product(sad, Vector::load(query.steps + group));
     }
-    const int32_t slack = slacks[indices[i]];
+    const int32_t slack = slacks == nullptr ? query.max_slack : slacks[indices[i]];
     const int32_t taken = slack < query.max_slack ? slack : query.max_slack;
     const int64_t bound = static_cast<int64_t>(Vector::total(sums)) + query.constant - taken;
     bounds[i] = bound < 0 ? 0U : static_cast<uint32_t>(bound);
   }
+}
+
+template <Instructions set>
+size_t DistanceBody<set>::cell_bounds(const uint8_t* codes, size_t blocks, const CellQuery& query,
+                                      uint16_t* bounds, uint32_t* indices) {
+  constexpr size_t half = cell_block / 2;
+  size_t found = 0;
+  for (size_t block = 0; block < blocks; ++block) {
+    if constexpr (set == Instructions::scalar) {
+      uint16_t sums[cell_block] = {};
+      for (size_t pair = 0; pair < query.pairs; ++pair) {
+        const uint8_t* const tables = query.tables + pair * 32;
+        const uint8_t* const row = codes + pair * cell_block;
+        for (size_t i = 0; i < cell_block; ++i) {
+          const int sum = tables[row[i] & 15] + tables[16 + (row[i] >> 4)];
+          sums[i] = static_cast<uint16_t>(sums[i] + (sum < 255 ? sum : 255));
+        }
+      }
+      for (size_t i = 0; i < cell_block; ++i) bounds[i] = sums[cell_place(i)];
+      for (size_t i = 0; i < cell_block; ++i) {
+        indices[found] = static_cast<uint32_t>(block * cell_block + i);
+        found += bounds[i] <= query.limit ? 1 : 0;
+      }
+    } else {
+      using Vector = ByteVector<set>;
+      using Register = typename Vector::Register;
+      typedef uint16_t Words __attribute__((vector_size(sizeof(Register))));
+      for (size_t at = 0; at < cell_block; at += sizeof(Register)) {
+        Words even{};
+        Words odd{};
+        for (size_t pair = 0; pair < query.pairs; ++pair) {
+          const uint8_t* const tables = query.tables + pair * 32;
+          const Register row = Vector::load(codes + pair * cell_block + at);
+          const Register sum = Vector::add_saturated(Vector::lookup(tables, row),
+                                                     Vector::lookup_upper(tables + 16, row));
+          const Words words = reinterpret_cast<Words>(sum);
+          even += words & 255;
+          odd += words >> 8;
+        }
+        __builtin_memcpy(bounds + at / 2, &even, sizeof even);
+        __builtin_memcpy(bounds + half + at / 2, &odd, sizeof odd);
+      }
+      const auto limit = static_cast<uint16_t>(query.limit < 65535 ? query.limit : 65535);
+      for (size_t i = 0; i < cell_block; i += half) {
+        const auto first = static_cast<uint32_t>(block * cell_block + i);
+        const uint32_t bits = Vector::at_most(bounds + i, limit);
+        if (bits != 0) found += write_set_bits(bits, first, indices + found);
+      }
+    }
+    codes += query.pairs * cell_block;
+    bounds += cell_block;
+  }
+  return found;
 }
 
 template <Instructions set>

@@ -40,6 +40,10 @@ constexpr int lanes_of = set == Instructions::avx512 ? 16
 ///   add_products(sums, bytes, weights)   adds to each number of 32 bits its four bytes times their
 ///                          weights, which add up to at most 127
 ///   halve(upper, lower, to)   `halved` means of 2 x 2 bytes, halves rounded up
+///   lookup(table, bytes), lookup_upper(table, bytes)    of each byte the entry of a table of 16
+///                          bytes at its lower, its upper four bits
+///   add_saturated(a, b)    of each byte the sum, at most 255
+///   at_most(values, limit) bit i: the i-th of 32 numbers of 16 bits is at most the limit
 ///   collect(values, limit, first, to)    of sizeof(Register) / 4 values those <= limit: writes
 ///                          first + position, may write as many as there are values; their number
 template <Instructions set>
@@ -124,6 +128,27 @@ struct ByteVector<Instructions::avx2> {
     return write_set_bits(static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(low))),
                           first, to);
   }
+  static Register repeated_table(const uint8_t* table) {
+    return _mm256_broadcastsi128_si256(_mm_loadu_si128(reinterpret_cast<const __m128i*>(table)));
+  }
+  static Register lookup(const uint8_t* table, Register bytes) {
+    return _mm256_shuffle_epi8(repeated_table(table), bytes & _mm256_set1_epi8(15));
+  }
+  static Register lookup_upper(const uint8_t* table, Register bytes) {
+    return lookup(table, _mm256_srli_epi16(bytes, 4));
+  }
+  static Register add_saturated(Register a, Register b) { return _mm256_adds_epu8(a, b); }
+  static uint32_t at_most(const uint16_t* values, uint16_t limit) {
+    const Register top = _mm256_set1_epi16(static_cast<short>(limit));
+    const auto low = [&](const uint16_t* from) {
+      const Register x = load(from);
+      return _mm256_cmpeq_epi16(_mm256_min_epu16(x, top), x);
+    };
+    // Packing works within halves of the register; the permutation puts the quarters in order.
+    const Register packed =
+        _mm256_permute4x64_epi64(_mm256_packs_epi16(low(values), low(values + 16)), 0xd8);
+    return static_cast<uint32_t>(_mm256_movemask_epi8(packed));
+  }
   static constexpr int halved = 32;
   static void halve(const uint8_t* upper, const uint8_t* lower, uint8_t* to) {
     const auto means = [&](int at) {
@@ -185,6 +210,18 @@ struct ByteVector<Instructions::avx512> {
     _mm512_storeu_si512(to, _mm512_maskz_compress_epi32(low, positions));
     return static_cast<size_t>(_mm_popcnt_u64(low));
   }
+  static Register lookup(const uint8_t* table, Register bytes) {
+    const __m128i entries = _mm_loadu_si128(reinterpret_cast<const __m128i*>(table));
+    return _mm512_shuffle_epi8(_mm512_maskz_broadcast_i32x4(0xFFFF, entries),
+                               bytes & _mm512_set1_epi8(15));
+  }
+  static Register lookup_upper(const uint8_t* table, Register bytes) {
+    return lookup(table, _mm512_srli_epi16(bytes, 4));
+  }
+  static Register add_saturated(Register a, Register b) { return _mm512_adds_epu8(a, b); }
+  static uint32_t at_most(const uint16_t* values, uint16_t limit) {
+    return _mm512_cmple_epu16_mask(load(values), _mm512_set1_epi16(static_cast<short>(limit)));
+  }
   static constexpr int halved = 32;
   static void halve(const uint8_t* upper, const uint8_t* lower, uint8_t* to) {
     const Register ones = _mm512_set1_epi8(1);
@@ -228,6 +265,25 @@ struct ByteVector<Instructions::neon> {
     const uint32x4_t low = vpaddlq_u16(vmull_u8(vget_low_u8(bytes(a)), vget_low_u8(w)));
     const uint32x4_t high = vpaddlq_u16(vmull_high_u8(bytes(a), w));
     return vreinterpretq_u64_u32(vaddq_u32(vreinterpretq_u32_u64(sums), vpaddq_u32(low, high)));
+  }
+  static Register lookup(const uint8_t* table, Register codes) {
+    return vreinterpretq_u64_u8(
+        vqtbl1q_u8(vld1q_u8(table), vandq_u8(bytes(codes), vdupq_n_u8(15))));
+  }
+  static Register lookup_upper(const uint8_t* table, Register codes) {
+    return vreinterpretq_u64_u8(vqtbl1q_u8(vld1q_u8(table), vshrq_n_u8(bytes(codes), 4)));
+  }
+  static Register add_saturated(Register a, Register b) {
+    return vreinterpretq_u64_u8(vqaddq_u8(bytes(a), bytes(b)));
+  }
+  static uint32_t at_most(const uint16_t* values, uint16_t limit) {
+    const uint16x8_t bit = {1, 2, 4, 8, 16, 32, 64, 128};
+    uint32_t bits = 0;
+    for (int i = 0; i < 4; ++i) {
+      const uint16x8_t low = vcleq_u16(vld1q_u16(values + 8 * i), vdupq_n_u16(limit));
+      bits |= static_cast<uint32_t>(vaddvq_u16(vandq_u16(low, bit))) << (8 * i);
+    }
+    return bits;
   }
   static constexpr int halved = 8;
   static void halve(const uint8_t* upper, const uint8_t* lower, uint8_t* to) {

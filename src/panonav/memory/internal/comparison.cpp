@@ -30,6 +30,12 @@ int checked_components(int components, SignatureShape shape) {
   return components == 0 ? shape.components : components;
 }
 
+void require_mask(const SearchMask& mask, SignatureShape shape) {
+  const auto rows = static_cast<std::size_t>(shape.rows);
+  require(mask.allowed_rows.empty() || mask.allowed_rows.size() == rows, "number of allowed rows",
+          static_cast<double>(mask.allowed_rows.size()), "0 or " + std::to_string(rows));
+}
+
 Comparison::Comparison(const SearchedViews& searched, const PackedSignature& query, int components,
                        const SearchMask& mask, const kernels::DistanceKernels& kernels)
     : store_(searched.store),
@@ -37,9 +43,7 @@ Comparison::Comparison(const SearchedViews& searched, const PackedSignature& que
       components_(checked_components(components, searched.shape)),
       component_bytes_(static_cast<std::size_t>(searched.shape.rows)) {
   require_signature(query, searched.shape);
-  require(mask.allowed_rows.empty() || mask.allowed_rows.size() == component_bytes_,
-          "number of allowed rows", static_cast<double>(mask.allowed_rows.size()),
-          "0 or " + std::to_string(component_bytes_));
+  require_mask(mask, searched.shape);
   query_.assign(query.magnitudes.begin(), query.magnitudes.end());
   if (!mask.allowed_rows.empty()) {
     mask_.resize(bytes());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "panonav/kernels/distance.hpp"
@@ -15,6 +16,9 @@ void require_signature(const PackedSignature& signature, SignatureShape shape);
 
 /// `components`, or all for 0. Throws ContractError when out of range.
 [[nodiscard]] int checked_components(int components, SignatureShape shape);
+
+/// Throws ContractError unless the mask has one entry for each row, or none.
+void require_mask(const SearchMask& mask, SignatureShape shape);
 
 /// A query against full signatures: the first `components` components of the rows that count.
 class Comparison {
@@ -63,5 +67,40 @@ class Comparison {
 [[nodiscard]] inline bool is_nearer(const Match& a, const Match& b) noexcept {
   return a.dissimilarity != b.dissimilarity ? a.dissimilarity < b.dissimilarity : a.view < b.view;
 }
+
+/// The nearest views so far, at most `top`.
+class Nearest {
+ public:
+  /// Nothing further away than `limit` is wanted.
+  Nearest(std::size_t top, std::uint32_t limit) : top_(top), limit_(limit) {}
+
+  void offer(const Match& match) {
+    if (heap_.size() == top_) {
+      if (!is_nearer(match, heap_.front())) return;
+      std::ranges::pop_heap(heap_, is_nearer);
+      heap_.back() = match;
+    } else {
+      heap_.push_back(match);
+    }
+    std::ranges::push_heap(heap_, is_nearer);
+    if (heap_.size() == top_) limit_ = std::min(limit_, heap_.front().dissimilarity);
+  }
+  /// Views whose distance is larger cannot be among the nearest; views at this distance can.
+  [[nodiscard]] std::uint32_t limit() const noexcept { return limit_; }
+  /// Whether a view at `bound` or further away would not be taken.
+  [[nodiscard]] bool rules_out(std::uint32_t bound, ViewId view) const noexcept {
+    return bound > limit_ || (heap_.size() == top_ && bound == heap_.front().dissimilarity &&
+                              heap_.front().view < view);
+  }
+  [[nodiscard]] std::vector<Match> sorted() && {
+    std::ranges::sort_heap(heap_, is_nearer);
+    return std::move(heap_);
+  }
+
+ private:
+  std::size_t top_;
+  std::uint32_t limit_;
+  std::vector<Match> heap_;  // the furthest in front
+};
 
 }  // namespace panonav

@@ -17,41 +17,6 @@ using Row = ViewStore::Row;
 /// A row and a lower bound of its distance.
 using Bounded = std::pair<std::uint32_t, Row>;
 
-/// The nearest views so far, at most `top`.
-class Nearest {
- public:
-  /// Nothing further away than `limit` is wanted.
-  Nearest(std::size_t top, std::uint32_t limit) : top_(top), limit_(limit) {}
-
-  void offer(const Match& match) {
-    if (heap_.size() == top_) {
-      if (!is_nearer(match, heap_.front())) return;
-      std::ranges::pop_heap(heap_, is_nearer);
-      heap_.back() = match;
-    } else {
-      heap_.push_back(match);
-    }
-    std::ranges::push_heap(heap_, is_nearer);
-    if (heap_.size() == top_) limit_ = std::min(limit_, heap_.front().dissimilarity);
-  }
-  /// Views whose distance is larger cannot be among the nearest; views at this distance can.
-  [[nodiscard]] std::uint32_t limit() const noexcept { return limit_; }
-  /// Whether a view at `bound` or further away would not be taken.
-  [[nodiscard]] bool rules_out(std::uint32_t bound, ViewId view) const noexcept {
-    return bound > limit_ || (heap_.size() == top_ && bound == heap_.front().dissimilarity &&
-                              heap_.front().view < view);
-  }
-  [[nodiscard]] std::vector<Match> sorted() && {
-    std::ranges::sort_heap(heap_, is_nearer);
-    return std::move(heap_);
-  }
-
- private:
-  std::size_t top_;
-  std::uint32_t limit_;
-  std::vector<Match> heap_;  // the furthest in front
-};
-
 /// Whether the fine bounds of the last views were worth their bytes.
 class FineBenefit {
  public:

@@ -1,0 +1,310 @@
+#include "panonav/memory/internal/sketch_segment.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cstdlib>
+#include <limits>
+#include <numeric>
+
+namespace panonav {
+
+namespace {
+
+constexpr std::size_t codes_of_a_cell = 16;
+constexpr std::size_t sums_of_a_step = 8;  // that share a step
+constexpr std::size_t max_cells = 256;     // of which the kernel adds up bounds
+
+std::size_t rounded_up(std::size_t count, std::size_t multiple) {
+  return (count + multiple - 1) / multiple * multiple;
+}
+
+/// Blocks of a component. Views differ most in their low components, because the spectra of
+/// pictures fall; the numbers make whole cache lines of 15 components.
+int blocks_of(int level, int component, int components) {
+  constexpr std::array usual{2, 4, 16};
+  if (level == 2) return component == 0 ? 2 * usual[2] : usual[2];
+  if (component < 2) return 2 * usual[static_cast<std::size_t>(level)];
+  const bool last = component + 2 >= components;
+  return usual[static_cast<std::size_t>(level)] / (last ? 2 : 1);
+}
+
+std::int32_t sum_of(const std::uint8_t* bytes, int count) {
+  return std::accumulate(bytes, bytes + count, std::int32_t{0});
+}
+
+}  // namespace
+
+SegmentLayout::SegmentLayout(SignatureShape shape) : shape_(shape) {
+  const auto most = static_cast<int>(std::bit_floor(static_cast<unsigned>(shape.rows)));
+  for (int level = 0; level < levels; ++level) {
+    std::size_t sums = 0;
+    for (int k = 0; k < shape.components; ++k) {
+      int blocks = std::min(most, blocks_of(level, k, shape.components));
+      if (level == 0 && sums + static_cast<std::size_t>(blocks) > max_cells) blocks = 0;
+      blocks_[level].push_back(blocks);
+      sums += static_cast<std::size_t>(blocks);
+    }
+    dimensions_[level] = rounded_up(sums, level == 0 ? 2 : 64);
+  }
+  constexpr std::size_t page = LargePageAllocator<std::uint8_t>::page;
+  max_rows_ =
+      std::clamp<std::size_t>(page / bytes() / kernels::cell_block, 1, 128) * kernels::cell_block;
+}
+
+void SegmentLayout::sum_blocks(const std::uint8_t* magnitudes, std::int32_t* sums) const {
+  std::array<std::int32_t*, levels> at{sums, sums + dimensions_[0],
+                                       sums + dimensions_[0] + dimensions_[1]};
+  const std::int32_t* const end = sums + total();
+  for (int k = 0; k < shape_.components; ++k) {
+    const std::uint8_t* const rows = magnitudes + static_cast<std::size_t>(k) * shape_.rows;
+    const int finest = blocks_[2][k];
+    for (int block = 0; block < finest; ++block) {
+      const int first = first_row(block, finest);
+      at[2][block] = sum_of(rows + first, first_row(block + 1, finest) - first);
+    }
+    for (int level = 1; level >= 0; --level) {
+      const int blocks = blocks_[level][k];
+      if (blocks == 0) continue;
+      const int joined = blocks_[level + 1][k] / blocks;
+      for (int block = 0; block < blocks; ++block) {
+        const std::int32_t* const from = at[level + 1] + block * joined;
+        at[level][block] = std::accumulate(from, from + joined, std::int32_t{0});
+      }
+    }
+    for (int level = 0; level < levels; ++level) at[level] += blocks_[level][k];
+  }
+  std::fill(at[0], sums + dimensions_[0], 0);
+  std::fill(at[1], sums + dimensions_[0] + dimensions_[1], 0);
+  std::fill(at[2], const_cast<std::int32_t*>(end), 0);
+}
+
+std::vector<std::int32_t> SegmentLayout::counted(int components,
+                                                 std::span<const std::uint8_t> allowed_rows) const {
+  std::vector<std::int32_t> counted;
+  std::size_t padded = 0;
+  for (int level = 0; level < levels; ++level) {
+    for (int k = 0; k < components; ++k) {
+      const int blocks = blocks_[level][k];
+      for (int block = 0; block < blocks; ++block) {
+        const int first = first_row(block, blocks);
+        const int rows = first_row(block + 1, blocks) - first;
+        const bool all =
+            allowed_rows.empty() || std::ranges::count(allowed_rows.subspan(first, rows), 0) == 0;
+        counted.push_back(all ? 1 : 0);
+      }
+    }
+    padded += dimensions_[level];
+    counted.resize(padded, 0);
+  }
+  return counted;
+}
+
+SketchSegment::SketchSegment(const SegmentLayout& layout, std::span<const ViewId> views,
+                             std::span<const std::uint8_t> magnitudes)
+    : views_(views.begin(), views.end()),
+      least_(std::ranges::min(views)),
+      largest_(std::ranges::max(views)) {
+  std::vector<std::int32_t> sums(views.size() * layout.total());
+  for (std::size_t row = 0; row < views.size(); ++row) {
+    layout.sum_blocks(magnitudes.data() + row * layout.shape().size(),
+                      sums.data() + row * layout.total());
+  }
+  const std::size_t padded = blocks() * kernels::cell_block;
+  // Views of the byte levels on whole cache lines.
+  begins_[1] = rounded_up(padded * layout.dimensions(0) / 2, 64);
+  begins_[2] = begins_[1] + padded * layout.dimensions(1);
+  codes_.resize(begins_[2] + padded * layout.dimensions(2));
+  make_cells(layout, sums);
+  make_level(layout, 1, sums);
+  make_level(layout, 2, sums);
+}
+
+std::size_t SketchSegment::blocks() const noexcept {
+  return (views_.size() + kernels::cell_block - 1) / kernels::cell_block;
+}
+
+std::uint64_t SketchSegment::bytes() const noexcept {
+  std::uint64_t bytes = codes_.size() + views_.size() * sizeof(ViewId) +
+                        (cell_low_.size() + cell_high_.size()) * sizeof(std::int32_t);
+  for (const Scale& scale : scales_) {
+    bytes += (2 * scale.offsets.size() + scale.max_missed.size()) * sizeof(std::int32_t) +
+             scale.steps.size() * (sizeof(std::uint64_t) + sizeof(float));
+  }
+  return bytes;
+}
+
+// Each code stands for about as many views as each other one.
+void SketchSegment::make_cells(const SegmentLayout& layout, const std::vector<std::int32_t>& sums) {
+  constexpr unsigned max_bins = 1024;
+  const std::size_t cells = layout.dimensions(0);
+  std::vector<std::int32_t> low(sums.begin(), sums.begin() + static_cast<std::ptrdiff_t>(cells));
+  std::vector<std::int32_t> high = low;
+  for (std::size_t row = 0; row < rows(); ++row) {
+    const std::int32_t* const of_row = sums.data() + row * layout.total();
+    for (std::size_t d = 0; d < cells; ++d) {
+      low[d] = std::min(low[d], of_row[d]);
+      high[d] = std::max(high[d], of_row[d]);
+    }
+  }
+  std::vector<int> shifts(cells);
+  for (std::size_t d = 0; d < cells; ++d) {
+    const auto range = static_cast<unsigned>(high[d] - low[d]);
+    while ((range >> shifts[d]) >= max_bins) ++shifts[d];
+  }
+  const auto bin = [&](std::size_t d, std::int32_t sum) {
+    return d * max_bins + static_cast<std::size_t>((sum - low[d]) >> shifts[d]);
+  };
+  std::vector<std::uint32_t> counts(cells * max_bins, 0);
+  for (std::size_t row = 0; row < rows(); ++row) {
+    const std::int32_t* const of_row = sums.data() + row * layout.total();
+    for (std::size_t d = 0; d < cells; ++d) ++counts[bin(d, of_row[d])];
+  }
+  std::vector<std::uint8_t> code_of_bin(counts.size());
+  for (std::size_t d = 0; d < cells; ++d) {
+    std::size_t below = 0;
+    for (std::size_t b = d * max_bins; b < (d + 1) * max_bins; ++b) {
+      code_of_bin[b] = static_cast<std::uint8_t>(
+          std::min(codes_of_a_cell - 1, below * codes_of_a_cell / rows()));
+      below += counts[b];
+    }
+  }
+  cell_low_.assign(cells * codes_of_a_cell, std::numeric_limits<std::int32_t>::max());
+  cell_high_.assign(cells * codes_of_a_cell, std::numeric_limits<std::int32_t>::min());
+  for (std::size_t row = 0; row < rows(); ++row) {
+    const std::int32_t* const of_row = sums.data() + row * layout.total();
+    std::uint8_t* const block =
+        codes_.data() + row / kernels::cell_block * kernels::cell_block * (cells / 2);
+    const std::size_t place = kernels::cell_place(row % kernels::cell_block);
+    for (std::size_t d = 0; d < cells; ++d) {
+      const std::uint8_t code = code_of_bin[bin(d, of_row[d])];
+      std::int32_t& smallest = cell_low_[d * codes_of_a_cell + code];
+      std::int32_t& largest = cell_high_[d * codes_of_a_cell + code];
+      smallest = std::min(smallest, of_row[d]);
+      largest = std::max(largest, of_row[d]);
+      std::uint8_t& byte = block[d / 2 * kernels::cell_block + place];
+      byte = static_cast<std::uint8_t>(byte | (d % 2 == 0 ? code : code << 4));
+    }
+  }
+  for (std::size_t i = 0; i < cell_low_.size(); ++i) {  // codes of no view
+    if (cell_high_[i] < cell_low_[i]) cell_low_[i] = cell_high_[i] = low[i / codes_of_a_cell];
+  }
+}
+
+void SketchSegment::make_level(const SegmentLayout& layout, int level,
+                               const std::vector<std::int32_t>& sums) {
+  const std::size_t count = layout.dimensions(level);
+  const std::size_t groups = count / sums_of_a_step;
+  std::size_t begin = 0;
+  for (int before = 0; before < level; ++before) begin += layout.dimensions(before);
+  Scale& scale = scales_[static_cast<std::size_t>(level) - 1];
+  const auto of = [&](std::size_t row) { return sums.data() + row * layout.total() + begin; };
+  scale.offsets.assign(of(0), of(0) + count);
+  scale.highest = scale.offsets;
+  for (std::size_t row = 0; row < rows(); ++row) {
+    const std::int32_t* const of_row = of(row);
+    for (std::size_t d = 0; d < count; ++d) {
+      scale.offsets[d] = std::min(scale.offsets[d], of_row[d]);
+      scale.highest[d] = std::max(scale.highest[d], of_row[d]);
+    }
+  }
+  scale.steps.assign(groups, 1);
+  scale.inverse_steps.assign(groups, 1.0F);
+  scale.max_missed.assign(groups, 0);
+  for (std::size_t d = 0; d < count; ++d) {
+    const auto range = static_cast<std::uint64_t>(scale.highest[d] - scale.offsets[d]);
+    std::uint64_t& step = scale.steps[d / sums_of_a_step];
+    step = std::max(step, (range + 254) / 255);
+    scale.inverse_steps[d / sums_of_a_step] = 1.0F / static_cast<float>(step);
+  }
+  for (std::size_t row = 0; row < rows(); ++row) {
+    const std::int32_t* const of_row = of(row);
+    std::uint8_t* const codes =
+        codes_.data() + begins_[static_cast<std::size_t>(level)] + row * count;
+    std::int32_t slack = 0;
+    for (std::size_t group = 0; group < groups; ++group) {
+      const auto step = static_cast<std::int32_t>(scale.steps[group]);
+      std::int32_t missed = 0;
+      for (std::size_t d = group * sums_of_a_step; d < (group + 1) * sums_of_a_step; ++d) {
+        // Any code would be safe, so rounding of the float product does no harm.
+        const std::int32_t above = of_row[d] - scale.offsets[d];
+        const float scaled = static_cast<float>(above) * scale.inverse_steps[group] + 0.5F;
+        const auto code = static_cast<std::int32_t>(std::min(scaled, 255.0F));
+        codes[d] = static_cast<std::uint8_t>(code);
+        missed += std::abs(above - code * step);
+      }
+      scale.max_missed[group] = std::max(scale.max_missed[group], missed);
+      slack += missed;
+    }
+    scale.max_slack = std::max(scale.max_slack, slack);
+  }
+}
+
+void SketchSegment::make_tables(const SegmentLayout& layout, const SegmentQuery& query,
+                                std::uint32_t unit, std::span<std::uint8_t> tables) const {
+  // A little less than the inverse, so that no rounding makes an entry too large.
+  const float inverse = (1.0F - 1e-6F) / static_cast<float>(unit);
+  for (std::size_t d = 0; d < layout.dimensions(0); ++d) {
+    const float counted = static_cast<float>(query.counted[d]) * inverse;
+    const std::int32_t sum = query.sums[d];
+    for (std::size_t i = d * codes_of_a_cell; i < (d + 1) * codes_of_a_cell; ++i) {
+      const std::int32_t outside =
+          std::max(std::max(cell_low_[i] - sum, sum - cell_high_[i]), std::int32_t{0});
+      const float units = std::min(static_cast<float>(outside) * counted, 255.0F);
+      tables[i] = static_cast<std::uint8_t>(static_cast<std::int32_t>(units));
+    }
+  }
+}
+
+std::span<const std::uint32_t> SketchSegment::cell_bounds(
+    const SegmentLayout& layout, const kernels::DistanceKernels& kernels,
+    std::span<const std::uint8_t> tables, std::uint32_t limit, std::size_t first, std::size_t count,
+    std::span<std::uint16_t> bounds, std::span<std::uint32_t> indices) const {
+  const std::size_t pairs = layout.dimensions(0) / 2;
+  return indices.first(kernels.cell_bounds(codes_.data() + first * kernels::cell_block * pairs,
+                                           count, {tables.data(), pairs, limit}, bounds.data(),
+                                           indices.data()));
+}
+
+SketchSegment::Encoded::Encoded(const SegmentLayout& layout)
+    : values(layout.dimensions(2)), mask(layout.dimensions(2)) {}
+
+// All views lie within the scale, so what the query lies outside of it is part of the distance.
+void SketchSegment::bounds_at(const SegmentLayout& layout, const kernels::DistanceKernels& kernels,
+                              const SegmentQuery& query, int level,
+                              std::span<const std::uint32_t> rows, Encoded& room,
+                              std::uint32_t* bounds) const {
+  const Scale& scale = scales_[static_cast<std::size_t>(level) - 1];
+  const std::size_t groups = scale.steps.size();
+  std::size_t begin = layout.dimensions(0);
+  if (level == 2) begin += layout.dimensions(1);
+  std::int32_t constant = 0;
+  std::int32_t slack = 0;
+  for (std::size_t group = 0; group < groups; ++group) {
+    const auto step = static_cast<std::int32_t>(scale.steps[group]);
+    std::int32_t any = 0;
+    for (std::size_t d = group * sums_of_a_step; d < (group + 1) * sums_of_a_step; ++d) {
+      const std::int32_t counts = query.counted[begin + d];
+      const std::int32_t sum = query.sums[begin + d];
+      const std::int32_t inside = std::clamp(sum, scale.offsets[d], scale.highest[d]);
+      const std::int32_t above = inside - scale.offsets[d];
+      const float scaled = static_cast<float>(above) * scale.inverse_steps[group] + 0.5F;
+      const auto code = static_cast<std::int32_t>(std::min(scaled, 255.0F));
+      any |= counts;
+      constant += counts * (std::abs(sum - inside) - std::abs(above - code * step));
+      room.values[d] = static_cast<std::uint8_t>(counts * code);
+      room.mask[d] = static_cast<std::uint8_t>(counts * 255);
+    }
+    slack += any * scale.max_missed[group];
+  }
+  const kernels::SketchQuery encoded{room.values.data(),
+                                     room.mask.data(),
+                                     scale.steps.data(),
+                                     groups,
+                                     groups,
+                                     constant,
+                                     std::min(slack, scale.max_slack)};
+  kernels.sketch_bounds_at(codes_.data() + begins_[static_cast<std::size_t>(level)], nullptr,
+                           rows.data(), rows.size(), encoded, bounds);
+}
+
+}  // namespace panonav

@@ -1,0 +1,463 @@
+#include "panonav/memory/view_sketches.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/kernels/dispatch.hpp"
+#include "panonav/memory/internal/comparison.hpp"
+#include "panonav/memory/internal/sketch_segment.hpp"
+
+namespace panonav {
+
+namespace {
+
+/// A segment and which of its views are there.
+struct LiveSegment {
+  std::shared_ptr<const SketchSegment> sketches;
+  std::vector<std::uint64_t> live;  // a bit for each row of its blocks
+  std::size_t count = 0;
+  [[nodiscard]] bool has(std::size_t row) const { return (live[row / 64] >> (row % 64) & 1U) != 0; }
+};
+
+LiveSegment all_live(std::shared_ptr<const SketchSegment> sketches) {
+  LiveSegment segment{std::move(sketches), {}, 0};
+  segment.count = segment.sketches->rows();
+  segment.live.assign(segment.sketches->blocks(), ~std::uint64_t{0});
+  if (segment.count % 64 != 0) segment.live.back() >>= 64 - segment.count % 64;
+  return segment;
+}
+
+/// A view on its way through the levels.
+struct SketchedView {
+  std::uint32_t bound = 0;
+  std::uint32_t segment = 0;  // its number
+  std::uint32_t row = 0;
+  ViewId view;
+};
+
+class SketchSearch {
+ public:
+  SketchSearch(const SegmentLayout& layout, std::span<const LiveSegment> segments,
+               const PackedSignature& query, int components, const SearchMask& mask,
+               std::size_t top, const ViewSketches::ReadViews& read)
+      : layout_(layout),
+        segments_(segments),
+        kernels_(kernels::distance_kernels(kernels::chosen_instructions())),
+        read_(read),
+        top_(top),
+        nearest_(top, std::numeric_limits<std::int32_t>::max()),
+        room_(layout),
+        tables_(layout.dimensions(0) * 16),
+        bounds_(layout.max_rows()),
+        indices_(layout.max_rows() + 64),
+        level_bounds_(layout.max_rows()) {
+    const auto rows = static_cast<std::size_t>(layout.shape().rows);
+    magnitudes_.assign(query.magnitudes.begin(), query.magnitudes.end());
+    compared_bytes_ = static_cast<std::size_t>(components) * rows;
+    if (!mask.allowed_rows.empty()) {
+      for (std::size_t i = 0; i < compared_bytes_; ++i) {
+        mask_.push_back(mask.allowed_rows[i % rows] != 0 ? 255 : 0);
+      }
+    }
+    excluded_.assign(mask.excluded_views.begin(), mask.excluded_views.end());
+    std::ranges::sort(excluded_);
+    query_.sums.resize(layout.total());
+    layout.sum_blocks(query.magnitudes.data(), query_.sums.data());
+    query_.counted = layout.counted(components, mask.allowed_rows);
+  }
+
+  SearchResult run() {
+    find_limit();
+    scan();
+    result_.matches = std::move(nearest_).sorted();
+    return std::move(result_);
+  }
+
+ private:
+  [[nodiscard]] std::size_t view_bytes() const noexcept { return compared_bytes_; }
+  [[nodiscard]] bool excluded(ViewId view) const {
+    return !excluded_.empty() && std::ranges::binary_search(excluded_, view);
+  }
+
+  void compare(ViewId view, std::span<const std::uint8_t> magnitudes) {
+    require(magnitudes.size() == layout_.shape().size(), "magnitudes of a view that was read",
+            static_cast<double>(magnitudes.size()), std::to_string(layout_.shape().size()));
+    ++result_.views_in_full;
+    result_.bytes_read += compared_bytes_;
+    nearest_.offer({view, mask_.empty()
+                              ? kernels_.l1(magnitudes.data(), magnitudes_.data(), compared_bytes_)
+                              : kernels_.masked_l1(magnitudes.data(), magnitudes_.data(),
+                                                   mask_.data(), compared_bytes_)});
+  }
+
+  /// Compares these in full; none is compared twice.
+  void read(std::span<const SketchedView> candidates) {
+    std::vector<ViewId> wanted;
+    for (const SketchedView& candidate : candidates) {
+      if (std::ranges::binary_search(compared_, candidate.view)) continue;
+      wanted.push_back(candidate.view);
+    }
+    if (wanted.empty()) return;
+    std::ranges::sort(wanted);
+    read_(wanted, [this](ViewId view, std::span<const std::uint8_t> magnitudes) {
+      compare(view, magnitudes);
+    });
+    const auto middle = static_cast<std::ptrdiff_t>(compared_.size());
+    compared_.insert(compared_.end(), wanted.begin(), wanted.end());
+    std::ranges::inplace_merge(compared_, compared_.begin() + middle);
+  }
+
+  static bool is_better(const SketchedView& a, const SketchedView& b) {
+    return a.bound != b.bound ? a.bound < b.bound : a.view < b.view;
+  }
+  static void keep_best(std::vector<SketchedView>& candidates, std::size_t count) {
+    if (candidates.size() <= count) return;
+    std::ranges::nth_element(candidates, candidates.begin() + static_cast<std::ptrdiff_t>(count),
+                             is_better);
+    candidates.resize(count);
+  }
+
+  /// Bounds of candidates, which are put in the order of their rows.
+  void refine(std::vector<SketchedView>& candidates, int level) {
+    std::ranges::sort(candidates, {}, [](const SketchedView& candidate) {
+      return std::pair(candidate.segment, candidate.row);
+    });
+    std::vector<std::uint32_t> rows;
+    for (std::size_t begin = 0; begin < candidates.size();) {
+      const std::uint32_t number = candidates[begin].segment;
+      std::size_t end = begin;
+      rows.clear();
+      for (; end < candidates.size() && candidates[end].segment == number; ++end) {
+        rows.push_back(candidates[end].row);
+      }
+      bounds_at(*segments_[number].sketches, level, rows);
+      for (std::size_t i = begin; i < end; ++i) candidates[i].bound = level_bounds_[i - begin];
+      begin = end;
+    }
+  }
+  void bounds_at(const SketchSegment& segment, int level, std::span<const std::uint32_t> rows) {
+    segment.bounds_at(layout_, kernels_, query_, level, rows, room_, level_bounds_.data());
+    result_.bytes_read += rows.size() * layout_.dimensions(level);
+  }
+
+  std::span<const std::uint32_t> cells(const SketchSegment& segment, std::uint32_t limit,
+                                       std::size_t first, std::size_t count) {
+    result_.bytes_read += count * kernels::cell_block * layout_.dimensions(0) / 2;
+    return segment.cell_bounds(layout_, kernels_, tables_, limit / unit_, first, count, bounds_,
+                               indices_);
+  }
+
+  /// Units in which a typical bound of the first segments is some hundred: fine enough that
+  /// rounding takes little of the bounds, and coarse enough that no entry has more than 255.
+  void choose_unit(std::uint32_t typical) { unit_ = std::max(1U, typical / units_of_a_limit); }
+
+  /// A first limit, within which `top` views lie: from the segments of which a sample of the views
+  /// looks best. Views that were taken near each other lie near each other there.
+  void find_limit() {
+    order_.clear();
+    std::vector<std::uint32_t> typical;
+    for (std::size_t i = 0; i < segments_.size(); ++i) {
+      order_.emplace_back(0U, static_cast<std::uint32_t>(i));
+    }
+    constexpr std::uint32_t all = std::numeric_limits<std::uint32_t>::max();
+    if (segments_.empty()) return;
+    choose_unit(typical_bound(*segments_.front().sketches));
+    if (segments_.size() > first_segments) {
+      for (auto& [least, number] : order_) {
+        const SketchSegment& segment = *segments_[number].sketches;
+        segment.make_tables(layout_, query_, unit_, tables_);
+        least = all;
+        for (std::size_t block = number % sampled_every; block < segment.blocks();
+             block += sampled_every) {
+          cells(segment, 0, block, 1);
+          const std::size_t rows =
+              std::min(kernels::cell_block, segment.rows() - block * kernels::cell_block);
+          least = std::min<std::uint32_t>(
+              least, *std::ranges::min_element(std::span(bounds_).first(rows)));
+        }
+      }
+      std::ranges::sort(order_);
+    }
+    std::vector<SketchedView> best;
+    std::size_t looked_at = 0;
+    for (std::size_t i = 0; i < order_.size(); ++i) {
+      if (i >= first_segments && looked_at >= 2 * top_) break;
+      const std::uint32_t number = order_[i].second;
+      const LiveSegment& segment = segments_[number];
+      segment.sketches->make_tables(layout_, query_, unit_, tables_);
+      cells(*segment.sketches, all, 0, segment.sketches->blocks());
+      for (std::uint32_t row = 0; row < segment.sketches->rows(); ++row) {
+        const ViewId view = segment.sketches->views()[row];
+        if (segment.has(row) && !excluded(view)) {
+          best.push_back({bounds_[row], number, row, view});
+          ++looked_at;
+        }
+      }
+      if (best.size() > 4 * kept_by_cells()) keep_best(best, kept_by_cells());
+    }
+    keep_best(best, kept_by_cells());
+    refine(best, 1);
+    keep_best(best, 128 + 4 * top_);
+    refine(best, 2);
+    keep_best(best, top_ + 6);
+    read(best);
+    choose_unit(nearest_.limit());
+  }
+  [[nodiscard]] std::size_t kept_by_cells() const noexcept { return 1024 + 8 * top_; }
+
+  /// The median bound of some views, in units of 1.
+  std::uint32_t typical_bound(const SketchSegment& segment) {
+    std::vector<std::uint32_t> rows;
+    for (std::uint32_t row = 0; row < std::min<std::size_t>(64, segment.rows()); ++row) {
+      rows.push_back(row);
+    }
+    bounds_at(segment, 1, rows);
+    const auto bounds = std::span(level_bounds_).first(rows.size());
+    const auto middle = bounds.begin() + static_cast<std::ptrdiff_t>(rows.size() / 2);
+    std::ranges::nth_element(bounds, middle);
+    return *middle;
+  }
+
+  void scan() {
+    std::vector<SketchedView> waiting;
+    std::vector<std::uint32_t> rows;
+    for (const auto& [least, number] : order_) {
+      const LiveSegment& segment = segments_[number];
+      const SketchSegment& sketches = *segment.sketches;
+      sketches.make_tables(layout_, query_, unit_, tables_);
+      const auto passed = cells(sketches, nearest_.limit(), 0, sketches.blocks());
+      rows.clear();
+      for (const std::uint32_t row : passed) {
+        if (segment.has(row)) rows.push_back(row);
+      }
+      for (int level = 1; level <= 2 && !rows.empty(); ++level) {
+        bounds_at(sketches, level, rows);
+        std::size_t kept = 0;
+        for (std::size_t i = 0; i < rows.size(); ++i) {
+          if (level_bounds_[i] > nearest_.limit()) continue;
+          if (level == 2) {
+            const ViewId view = sketches.views()[rows[i]];
+            if (!excluded(view)) waiting.push_back({level_bounds_[i], number, rows[i], view});
+          }
+          rows[kept++] = rows[i];
+        }
+        rows.resize(kept);
+      }
+      if (waiting.size() >= max_waiting) read_some(waiting);
+    }
+    while (!waiting.empty()) read_some(waiting);
+  }
+
+  /// The best of them; all where they are few. Of the others those stay that can be among the
+  /// nearest then.
+  void read_some(std::vector<SketchedView>& waiting) {
+    std::erase_if(waiting, [this](const SketchedView& candidate) {
+      return nearest_.rules_out(candidate.bound, candidate.view) ||
+             std::ranges::binary_search(compared_, candidate.view);
+    });
+    const std::size_t some = waiting.size() <= read_at_once ? waiting.size() : read_at_once;
+    std::vector<SketchedView> best(waiting);
+    keep_best(best, some);
+    read(best);
+    std::erase_if(waiting, [this](const SketchedView& candidate) {
+      return nearest_.rules_out(candidate.bound, candidate.view) ||
+             std::ranges::binary_search(compared_, candidate.view);
+    });
+    choose_unit(nearest_.limit());
+  }
+
+  static constexpr std::size_t first_segments = 16;
+  static constexpr std::size_t sampled_every = 16;  // blocks of a segment
+  static constexpr std::uint32_t units_of_a_limit = 1000;
+  static constexpr std::size_t max_waiting = 256;
+  static constexpr std::size_t read_at_once = 64;
+
+  const SegmentLayout& layout_;
+  std::span<const LiveSegment> segments_;
+  const kernels::DistanceKernels& kernels_;
+  const ViewSketches::ReadViews& read_;
+  std::size_t top_;
+  Nearest nearest_;
+  SegmentQuery query_;
+  AlignedVector<std::uint8_t> magnitudes_, mask_;  // the mask is empty when all rows count
+  std::size_t compared_bytes_ = 0;
+  std::vector<ViewId> excluded_;                                // ascending
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> order_;  // least bound of a sample, number
+  std::vector<ViewId> compared_;                                // in full, ascending
+  std::uint32_t unit_ = 1;
+  SketchSegment::Encoded room_;
+  AlignedVector<std::uint8_t> tables_;
+  std::vector<std::uint16_t> bounds_;
+  std::vector<std::uint32_t> indices_, level_bounds_;
+  SearchResult result_;
+};
+
+}  // namespace
+
+struct ViewSketches::Implementation {
+  explicit Implementation(SignatureShape shape)
+      : layout(std::make_shared<const SegmentLayout>(shape)) {}
+
+  std::shared_ptr<const SegmentLayout> layout;
+  std::vector<LiveSegment> segments;  // full ones, then the one that grows
+  /// Of the last segment while it is not full: it is sketched anew when views come.
+  std::shared_ptr<const std::vector<std::uint8_t>> growing;
+  std::size_t size = 0;
+};
+
+ViewSketches::ViewSketches(SignatureShape shape) {
+  static_cast<void>(VisualMemory(shape, 1.0F, {}));  // refuses shapes that no memory has
+  implementation_ = std::make_unique<Implementation>(shape);
+}
+ViewSketches::~ViewSketches() = default;
+ViewSketches::ViewSketches(const ViewSketches& other)
+    : implementation_(std::make_unique<Implementation>(*other.implementation_)) {}
+ViewSketches& ViewSketches::operator=(const ViewSketches& other) {
+  if (this != &other) *implementation_ = *other.implementation_;
+  return *this;
+}
+ViewSketches::ViewSketches(ViewSketches&&) noexcept = default;
+ViewSketches& ViewSketches::operator=(ViewSketches&&) noexcept = default;
+
+SignatureShape ViewSketches::shape() const noexcept {
+  return implementation_->layout->shape();
+}
+std::size_t ViewSketches::size() const noexcept {
+  return implementation_->size;
+}
+
+std::uint64_t ViewSketches::bytes() const noexcept {
+  std::uint64_t bytes = implementation_->growing ? implementation_->growing->size() : 0;
+  for (const LiveSegment& segment : implementation_->segments) {
+    bytes += segment.sketches->bytes() + segment.live.size() * sizeof(std::uint64_t);
+  }
+  return bytes;
+}
+
+std::vector<ViewId> ViewSketches::views() const {
+  std::vector<ViewId> views;
+  views.reserve(size());
+  for (const LiveSegment& segment : implementation_->segments) {
+    for (std::size_t row = 0; row < segment.sketches->rows(); ++row) {
+      if (segment.has(row)) views.push_back(segment.sketches->views()[row]);
+    }
+  }
+  if (!std::ranges::is_sorted(views)) std::ranges::sort(views);
+  return views;
+}
+
+void ViewSketches::insert(std::span<const ViewId> views, std::span<const std::uint8_t> magnitudes) {
+  Implementation& own = *implementation_;
+  const std::size_t view_bytes = shape().size();
+  require(magnitudes.size() == views.size() * view_bytes, "number of magnitudes",
+          static_cast<double>(magnitudes.size()), to_text(double(views.size() * view_bytes)));
+  if (views.empty()) return;
+  // What the last segment holds comes first.
+  std::vector<ViewId> ids;
+  std::vector<std::uint8_t> bytes;
+  if (own.growing) {
+    const LiveSegment& last = own.segments.back();
+    for (std::size_t row = 0; row < last.sketches->rows(); ++row) {
+      if (!last.has(row)) continue;
+      ids.push_back(last.sketches->views()[row]);
+      const auto from = own.growing->begin() + static_cast<std::ptrdiff_t>(row * view_bytes);
+      bytes.insert(bytes.end(), from, from + static_cast<std::ptrdiff_t>(view_bytes));
+    }
+    own.segments.pop_back();
+    own.growing.reset();
+  }
+  own.size += views.size();
+  const std::size_t most = own.layout->max_rows();
+  while (!views.empty()) {
+    const std::size_t taken = std::min(views.size(), most - ids.size());
+    const auto of_these = magnitudes.first(taken * view_bytes);
+    if (ids.empty() && taken == most) {
+      own.segments.push_back(all_live(
+          std::make_shared<const SketchSegment>(*own.layout, views.first(taken), of_these)));
+    } else {
+      ids.insert(ids.end(), views.begin(), views.begin() + static_cast<std::ptrdiff_t>(taken));
+      bytes.insert(bytes.end(), of_these.begin(), of_these.end());
+      if (ids.size() == most || taken == views.size()) {
+        own.segments.push_back(
+            all_live(std::make_shared<const SketchSegment>(*own.layout, ids, bytes)));
+        if (ids.size() < most) {
+          own.growing = std::make_shared<const std::vector<std::uint8_t>>(std::move(bytes));
+        }
+        ids.clear();
+        bytes.clear();
+      }
+    }
+    views = views.subspan(taken);
+    magnitudes = magnitudes.subspan(of_these.size());
+  }
+}
+
+void ViewSketches::insert(const ViewSketches& other) {
+  Implementation& own = *implementation_;
+  const Implementation& given = *other.implementation_;
+  if (!(shape() == other.shape())) {
+    throw ContractError(
+        "shape of other sketches",
+        std::to_string(other.shape().rows) + " x " + std::to_string(other.shape().components),
+        std::to_string(shape().rows) + " x " + std::to_string(shape().components));
+  }
+  const std::size_t full = given.segments.size() - (given.growing ? 1 : 0);
+  const auto at = own.segments.end() - (own.growing ? 1 : 0);
+  own.segments.insert(at, given.segments.begin(),
+                      given.segments.begin() + static_cast<std::ptrdiff_t>(full));
+  for (std::size_t i = 0; i < full; ++i) own.size += given.segments[i].count;
+  if (!given.growing) return;
+  const LiveSegment& last = given.segments.back();
+  std::vector<ViewId> ids;
+  std::vector<std::uint8_t> bytes;
+  for (std::size_t row = 0; row < last.sketches->rows(); ++row) {
+    if (!last.has(row)) continue;
+    ids.push_back(last.sketches->views()[row]);
+    const auto from = given.growing->begin() + static_cast<std::ptrdiff_t>(row * shape().size());
+    bytes.insert(bytes.end(), from, from + static_cast<std::ptrdiff_t>(shape().size()));
+  }
+  insert(ids, bytes);
+}
+
+void ViewSketches::erase(std::span<const ViewId> views) {
+  Implementation& own = *implementation_;
+  std::vector<ViewId> gone(views.begin(), views.end());
+  std::ranges::sort(gone);
+  for (LiveSegment& segment : own.segments) {
+    const SketchSegment& sketches = *segment.sketches;
+    const auto first = std::ranges::lower_bound(gone, sketches.least());
+    if (first == gone.end() || sketches.largest() < *first) continue;
+    for (std::size_t row = 0; row < sketches.rows(); ++row) {
+      if (!segment.has(row) || !std::ranges::binary_search(gone, sketches.views()[row])) continue;
+      segment.live[row / 64] &= ~(std::uint64_t{1} << (row % 64));
+      --segment.count;
+      --own.size;
+    }
+  }
+  if (own.growing && own.segments.back().count == 0) own.growing.reset();
+  std::erase_if(own.segments, [](const LiveSegment& segment) { return segment.count == 0; });
+}
+
+SearchResult ViewSketches::search(const PackedSignature& query, const SearchOptions& options,
+                                  const SearchMask& mask, const ReadViews& read) const {
+  require(options.top >= 1, "top", options.top, ">= 1");
+  require_signature(query, shape());
+  require_mask(mask, shape());
+  const int components = checked_components(options.components, shape());
+  const std::size_t top = std::min(static_cast<std::size_t>(options.top), size());
+  const std::uint64_t in_full = std::uint64_t{size()} * static_cast<std::uint64_t>(components) *
+                                static_cast<std::uint64_t>(shape().rows);
+  SearchResult result;
+  if (top > 0) {
+    result = SketchSearch(*implementation_->layout, implementation_->segments, query, components,
+                          mask, top, read)
+                 .run();
+  }
+  result.bytes_in_full = in_full;
+  return result;
+}
+
+}  // namespace panonav
