@@ -2,14 +2,24 @@
 // bench/search_bench.sh starts a server for it. Of the views 100,000 are rendered; the others are
 // made in places of 1000, each of two rendered runs of 1000 views that are mixed with one weight.
 // Such places are more like each other and like every query than rendered ones.
+#include <time.h>
+
+#include <algorithm>
+#include <array>
 #include <chrono>
+#include <cstdlib>
+#include <fstream>
 #include <iostream>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "panonav/core/random.hpp"
 #include "panonav/core/text.hpp"
+#include "panonav/memory/visual_memory.hpp"
 #include "panonav/storage/memory_file.hpp"
+#include "panonav/storage/place_search.hpp"
+#include "rivals.hpp"
 #include "simulated_views.hpp"
 
 namespace panonav::bench {
@@ -23,6 +33,12 @@ constexpr std::size_t batch = 10000;
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+double thread_seconds() {
+  timespec used{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
+  return static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
 }
 
 const ViewSet& rendered_views() {
@@ -99,14 +115,199 @@ int fill(const std::string& address, std::size_t views) {
   return 0;
 }
 
+PackedSignature query_of(std::vector<std::uint8_t> magnitudes) {
+  const std::size_t bytes = magnitudes.size();
+  return {ViewSet::shape, std::move(magnitudes), std::vector<std::uint8_t>(bytes)};
+}
+
+struct Queries {
+  std::string name;
+  std::vector<PackedSignature> all;
+};
+
+/// None of them is in the memory.
+std::vector<Queries> make_queries() {
+  std::vector<Queries> kinds{{"between rendered views", {}},
+                             {"mixtures of two such", {}},
+                             {"another building", {}},
+                             {"noise", {}}};
+  const ViewSet& set = rendered_views();
+  const ViewSet other =
+      simulated_views(Places::rooms, 6000, 100,
+                      std::filesystem::path(PANONAV_BENCH_CACHE) / "other.bin", 5000);
+  Random random(9);
+  const auto bytes_of = [](std::span<const std::uint8_t> from) {
+    return std::vector<std::uint8_t>(from.begin(), from.end());
+  };
+  for (std::size_t i = 0; i < 200; ++i) {
+    kinds[0].all.push_back(query_of(bytes_of(set.query(i * 5))));
+  }
+  for (std::size_t i = 0; i < 40; ++i) {
+    auto mixed = bytes_of(set.query(random.index(set.query_count())));
+    const auto second = set.query(random.index(set.query_count()));
+    for (std::size_t k = 0; k < mixed.size(); ++k) {
+      mixed[k] = static_cast<std::uint8_t>((mixed[k] + second[k] + 1) / 2);
+    }
+    kinds[1].all.push_back(query_of(mixed));
+    kinds[2].all.push_back(query_of(bytes_of(other.query(i * 2))));
+  }
+  for (std::size_t i = 0; i < 5; ++i) {
+    std::vector<std::uint8_t> noise(ViewSet::shape.size());
+    for (auto& byte : noise) byte = static_cast<std::uint8_t>(random.next());
+    kinds[3].all.push_back(query_of(std::move(noise)));
+  }
+  return kinds;
+}
+
+double gigabytes(const std::string& key) {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.starts_with(key)) return 1e-6 * std::stod(line.substr(key.size()));
+  }
+  return 0.0;
+}
+
+void print_load() {
+  std::ifstream file("/proc/loadavg");
+  std::string load;
+  std::getline(file, load);
+  std::cout << "load: " << load << "\n";
+}
+
+std::string times(std::vector<double> ms) {
+  std::ranges::sort(ms);
+  return "median " + fixed(ms[ms.size() / 2], 1) + ", of ten nine " +
+         fixed(ms[ms.size() * 9 / 10], 1) + ", slowest " + fixed(ms.back(), 1) + " ms";
+}
+
+/// What is read from memory when nothing else is done.
+double read_gb_per_s() {
+  std::vector<std::uint64_t> bytes(std::size_t{64} << 20U, 1);
+  double best = 0.0;
+  for (int i = 0; i < 5; ++i) {
+    const auto start = Clock::now();
+    std::array<std::uint64_t, 8> sums{};
+    for (std::size_t at = 0; at < bytes.size(); at += 8) {
+      for (std::size_t lane = 0; lane < 8; ++lane) sums[lane] += bytes[at + lane];
+    }
+    const double taken_s = seconds_since(start);
+    if (std::ranges::max(sums) != 0) best = std::max(best, 8e-9 * double(bytes.size()) / taken_s);
+  }
+  return best;
+}
+
+/// The ten nearest of some queries by comparing all views.
+std::vector<std::vector<Match>> scan(std::span<const PackedSignature* const> queries,
+                                     std::size_t views) {
+  std::vector<std::vector<Match>> nearest(queries.size());
+  const auto before = [](const Match& a, const Match& b) {
+    return std::pair(a.dissimilarity, a.view) < std::pair(b.dissimilarity, b.view);
+  };
+  for (std::size_t number = 0; number < views; ++number) {
+    const auto view = magnitudes_of(number);
+    for (std::size_t q = 0; q < queries.size(); ++q) {
+      const auto& asked = queries[q]->magnitudes;
+      std::uint32_t sum = 0;
+      for (std::size_t i = 0; i < view.size(); ++i) {
+        sum += static_cast<std::uint32_t>(std::abs(view[i] - asked[i]));
+      }
+      auto& best = nearest[q];
+      const Match match{{static_cast<std::uint32_t>(number + 1)}, sum};
+      if (best.size() == 10 && !before(match, best.back())) continue;
+      best.insert(std::ranges::upper_bound(best, match, before), match);
+      if (best.size() > 10) best.pop_back();
+    }
+  }
+  return nearest;
+}
+
+void ask_rivals(const std::vector<PackedSignature>& queries) {
+  constexpr std::size_t held = 1000000;
+  VisualMemory memory(ViewSet::shape, 1.0F, {});
+  std::vector<std::uint8_t> plain;
+  plain.reserve(held * ViewSet::shape.size());
+  for (std::size_t number = 0; number < held; ++number) {
+    PackedSignature view = query_of(magnitudes_of(number));
+    plain.insert(plain.end(), view.magnitudes.begin(), view.magnitudes.end());
+    memory.append(view, {"v" + std::to_string(number), {}, {}});
+  }
+  (void)memory.search(queries.front());
+  std::vector<double> ms;
+  for (const PackedSignature& query : queries) {
+    const auto start = Clock::now();
+    (void)memory.search(query);
+    ms.push_back(1e3 * seconds_since(start));
+  }
+  std::cout << "VisualMemory of " << held << " views: " << times(ms) << "\n";
+  const auto rival = make_byte_scan(plain, ViewSet::shape.size());
+  std::vector<double> scan_ms;
+  for (std::size_t i = 0; i < 5; ++i) {
+    const auto start = Clock::now();
+    (void)rival->nearest(queries[i].magnitudes, 10);
+    scan_ms.push_back(1e3 * seconds_since(start));
+  }
+  std::cout << "scan over " << held << " views: " << times(scan_ms) << "\n";
+}
+
+int ask(const std::string& address, std::size_t views) {
+  const std::vector<Queries> kinds = make_queries();
+  print_load();
+  std::cout << "memory is read with " << fixed(read_gb_per_s(), 1) << " GB/s\n";
+  const double before = gigabytes("VmRSS:");
+  const auto start = Clock::now();
+  const PlaceSearch search(address);
+  const double taken_s = seconds_since(start);
+  std::cout << "start: " << search.size() << " views in " << fixed(taken_s, 1) << " s; sketches "
+            << fixed(1e-9 * double(search.bytes()), 2) << " GB, "
+            << fixed(double(search.bytes()) / double(search.size()), 0) << " bytes a view; resident "
+            << fixed(gigabytes("VmRSS:") - before, 2) << " GB more, at most "
+            << fixed(gigabytes("VmHWM:"), 2) << " GB in all\n";
+  std::vector<const PackedSignature*> sampled;
+  std::vector<std::vector<Match>> found;
+  for (int round = 0; round < 2; ++round) {
+    print_load();
+    std::cout << (round == 0 ? "first time, rows from the disk:\n" : "again:\n");
+    for (const Queries& kind : kinds) {
+      std::vector<double> ms;
+      std::vector<double> own_ms;
+      std::uint64_t in_full = 0;
+      std::uint64_t bytes = 0;
+      for (std::size_t i = 0; i < kind.all.size(); ++i) {
+        const auto from = Clock::now();
+        const double own = thread_seconds();
+        const SearchResult result = search.search(kind.all[i]);
+        own_ms.push_back(1e3 * (thread_seconds() - own));
+        ms.push_back(1e3 * seconds_since(from));
+        in_full += result.views_in_full;
+        bytes += result.bytes_read;
+        if (round == 0 && i < 3) {
+          sampled.push_back(&kind.all[i]);
+          found.push_back(result.matches);
+        }
+      }
+      std::cout << "  " << kind.name << ": " << times(ms) << "; processor time "
+                << times(own_ms) << "; "
+                << in_full / kind.all.size() << " views read in full, "
+                << fixed(1e-6 * double(bytes) / double(kind.all.size()), 0) << " MB\n";
+    }
+  }
+  const bool equal = scan(sampled, views) == found;
+  std::cout << "equal to a full scan over " << views << " views in " << sampled.size()
+            << " samples: " << (equal ? "yes" : "NO") << "\n";
+  ask_rivals(kinds.front().all);
+  return equal ? 0 : 1;
+}
+
 }  // namespace
 }  // namespace panonav::bench
 
 int main(int argc, char** argv) {
   using namespace panonav::bench;
+  std::cout << std::unitbuf;
   const std::string what = argc > 2 ? argv[1] : "";
   const std::size_t views = argc > 3 ? std::stoul(argv[3]) : 10000000;
   if (what == "fill") return fill(argv[2], views);
+  if (what == "ask") return ask(argv[2], views);
   std::cerr << "usage: search_bench fill|ask ADDRESS [VIEWS], as of panonav-postgresql FOLDER "
                "address search\n";
   return 2;

@@ -103,7 +103,7 @@ std::vector<std::uint8_t> packed(const std::vector<float>& magnitudes, float ful
   return bytes;
 }
 
-ViewSet render(Places places, std::size_t views, std::size_t queries) {
+ViewSet render(Places places, std::size_t views, std::size_t queries, std::uint64_t first_room) {
   static constexpr std::string_view kinds[] = {"office", "lab", "hall"};
   // Rooms of 10 .. 49 square metres; no more than this many views of one, so that there are enough
   // rooms.
@@ -114,7 +114,7 @@ ViewSet render(Places places, std::size_t views, std::size_t queries) {
   std::size_t made = 0;
   std::size_t asked = 0;
   std::size_t rooms = 0;
-  for (std::uint64_t seed = 1; made < views; ++seed) {
+  for (std::uint64_t seed = first_room; made < views; ++seed) {
     Random random(seed, 77);
     const Room room(kinds[seed % std::size(kinds)], seed);
     const std::size_t most = std::min(max_per_room, views - made);
@@ -151,7 +151,7 @@ ViewSet render(Places places, std::size_t views, std::size_t queries) {
 }  // namespace
 
 ViewSet simulated_views(Places places, std::size_t views, std::size_t queries,
-                        const std::filesystem::path& cache) {
+                        const std::filesystem::path& cache, std::uint64_t first_room) {
   if (places == Places::numbers) {
     Random random(5);
     ViewSet set;
@@ -166,7 +166,7 @@ ViewSet simulated_views(Places places, std::size_t views, std::size_t queries,
   const std::size_t query_bytes = queries * ViewSet::shape.size();
   std::error_code missing;
   if (std::filesystem::file_size(cache, missing) != view_bytes + query_bytes) {
-    const ViewSet set = render(places, views, queries);
+    const ViewSet set = render(places, views, queries, first_room);
     std::ofstream out(cache, std::ios::binary);
     out.write(reinterpret_cast<const char*>(set.views.data()),
               static_cast<std::streamsize>(set.views.size()));

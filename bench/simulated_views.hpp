@@ -35,8 +35,9 @@ enum class Places {
 /// Rendered with the project's own ray tracing: 80 rows x 64 columns, one ray a pixel, random
 /// headings, the grey-level noise of a 512-column camera with a standard deviation of 2 %.
 /// Rendering takes milliseconds a view, so the set is kept in `cache` and read from there the next
-/// time.
+/// time. Rooms are those of `first_room` and the following seeds.
 [[nodiscard]] ViewSet simulated_views(Places places, std::size_t views, std::size_t queries,
-                                      const std::filesystem::path& cache);
+                                      const std::filesystem::path& cache,
+                                      std::uint64_t first_room = 1);
 
 }  // namespace panonav::bench

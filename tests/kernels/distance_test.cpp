@@ -114,36 +114,71 @@ TEST_P(Distance, SketchBoundsFollowTheirDefinition) {
 
 TEST_P(Distance, CellBoundsFollowTheirDefinition) {
   Random random(14);
-  for (const std::size_t pairs : {1U, 2U, 7U, 16U, 128U}) {
+  for (const std::size_t pairs : {1U, 2U, 7U, 16U, 100U}) {
     const std::size_t blocks = 1 + random.index(5);
     const auto codes = random_bytes(random, blocks * pairs * cell_block);
     auto tables = random_bytes(random, pairs * 32);
-    if (pairs == 128) std::ranges::fill(tables, 255);  // the largest sum
-    std::vector<std::uint32_t> expected;
+    for (auto& entry : tables) entry = static_cast<std::uint8_t>(entry / (2 * pairs));
+    if (pairs == 100) std::ranges::fill(tables, 255);  // more than a byte holds
+    std::vector<std::uint8_t> expected;
     for (std::size_t view = 0; view < blocks * cell_block; ++view) {
-      expected.push_back(0);
+      int sum = 0;
       for (std::size_t pair = 0; pair < pairs; ++pair) {
         const std::size_t row = (view / cell_block * pairs + pair) * cell_block;
-        const std::uint8_t code = codes[row + cell_place(view % cell_block)];
-        expected.back() +=
-            std::min(255, tables[pair * 32 + code % 16] + tables[pair * 32 + 16 + code / 16]);
+        const std::uint8_t code = codes[row + view % cell_block];
+        sum += tables[pair * 32 + code % 16] + tables[pair * 32 + 16 + code / 16];
       }
+      expected.push_back(static_cast<std::uint8_t>(std::min(sum, 255)));
     }
-    std::vector<std::uint32_t> ascending = expected;
+    std::vector<std::uint8_t> ascending = expected;
     std::ranges::sort(ascending);
-    for (const std::uint32_t limit : {ascending[ascending.size() / 3], 0U, 65535U, 100000U}) {
-      std::vector<std::uint16_t> bounds(expected.size());
+    for (const int limit : {int{ascending[ascending.size() / 3]}, 0, 254, 255}) {
+      std::vector<std::uint8_t> bounds(expected.size());
       std::vector<std::uint32_t> indices(expected.size());
-      indices.resize(kernels.cell_bounds(codes.data(), blocks, {tables.data(), pairs, limit},
-                                         bounds.data(), indices.data()));
+      indices.resize(
+          kernels.cell_bounds(codes.data(), blocks,
+                              {tables.data(), pairs, static_cast<std::uint8_t>(limit)},
+                              bounds.data(), indices.data()));
+      EXPECT_EQ(bounds, expected) << pairs << " pairs";
       std::vector<std::uint32_t> wanted;
       for (std::uint32_t view = 0; view < expected.size(); ++view) {
-        EXPECT_EQ(bounds[view], expected[view]) << pairs << " pairs, view " << view;
         if (expected[view] <= limit) wanted.push_back(view);
       }
       EXPECT_EQ(indices, wanted) << pairs << " pairs, limit " << limit;
     }
   }
+}
+
+TEST_P(Distance, CellTablesAreLowerBounds) {
+  Random random(15);
+  constexpr std::size_t dimensions = 9;
+  std::vector<std::int32_t> low, high, sums;
+  std::vector<float> factors;
+  for (std::size_t d = 0; d < dimensions; ++d) {
+    const std::uint32_t unit = 1 + static_cast<std::uint32_t>(random.index(100));
+    sums.push_back(static_cast<std::int32_t>(random.index(20000)));
+    factors.push_back(d == 3 ? 0.0F : (1.0F - 1e-6F) / static_cast<float>(unit));
+    for (int code = 0; code < 16; ++code) {
+      low.push_back(static_cast<std::int32_t>(random.index(20000)));
+      high.push_back(low.back() + static_cast<std::int32_t>(random.index(300)));
+    }
+  }
+  std::vector<std::uint8_t> tables(16 * dimensions);
+  std::vector<std::uint8_t> by_scalar(tables.size());
+  kernels.cell_tables(low.data(), high.data(), sums.data(), factors.data(), dimensions,
+                      tables.data());
+  scalar.cell_tables(low.data(), high.data(), sums.data(), factors.data(), dimensions,
+                     by_scalar.data());
+  EXPECT_EQ(tables, by_scalar);
+  int large = 0;
+  for (std::size_t i = 0; i < tables.size(); ++i) {
+    const double outside = std::max({low[i] - sums[i / 16], sums[i / 16] - high[i], 0});
+    EXPECT_LE(tables[i], outside * static_cast<double>(factors[i / 16]));
+    EXPECT_GT(tables[i] + 1.0,
+              std::min(255.0, outside * static_cast<double>(factors[i / 16])) - 0.001);
+    large += tables[i] == 255 ? 1 : 0;
+  }
+  EXPECT_GT(large, 10);
 }
 
 TEST_P(Distance, SketchBoundsOfPickedViewsAreThoseOfTheInterleavedOnes) {

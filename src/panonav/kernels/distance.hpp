@@ -26,14 +26,18 @@ struct DistanceKernels {
   void (*sketch_bounds_at)(const uint8_t* sketches, const int32_t* slacks, const uint32_t* indices,
                            size_t count, const SketchQuery& query, uint32_t* bounds);
 
-  /// For each view v of `blocks` blocks of `cell_block` views: bounds[v] = the sum over pairs of
-  /// dimensions of min(255, tables[32 * pair + first code] + tables[32 * pair + 16 + second code]).
-  /// Writes the positions of those <= query.limit, ascending, to `indices`, which has room for all,
-  /// and returns their number. A block consists of `pairs` rows of `cell_block` bytes; byte
-  /// cell_place(v) of each is of view v: the code of an even dimension in its lower four bits, that
-  /// of the next one in the upper four.
+  /// For each of 16 codes of each dimension, which stand for sums of low .. high: tables[16 * d +
+  /// code] = what lies between them and sums[d], times factors[d], rounded down, at most 255.
+  void (*cell_tables)(const int32_t* low, const int32_t* high, const int32_t* sums,
+                      const float* factors, size_t dimensions, uint8_t* tables);
+
+  /// For each view v of `blocks` blocks of `cell_block` views: bounds[v] = the sum over its codes of
+  /// tables[16 * d + code], at most 255. Writes the positions of those <= query.limit, ascending, to
+  /// `indices`, which has room for all, and returns their number. A block consists of `pairs` rows of
+  /// `cell_block` bytes; byte v of each is of view v: the code of an even dimension in its lower four
+  /// bits, that of the next one in the upper four.
   size_t (*cell_bounds)(const uint8_t* codes, size_t blocks, const CellQuery& query,
-                        uint16_t* bounds, uint32_t* indices);
+                        uint8_t* bounds, uint32_t* indices);
 
   /// Writes the positions of the values <= limit, ascending, and returns their number. `indices`
   /// has room for `count` entries and 16 more.

@@ -30,19 +30,13 @@ struct SketchQuery {
 
 /// A query as `cell_bounds` compares it. Sketches consist of codes of 4 bits, one a dimension.
 struct CellQuery {
-  /// 16 bytes a dimension, at most 256 dimensions: what each code adds to the bound.
-  const uint8_t* tables;
-  size_t pairs;    ///< half the number of dimensions
-  uint32_t limit;  ///< of the bounds that are wanted
+  const uint8_t* tables;  ///< 16 bytes a dimension: what each code adds to the bound
+  size_t pairs;           ///< half the number of dimensions
+  uint8_t limit;          ///< of the bounds that are wanted
 };
 
 /// Views that `cell_bounds` compares together.
 inline constexpr size_t cell_block = 64;
-/// Where the codes of view `view` of a block lie in each row of `cell_block` bytes. Even bytes are
-/// the first half of the views, so that sums of 16 bits come out in the order of the views.
-constexpr size_t cell_place(size_t view) {
-  return view < cell_block / 2 ? 2 * view : 2 * view - cell_block + 1;
-}
 
 /// Sizes of what `match_columns` compares.
 /// Columns of the query.

@@ -102,6 +102,17 @@ void visit_options(LocaliserOptions& options, OptionVisitor& visitor) {
   table.visit(options, visitor);
 }
 
+int first_matches(const LocaliserOptions& options, bool by_features) {
+  return std::max(
+      {options.top, PositionModel::candidates, by_features ? verified_candidates : 0});
+}
+
+bool looks_further(const PlaceModel& model, std::span<const RankedMatch> first) {
+  return std::ranges::none_of(first, [&](const RankedMatch& match) {
+    return match.columns.difference <= model.neighbouring;
+  });
+}
+
 Localiser::Localiser(const VisualMemory& memory, const LocaliserOptions& options)
     : Localiser(memory, ranking_of(memory, options), options) {}
 
@@ -117,12 +128,12 @@ Localiser::Localiser(const VisualMemory& memory, std::shared_ptr<const ColumnRan
 
 Localiser::Localiser(const VisualMemory& memory, const PlaceModel& place_model,
                      const PositionModel& position_model, const LocaliserOptions& options,
-                     std::optional<double> spacing_m)
+                     std::optional<double> spacing_m, std::size_t views)
     : memory_(&memory),
       options_(options),
       ranking_(ranking_of(memory, options)),
       support_(*ranking_, spacing_m),
-      criterion_(*ranking_),
+      criterion_(*ranking_, views),
       place_model_(place_model),
       position_model_(position_model) {
   require(position_model_.components == options_.components, "components of the position model",
@@ -146,15 +157,10 @@ Localisation Localiser::localise(const PackedSignature& query, const SearchMask&
     seen_features = with_rows(features(Handedness::as_seen), mask.allowed_rows);
   }
   const bool by_features = seen_features.has_value();
-  const int first =
-      std::max({options_.top, PositionModel::candidates, by_features ? verified_candidates : 0});
+  const int first = first_matches(options_, by_features);
   std::vector<RankedMatch> ranked = nearest(first);
   if (ranked.empty()) return result;
-  const auto min_difference = [&] {
-    return std::ranges::min(ranked, {}, [](const RankedMatch& r) { return r.columns.difference; })
-        .columns.difference;
-  };
-  if (options_.reranked_views > first && min_difference() > place_model_.neighbouring) {
+  if (options_.reranked_views > first && looks_further(place_model_, ranked)) {
     ranked = nearest(options_.reranked_views);
   }
   result.evidence = criterion_.evidence(query, ranked, mask);

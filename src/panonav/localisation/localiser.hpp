@@ -64,6 +64,13 @@ struct LocaliserOptions {
 };
 void visit_options(LocaliserOptions& options, OptionVisitor& visitor);
 
+/// How many views a search finds for `Localiser::localise` at first. `by_features`: whether local
+/// features of the query decide between matches.
+[[nodiscard]] int first_matches(const LocaliserOptions& options, bool by_features);
+/// Whether none of these matches explains the query, so that `reranked_views` are searched for where
+/// these are more than the first ones.
+[[nodiscard]] bool looks_further(const PlaceModel& model, std::span<const RankedMatch> first);
+
 /// Finds places of a memory from single views, in any heading of the robot.
 class Localiser {
  public:
@@ -72,11 +79,13 @@ class Localiser {
   /// ContractError on more components than the memory's. Cost: about 200 searches, and 0.2 s for
   /// comparing columns, at most.
   explicit Localiser(const VisualMemory& memory, const LocaliserOptions& options = {});
-  /// With models learnt before; `spacing_m`: that of the support, where it is known. Throws
-  /// ContractError when the position model was learnt over other components.
+  /// With models learnt before; `spacing_m`: that of the support, where it is known. `views`: the
+  /// memory is a part of one of so many views, with all that the answer to a query looks at
+  /// (`SearchedRecogniser`); 0: it is the whole. Throws ContractError when the position model was
+  /// learnt over other components.
   Localiser(const VisualMemory& memory, const PlaceModel& place_model,
             const PositionModel& position_model, const LocaliserOptions& options = {},
-            std::optional<double> spacing_m = std::nullopt);
+            std::optional<double> spacing_m = std::nullopt, std::size_t views = 0);
 
   /// From now on, in queries that come with theirs, local features are evidence of whether the
   /// place is known, where columns leave doubt. `rank`: they also decide between the best matches,

@@ -17,11 +17,14 @@ namespace {
 constexpr std::size_t max_neighbours = 8;  // of a grid
 constexpr std::size_t counted_views = 4;   // the corners of a grid's square
 constexpr double spacings = 1.5;           // more than the diagonal of a grid's square
-constexpr std::size_t max_examined = 30;
 constexpr double looked_at_share = 1.25;
 constexpr double heading_tolerance_rad = radians(20.0);
 
 }  // namespace
+
+double NeighbourSupport::radius_m(double spacing_m) noexcept {
+  return spacings * spacing_m;
+}
 
 NeighbourSupport::NeighbourSupport(const ColumnRanking& ranking, std::optional<double> spacing_m)
     : ranking_(&ranking) {
@@ -35,7 +38,7 @@ NeighbourSupport::NeighbourSupport(const ColumnRanking& ranking, std::optional<d
   }
   if (positions.size() < 2) return;
   spacing_m_ = spacing_m ? *spacing_m : VoronoiCells(positions).spacing_m();
-  radius_m_ = spacings * spacing_m_;
+  radius_m_ = radius_m(spacing_m_);
   if (!(radius_m_ > 0.0)) return;
   for (std::size_t i = 0; i < views.size(); ++i) {
     const auto [x, y] = cell_of(positions[i]);

@@ -21,6 +21,11 @@ class NeighbourSupport {
   explicit NeighbourSupport(const ColumnRanking& ranking,
                             std::optional<double> spacing_m = std::nullopt);
 
+  /// Within which neighbours lie, for this spacing of a memory.
+  [[nodiscard]] static double radius_m(double spacing_m) noexcept;
+  /// The matches that `put_best_supported_first` may look at, of those that it is given.
+  static constexpr std::size_t max_examined = 30;
+
   /// Between references with headings; 0 where there are fewer than two.
   [[nodiscard]] double spacing_m() const noexcept { return spacing_m_; }
 
@@ -37,7 +42,7 @@ class NeighbourSupport {
 
   /// Puts the match with the least score, by its supported difference, and its neighbours first,
   /// each group in the order that it was in. Only matches whose score is within a quarter of the
-  /// first one's are looked at, 30 at most. `ranked` stays as it is when no match has neighbours.
+  /// first one's are looked at, `max_examined` at most. `ranked` stays as it is when no match has neighbours.
   void put_best_supported_first(const ColumnProfiles& query, std::vector<RankedMatch>& ranked,
                                 std::span<const ViewId> excluded = {}) const;
 

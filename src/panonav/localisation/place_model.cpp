@@ -74,18 +74,25 @@ double log_share(int verified, int chance) {
   return std::log((1.0 + verified) / (1.0 + chance));
 }
 
-// Each by its own number.
+}  // namespace
+
 std::vector<ViewId> drawn_views(std::span<const ViewId> views) {
-  std::vector<std::pair<std::uint64_t, ViewId>> drawn;
-  for (const ViewId view : views) drawn.emplace_back(Random(1, view.value).next(), view);
-  const std::size_t kept = std::min(drawn.size(), chance_views + spare_views);
-  std::ranges::partial_sort(drawn, drawn.begin() + static_cast<std::ptrdiff_t>(kept));
+  std::vector<std::pair<std::uint64_t, ViewId>> drawn;  // a heap, the largest number in front
+  for (const ViewId view : views) {
+    const std::pair number(Random(1, view.value).next(), view);
+    if (drawn.size() == chance_views + spare_views) {
+      if (!(number < drawn.front())) continue;
+      std::ranges::pop_heap(drawn);
+      drawn.pop_back();
+    }
+    drawn.push_back(number);
+    std::ranges::push_heap(drawn);
+  }
+  std::ranges::sort_heap(drawn);
   std::vector<ViewId> sample;
-  for (std::size_t i = 0; i < kept; ++i) sample.push_back(drawn[i].second);
+  for (const auto& [number, view] : drawn) sample.push_back(view);
   return sample;
 }
-
-}  // namespace
 
 void visit_options(PlaceModelOptions& options, OptionVisitor& visitor) {
   using T = PlaceModelOptions;
@@ -187,8 +194,10 @@ std::array<double, doubtful_features> doubtful_features_of(const PlaceEvidence& 
           log_share(found.verified, found.neighbour)};
 }
 
-PlaceCriterion::PlaceCriterion(const ColumnRanking& ranking)
-    : ranking_(&ranking), sample_(drawn_views(ranking.memory().views())) {
+PlaceCriterion::PlaceCriterion(const ColumnRanking& ranking, std::size_t views)
+    : ranking_(&ranking),
+      views_(static_cast<int>(std::min<std::size_t>(views, std::numeric_limits<int>::max()))),
+      sample_(drawn_views(ranking.memory().views())) {
   for (const ViewId view : sample_) profiles_.push_back(profiles(view, {}));
 }
 
@@ -235,7 +244,7 @@ PlaceEvidence PlaceCriterion::evidence(const PackedSignature& query,
   const VisualMemory& memory = ranking_->memory();
   PlaceEvidence found{.components = memory.shape().components};
   if (matches.empty()) return found;
-  found.views = static_cast<int>(memory.size()) -
+  found.views = (views_ > 0 ? views_ : static_cast<int>(memory.size())) -
                 static_cast<int>(std::ranges::count_if(
                     mask.excluded_views, [&](ViewId view) { return memory.contains(view); }));
   std::vector<const RankedMatch*> best(matches.size());

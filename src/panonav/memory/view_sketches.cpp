@@ -146,29 +146,24 @@ class SketchSearch {
   std::span<const std::uint32_t> cells(const SketchSegment& segment, std::uint32_t limit,
                                        std::size_t first, std::size_t count) {
     result_.bytes_read += count * kernels::cell_block * layout_.dimensions(0) / 2;
-    return segment.cell_bounds(layout_, kernels_, tables_, limit / unit_, first, count, bounds_,
+    return segment.cell_bounds(layout_, kernels_, query_, tables_, limit, first, count, bounds_,
                                indices_);
   }
-
-  /// Units in which a typical bound of the first segments is some hundred: fine enough that
-  /// rounding takes little of the bounds, and coarse enough that no entry has more than 255.
-  void choose_unit(std::uint32_t typical) { unit_ = std::max(1U, typical / units_of_a_limit); }
 
   /// A first limit, within which `top` views lie: from the segments of which a sample of the views
   /// looks best. Views that were taken near each other lie near each other there.
   void find_limit() {
     order_.clear();
-    std::vector<std::uint32_t> typical;
     for (std::size_t i = 0; i < segments_.size(); ++i) {
       order_.emplace_back(0U, static_cast<std::uint32_t>(i));
     }
     constexpr std::uint32_t all = std::numeric_limits<std::uint32_t>::max();
     if (segments_.empty()) return;
-    choose_unit(typical_bound(*segments_.front().sketches));
+    query_.choose_unit(layout_, typical_bound(*segments_.front().sketches));
     if (segments_.size() > first_segments) {
       for (auto& [least, number] : order_) {
         const SketchSegment& segment = *segments_[number].sketches;
-        segment.make_tables(layout_, query_, unit_, tables_);
+        segment.make_tables(layout_, kernels_, query_, tables_);
         least = all;
         for (std::size_t block = number % sampled_every; block < segment.blocks();
              block += sampled_every) {
@@ -187,7 +182,7 @@ class SketchSearch {
       if (i >= first_segments && looked_at >= 2 * top_) break;
       const std::uint32_t number = order_[i].second;
       const LiveSegment& segment = segments_[number];
-      segment.sketches->make_tables(layout_, query_, unit_, tables_);
+      segment.sketches->make_tables(layout_, kernels_, query_, tables_);
       cells(*segment.sketches, all, 0, segment.sketches->blocks());
       for (std::uint32_t row = 0; row < segment.sketches->rows(); ++row) {
         const ViewId view = segment.sketches->views()[row];
@@ -204,11 +199,11 @@ class SketchSearch {
     refine(best, 2);
     keep_best(best, top_ + 6);
     read(best);
-    choose_unit(nearest_.limit());
+    query_.choose_unit(layout_, nearest_.limit());
   }
   [[nodiscard]] std::size_t kept_by_cells() const noexcept { return 1024 + 8 * top_; }
 
-  /// The median bound of some views, in units of 1.
+  /// The median bound of some views.
   std::uint32_t typical_bound(const SketchSegment& segment) {
     std::vector<std::uint32_t> rows;
     for (std::uint32_t row = 0; row < std::min<std::size_t>(64, segment.rows()); ++row) {
@@ -227,7 +222,7 @@ class SketchSearch {
     for (const auto& [least, number] : order_) {
       const LiveSegment& segment = segments_[number];
       const SketchSegment& sketches = *segment.sketches;
-      sketches.make_tables(layout_, query_, unit_, tables_);
+      sketches.make_tables(layout_, kernels_, query_, tables_);
       const auto passed = cells(sketches, nearest_.limit(), 0, sketches.blocks());
       rows.clear();
       for (const std::uint32_t row : passed) {
@@ -266,12 +261,11 @@ class SketchSearch {
       return nearest_.rules_out(candidate.bound, candidate.view) ||
              std::ranges::binary_search(compared_, candidate.view);
     });
-    choose_unit(nearest_.limit());
+    query_.choose_unit(layout_, nearest_.limit());
   }
 
   static constexpr std::size_t first_segments = 16;
   static constexpr std::size_t sampled_every = 16;  // blocks of a segment
-  static constexpr std::uint32_t units_of_a_limit = 1000;
   static constexpr std::size_t max_waiting = 256;
   static constexpr std::size_t read_at_once = 64;
 
@@ -287,10 +281,9 @@ class SketchSearch {
   std::vector<ViewId> excluded_;                                // ascending
   std::vector<std::pair<std::uint32_t, std::uint32_t>> order_;  // least bound of a sample, number
   std::vector<ViewId> compared_;                                // in full, ascending
-  std::uint32_t unit_ = 1;
   SketchSegment::Encoded room_;
   AlignedVector<std::uint8_t> tables_;
-  std::vector<std::uint16_t> bounds_;
+  AlignedVector<std::uint8_t> bounds_;
   std::vector<std::uint32_t> indices_, level_bounds_;
   SearchResult result_;
 };

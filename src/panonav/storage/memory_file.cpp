@@ -51,6 +51,15 @@ void require_view(const NewView& view, SignatureShape shape) {
 
 }  // namespace
 
+const ViewRow& MemoryTables::checked(const ViewRow& row, SignatureShape shape,
+                                     RecordBytes& scratch) const {
+  if (row.signature.size() != 2 * shape.size() ||
+      row.checksum != view_checksum(scratch, row.id, row.info, row.signature)) {
+    fail_damaged("view " + std::to_string(row.id.value) + " does not match its checksum");
+  }
+  return row;
+}
+
 void MemoryTables::fail_damaged(std::string_view what) const {
   throw FileError(place().string(), "is damaged: " + std::string(what));
 }
@@ -61,11 +70,7 @@ MemoryFile::Implementation::Implementation(std::filesystem::path address_,
     : address(std::move(address_)), tables(std::move(tables_)), header(std::move(header_)) {}
 
 const ViewRow& MemoryFile::Implementation::checked(const ViewRow& row) {
-  if (row.signature.size() != 2 * header.shape.size() ||
-      row.checksum != view_checksum(scratch, row.id, row.info, row.signature)) {
-    tables->fail_damaged("view " + std::to_string(row.id.value) + " does not match its checksum");
-  }
-  return row;
+  return tables->checked(row, header.shape, scratch);
 }
 
 void MemoryFile::Implementation::append_row(const ViewRow& row, VisualMemory& memory) {
@@ -323,7 +328,11 @@ std::vector<ViewId> MemoryFile::views() const {
 }
 
 std::vector<ViewId> MemoryFile::views_within(const PositionBounds& bounds) const {
-  return implementation_->tables->views_within(bounds);
+  std::vector<ViewId> views;
+  for (const PositionRow& row : implementation_->tables->views_within(bounds)) {
+    views.push_back(row.id);
+  }
+  return views;
 }
 
 std::vector<Link> MemoryFile::links() const {

@@ -23,8 +23,10 @@ struct DistanceBody {
   static void sketch_bounds_at(const uint8_t* sketches, const int32_t* slacks,
                                const uint32_t* indices, size_t count, const SketchQuery& query,
                                uint32_t* bounds);
+  static void cell_tables(const int32_t* low, const int32_t* high, const int32_t* sums,
+                          const float* factors, size_t dimensions, uint8_t* tables);
   static size_t cell_bounds(const uint8_t* codes, size_t blocks, const CellQuery& query,
-                            uint16_t* bounds, uint32_t* indices);
+                            uint8_t* bounds, uint32_t* indices);
   static size_t collect_at_most(const uint32_t* values, size_t count, uint32_t limit,
                                 uint32_t* indices);
 };

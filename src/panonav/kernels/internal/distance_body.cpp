@@ -126,7 +126,7 @@ void DistanceBody<set>::sketch_bounds_at(const uint8_t* sketches, const int32_t*
                                          const SketchQuery& query, uint32_t* bounds) {
   using Vector = ByteVector<set>;
   using Register = typename Vector::Register;
-  constexpr size_t ahead = 8;
+  constexpr size_t ahead = 24;
   for (size_t i = 0; i < count; ++i) {
     if (i + ahead < count) {
       const uint8_t* const next = sketches + indices[i + ahead] * query.stored_groups * 8;
@@ -147,50 +147,60 @@ void DistanceBody<set>::sketch_bounds_at(const uint8_t* sketches, const int32_t*
 }
 
 template <Instructions set>
+void DistanceBody<set>::cell_tables(const int32_t* low, const int32_t* high, const int32_t* sums,
+                                    const float* factors, size_t dimensions, uint8_t* tables) {
+  for (size_t d = 0; d < dimensions; ++d) {
+    const int32_t sum = sums[d];
+    const float factor = factors[d];
+    for (size_t i = 16 * d; i < 16 * d + 16; ++i) {
+      const int32_t below = low[i] - sum;
+      const int32_t above = sum - high[i];
+      int32_t outside = below > above ? below : above;
+      outside = outside > 0 ? outside : 0;
+      const float units = static_cast<float>(outside) * factor;
+      tables[i] = static_cast<uint8_t>(static_cast<int32_t>(units < 255.0F ? units : 255.0F));
+    }
+  }
+}
+
+template <Instructions set>
 size_t DistanceBody<set>::cell_bounds(const uint8_t* codes, size_t blocks, const CellQuery& query,
-                                      uint16_t* bounds, uint32_t* indices) {
-  constexpr size_t half = cell_block / 2;
+                                      uint8_t* bounds, uint32_t* indices) {
   size_t found = 0;
   for (size_t block = 0; block < blocks; ++block) {
+    const auto first = static_cast<uint32_t>(block * cell_block);
     if constexpr (set == Instructions::scalar) {
       uint16_t sums[cell_block] = {};
       for (size_t pair = 0; pair < query.pairs; ++pair) {
         const uint8_t* const tables = query.tables + pair * 32;
         const uint8_t* const row = codes + pair * cell_block;
         for (size_t i = 0; i < cell_block; ++i) {
-          const int sum = tables[row[i] & 15] + tables[16 + (row[i] >> 4)];
-          sums[i] = static_cast<uint16_t>(sums[i] + (sum < 255 ? sum : 255));
+          const int sum = sums[i] + tables[row[i] & 15] + tables[16 + (row[i] >> 4)];
+          sums[i] = static_cast<uint16_t>(sum < 255 ? sum : 255);
         }
       }
-      for (size_t i = 0; i < cell_block; ++i) bounds[i] = sums[cell_place(i)];
       for (size_t i = 0; i < cell_block; ++i) {
-        indices[found] = static_cast<uint32_t>(block * cell_block + i);
+        bounds[i] = static_cast<uint8_t>(sums[i]);
+        indices[found] = first + static_cast<uint32_t>(i);
         found += bounds[i] <= query.limit ? 1 : 0;
       }
     } else {
       using Vector = ByteVector<set>;
       using Register = typename Vector::Register;
-      typedef uint16_t Words __attribute__((vector_size(sizeof(Register))));
       for (size_t at = 0; at < cell_block; at += sizeof(Register)) {
-        Words even{};
-        Words odd{};
+        Register sums{};
         for (size_t pair = 0; pair < query.pairs; ++pair) {
           const uint8_t* const tables = query.tables + pair * 32;
           const Register row = Vector::load(codes + pair * cell_block + at);
-          const Register sum = Vector::add_saturated(Vector::lookup(tables, row),
-                                                     Vector::lookup_upper(tables + 16, row));
-          const Words words = reinterpret_cast<Words>(sum);
-          even += words & 255;
-          odd += words >> 8;
+          sums = Vector::add_saturated(sums, Vector::lookup(tables, row));
+          sums = Vector::add_saturated(sums, Vector::lookup_upper(tables + 16, row));
         }
-        __builtin_memcpy(bounds + at / 2, &even, sizeof even);
-        __builtin_memcpy(bounds + half + at / 2, &odd, sizeof odd);
-      }
-      const auto limit = static_cast<uint16_t>(query.limit < 65535 ? query.limit : 65535);
-      for (size_t i = 0; i < cell_block; i += half) {
-        const auto first = static_cast<uint32_t>(block * cell_block + i);
-        const uint32_t bits = Vector::at_most(bounds + i, limit);
-        if (bits != 0) found += write_set_bits(bits, first, indices + found);
+        __builtin_memcpy(bounds + at, &sums, sizeof sums);
+        uint64_t bits = Vector::at_most(sums, query.limit);
+        for (; bits != 0; bits &= bits - 1) {
+          indices[found++] = first + static_cast<uint32_t>(at) +
+                             static_cast<uint32_t>(__builtin_ctzll(bits));
+        }
       }
     }
     codes += query.pairs * cell_block;

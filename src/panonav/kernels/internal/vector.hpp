@@ -43,7 +43,7 @@ constexpr int lanes_of = set == Instructions::avx512 ? 16
 ///   lookup(table, bytes), lookup_upper(table, bytes)    of each byte the entry of a table of 16
 ///                          bytes at its lower, its upper four bits
 ///   add_saturated(a, b)    of each byte the sum, at most 255
-///   at_most(values, limit) bit i: the i-th of 32 numbers of 16 bits is at most the limit
+///   at_most(a, limit)      bit i: byte i is at most the limit
 ///   collect(values, limit, first, to)    of sizeof(Register) / 4 values those <= limit: writes
 ///                          first + position, may write as many as there are values; their number
 template <Instructions set>
@@ -138,16 +138,9 @@ struct ByteVector<Instructions::avx2> {
     return lookup(table, _mm256_srli_epi16(bytes, 4));
   }
   static Register add_saturated(Register a, Register b) { return _mm256_adds_epu8(a, b); }
-  static uint32_t at_most(const uint16_t* values, uint16_t limit) {
-    const Register top = _mm256_set1_epi16(static_cast<short>(limit));
-    const auto low = [&](const uint16_t* from) {
-      const Register x = load(from);
-      return _mm256_cmpeq_epi16(_mm256_min_epu16(x, top), x);
-    };
-    // Packing works within halves of the register; the permutation puts the quarters in order.
-    const Register packed =
-        _mm256_permute4x64_epi64(_mm256_packs_epi16(low(values), low(values + 16)), 0xd8);
-    return static_cast<uint32_t>(_mm256_movemask_epi8(packed));
+  static uint64_t at_most(Register a, uint8_t limit) {
+    const Register top = _mm256_set1_epi8(static_cast<char>(limit));
+    return static_cast<uint32_t>(_mm256_movemask_epi8(_mm256_cmpeq_epi8(_mm256_min_epu8(a, top), a)));
   }
   static constexpr int halved = 32;
   static void halve(const uint8_t* upper, const uint8_t* lower, uint8_t* to) {
@@ -219,8 +212,8 @@ struct ByteVector<Instructions::avx512> {
     return lookup(table, _mm512_srli_epi16(bytes, 4));
   }
   static Register add_saturated(Register a, Register b) { return _mm512_adds_epu8(a, b); }
-  static uint32_t at_most(const uint16_t* values, uint16_t limit) {
-    return _mm512_cmple_epu16_mask(load(values), _mm512_set1_epi16(static_cast<short>(limit)));
+  static uint64_t at_most(Register a, uint8_t limit) {
+    return _mm512_cmple_epu8_mask(a, _mm512_set1_epi8(static_cast<char>(limit)));
   }
   static constexpr int halved = 32;
   static void halve(const uint8_t* upper, const uint8_t* lower, uint8_t* to) {
@@ -276,14 +269,11 @@ struct ByteVector<Instructions::neon> {
   static Register add_saturated(Register a, Register b) {
     return vreinterpretq_u64_u8(vqaddq_u8(bytes(a), bytes(b)));
   }
-  static uint32_t at_most(const uint16_t* values, uint16_t limit) {
-    const uint16x8_t bit = {1, 2, 4, 8, 16, 32, 64, 128};
-    uint32_t bits = 0;
-    for (int i = 0; i < 4; ++i) {
-      const uint16x8_t low = vcleq_u16(vld1q_u16(values + 8 * i), vdupq_n_u16(limit));
-      bits |= static_cast<uint32_t>(vaddvq_u16(vandq_u16(low, bit))) << (8 * i);
-    }
-    return bits;
+  static uint64_t at_most(Register a, uint8_t limit) {
+    const uint8x16_t bit = {1, 2, 4, 8, 16, 32, 64, 128, 1, 2, 4, 8, 16, 32, 64, 128};
+    const uint8x16_t low = vandq_u8(vcleq_u8(bytes(a), vdupq_n_u8(limit)), bit);
+    return vaddv_u8(vget_low_u8(low)) |
+           static_cast<uint64_t>(vaddv_u8(vget_high_u8(low))) << 8U;
   }
   static constexpr int halved = 8;
   static void halve(const uint8_t* upper, const uint8_t* lower, uint8_t* to) {

@@ -12,7 +12,6 @@ namespace {
 
 constexpr std::size_t codes_of_a_cell = 16;
 constexpr std::size_t sums_of_a_step = 8;  // that share a step
-constexpr std::size_t max_cells = 256;     // of which the kernel adds up bounds
 
 std::size_t rounded_up(std::size_t count, std::size_t multiple) {
   return (count + multiple - 1) / multiple * multiple;
@@ -39,8 +38,7 @@ SegmentLayout::SegmentLayout(SignatureShape shape) : shape_(shape) {
   for (int level = 0; level < levels; ++level) {
     std::size_t sums = 0;
     for (int k = 0; k < shape.components; ++k) {
-      int blocks = std::min(most, blocks_of(level, k, shape.components));
-      if (level == 0 && sums + static_cast<std::size_t>(blocks) > max_cells) blocks = 0;
+      const int blocks = std::min(most, blocks_of(level, k, shape.components));
       blocks_[level].push_back(blocks);
       sums += static_cast<std::size_t>(blocks);
     }
@@ -64,7 +62,6 @@ void SegmentLayout::sum_blocks(const std::uint8_t* magnitudes, std::int32_t* sum
     }
     for (int level = 1; level >= 0; --level) {
       const int blocks = blocks_[level][k];
-      if (blocks == 0) continue;
       const int joined = blocks_[level + 1][k] / blocks;
       for (int block = 0; block < blocks; ++block) {
         const std::int32_t* const from = at[level + 1] + block * joined;
@@ -174,7 +171,7 @@ void SketchSegment::make_cells(const SegmentLayout& layout, const std::vector<st
     const std::int32_t* const of_row = sums.data() + row * layout.total();
     std::uint8_t* const block =
         codes_.data() + row / kernels::cell_block * kernels::cell_block * (cells / 2);
-    const std::size_t place = kernels::cell_place(row % kernels::cell_block);
+    const std::size_t place = row % kernels::cell_block;
     for (std::size_t d = 0; d < cells; ++d) {
       const std::uint8_t code = code_of_bin[bin(d, of_row[d])];
       std::int32_t& smallest = cell_low_[d * codes_of_a_cell + code];
@@ -239,29 +236,32 @@ void SketchSegment::make_level(const SegmentLayout& layout, int level,
   }
 }
 
-void SketchSegment::make_tables(const SegmentLayout& layout, const SegmentQuery& query,
-                                std::uint32_t unit, std::span<std::uint8_t> tables) const {
+void SegmentQuery::choose_unit(const SegmentLayout& layout, std::uint32_t largest) {
+  constexpr std::uint32_t most = 254;
+  unit = largest / most + 1;
   // A little less than the inverse, so that no rounding makes an entry too large.
   const float inverse = (1.0F - 1e-6F) / static_cast<float>(unit);
-  for (std::size_t d = 0; d < layout.dimensions(0); ++d) {
-    const float counted = static_cast<float>(query.counted[d]) * inverse;
-    const std::int32_t sum = query.sums[d];
-    for (std::size_t i = d * codes_of_a_cell; i < (d + 1) * codes_of_a_cell; ++i) {
-      const std::int32_t outside =
-          std::max(std::max(cell_low_[i] - sum, sum - cell_high_[i]), std::int32_t{0});
-      const float units = std::min(static_cast<float>(outside) * counted, 255.0F);
-      tables[i] = static_cast<std::uint8_t>(static_cast<std::int32_t>(units));
-    }
+  factors.resize(layout.dimensions(0));
+  for (std::size_t d = 0; d < factors.size(); ++d) {
+    factors[d] = static_cast<float>(counted[d]) * inverse;
   }
 }
 
+void SketchSegment::make_tables(const SegmentLayout& layout,
+                                const kernels::DistanceKernels& kernels, const SegmentQuery& query,
+                                std::span<std::uint8_t> tables) const {
+  kernels.cell_tables(cell_low_.data(), cell_high_.data(), query.sums.data(), query.factors.data(),
+                      layout.dimensions(0), tables.data());
+}
+
 std::span<const std::uint32_t> SketchSegment::cell_bounds(
-    const SegmentLayout& layout, const kernels::DistanceKernels& kernels,
+    const SegmentLayout& layout, const kernels::DistanceKernels& kernels, const SegmentQuery& query,
     std::span<const std::uint8_t> tables, std::uint32_t limit, std::size_t first, std::size_t count,
-    std::span<std::uint16_t> bounds, std::span<std::uint32_t> indices) const {
+    std::span<std::uint8_t> bounds, std::span<std::uint32_t> indices) const {
   const std::size_t pairs = layout.dimensions(0) / 2;
+  const auto units = static_cast<std::uint8_t>(std::min(limit / query.unit, 255U));
   return indices.first(kernels.cell_bounds(codes_.data() + first * kernels::cell_block * pairs,
-                                           count, {tables.data(), pairs, limit}, bounds.data(),
+                                           count, {tables.data(), pairs, units}, bounds.data(),
                                            indices.data()));
 }
 

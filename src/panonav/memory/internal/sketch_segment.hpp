@@ -56,6 +56,11 @@ class SegmentLayout {
 struct SegmentQuery {
   std::vector<std::int32_t> sums;     ///< of the query, as `SegmentLayout::sum_blocks` gives them
   std::vector<std::int32_t> counted;  ///< 1 or 0 each
+  std::vector<float> factors;         ///< of the cells: `counted` over `unit`
+  std::uint32_t unit = 1;             ///< of bounds by cells
+
+  /// Bounds up to `largest` are told apart.
+  void choose_unit(const SegmentLayout& layout, std::uint32_t largest);
 };
 
 /// Sketches of up to `SegmentLayout::max_rows` views. Nothing changes once it is made.
@@ -74,16 +79,17 @@ class SketchSegment {
   /// Of the sketches, with room for rows that there are not.
   [[nodiscard]] std::uint64_t bytes() const noexcept;
 
-  /// What each code adds to the bounds, in whole `unit`s, rounded down.
-  void make_tables(const SegmentLayout& layout, const SegmentQuery& query, std::uint32_t unit,
-                   std::span<std::uint8_t> tables) const;
-  /// Bounds in units of the rows of blocks first .. first + count - 1; indices of those at most
-  /// `limit`, counted from the first block on, which are returned.
+  /// What each code adds to the bounds, in whole units, rounded down.
+  void make_tables(const SegmentLayout& layout, const kernels::DistanceKernels& kernels,
+                   const SegmentQuery& query, std::span<std::uint8_t> tables) const;
+  /// Bounds in units, 255 for all beyond, of the rows of blocks first .. first + count - 1; indices
+  /// of those that may be at most `limit`, counted from the first block on, are returned.
   std::span<const std::uint32_t> cell_bounds(const SegmentLayout& layout,
                                              const kernels::DistanceKernels& kernels,
+                                             const SegmentQuery& query,
                                              std::span<const std::uint8_t> tables,
                                              std::uint32_t limit, std::size_t first,
-                                             std::size_t count, std::span<std::uint16_t> bounds,
+                                             std::size_t count, std::span<std::uint8_t> bounds,
                                              std::span<std::uint32_t> indices) const;
 
   /// Room for a query in the codes of a segment.

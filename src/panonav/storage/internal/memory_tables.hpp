@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "panonav/storage/checksum.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "panonav/storage/memory_header.hpp"
 
@@ -23,6 +24,19 @@ struct ViewRow {
   ReferenceInfo info;
   std::span<const std::uint8_t> signature;
   std::int64_t checksum = 0;
+};
+
+/// What a sketch is made of: no checksum covers it alone.
+struct MagnitudesRow {
+  ViewId id;
+  std::optional<Point2> position;
+  std::span<const std::uint8_t> magnitudes;  ///< valid until the next row is read
+};
+
+/// Where a view was taken.
+struct PositionRow {
+  ViewId id;
+  ReferencePose pose;
 };
 
 struct LinkRow {
@@ -85,6 +99,8 @@ class MemoryTables {
   /// What messages of damage call the memory.
   [[nodiscard]] virtual const std::filesystem::path& place() const noexcept = 0;
   [[noreturn]] void fail_damaged(std::string_view what) const;
+  /// The row itself. Throws FileError when it does not match its checksum.
+  const ViewRow& checked(const ViewRow& row, SignatureShape shape, RecordBytes& scratch) const;
   [[nodiscard]] virtual std::unique_ptr<Transaction> transaction(Kind kind) = 0;
 
   /// Every checksum is checked.
@@ -107,13 +123,18 @@ class MemoryTables {
   virtual void read_views(const Take<ViewRow>& take) = 0;
   /// These, in this order. Throws as `refuse_view`.
   virtual void read_views(std::span<const ViewId> views, const Take<ViewRow>& take) = 0;
+  /// Those of them that are there, in any order.
+  virtual void read_views_there(std::span<const ViewId> views, const Take<ViewRow>& take) = 0;
+  /// Those with ids first .. last, ascending; of each signature the first `bytes`.
+  virtual void read_magnitudes(ViewId first, ViewId last, std::size_t bytes,
+                               const Take<MagnitudesRow>& take) = 0;
   [[nodiscard]] virtual std::optional<ViewId> find(std::string_view name) = 0;
   /// By ascending id.
   [[nodiscard]] virtual std::vector<std::string> names() = 0;
   /// Ascending.
   [[nodiscard]] virtual std::vector<ViewId> views() = 0;
   /// Ascending.
-  [[nodiscard]] virtual std::vector<ViewId> views_within(const PositionBounds& bounds) = 0;
+  [[nodiscard]] virtual std::vector<PositionRow> views_within(const PositionBounds& bounds) = 0;
   /// Ascending.
   [[nodiscard]] virtual std::vector<ViewId> views_with(BesideViews table) = 0;
   [[nodiscard]] virtual std::optional<StoredBytes> bytes(BesideViews table, ViewId view) = 0;

@@ -10,6 +10,7 @@
 #include <bit>
 #include <chrono>
 #include <limits>
+#include <utility>
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
@@ -22,12 +23,6 @@ namespace {
 // Numbers of PostgreSQL's own types, which never change.
 constexpr unsigned bytea_type = 17, int8_type = 20, text_type = 25, float8_type = 701,
                    int8_array_type = 1016, text_array_type = 1009;
-
-std::uint64_t big_endian_word(std::string_view bytes) {
-  std::uint64_t word = 0;
-  for (const char c : bytes) word = (word << 8U) | static_cast<unsigned char>(c);
-  return word;
-}
 
 struct ClearResult {
   void operator()(pg_result* result) const noexcept { PQclear(result); }
@@ -45,6 +40,12 @@ void append_big_endian(std::string& bytes, std::uint64_t value, int size) {
   for (int shift = 8 * (size - 1); shift >= 0; shift -= 8) {
     bytes += static_cast<char>((value >> static_cast<unsigned>(shift)) & 255U);
   }
+}
+
+std::uint64_t big_endian_word(std::string_view bytes) {
+  std::uint64_t word = 0;
+  for (const char c : bytes) word = (word << 8U) | static_cast<unsigned char>(c);
+  return word;
 }
 
 PostgresqlValues::Value& PostgresqlValues::next(unsigned type) {
@@ -338,9 +339,13 @@ PostgresqlRows PostgresqlConnection::run(const std::string& sql, const Postgresq
 
 void PostgresqlConnection::drain() noexcept {
   while (pg_result* rest = PQgetResult(connection_.get())) {
-    const bool copying = PQresultStatus(rest) == PGRES_COPY_IN;
+    const auto status = PQresultStatus(rest);
     PQclear(rest);
-    if (copying) PQputCopyEnd(connection_.get(), "given up");
+    if (status == PGRES_COPY_IN) PQputCopyEnd(connection_.get(), "given up");
+    char* sent = nullptr;
+    while (status == PGRES_COPY_OUT && PQgetCopyData(connection_.get(), &sent, 0) > 0) {
+      PQfreemem(sent);
+    }
     if (PQstatus(connection_.get()) != CONNECTION_OK) return;
   }
 }
@@ -384,6 +389,56 @@ void PostgresqlConnection::copy_in(const std::string& sql, std::string_view byte
   if (PQresultStatus(done.get()) != PGRES_COMMAND_OK) fail(done.get());
 }
 
+void PostgresqlConnection::copy_out(
+    const std::string& sql, int fields,
+    const std::function<void(std::span<const std::optional<std::string_view>>)>& take) {
+  {
+    Result begun(PQexec(connection_.get(), sql.c_str()));
+    if (PQresultStatus(begun.get()) != PGRES_COPY_OUT) fail(begun.get());
+  }
+  struct Free {
+    void operator()(char* bytes) const noexcept { PQfreemem(bytes); }
+  };
+  const auto refuse = [this] { throw FileError(shown_.native(), "sends rows that are cut off"); };
+  std::vector<std::optional<std::string_view>> row(static_cast<std::size_t>(fields));
+  bool begins = true;
+  int size = 0;
+  try {
+    char* sent = nullptr;
+    while ((size = PQgetCopyData(connection_.get(), &sent, 0)) > 0) {
+      const std::unique_ptr<char, Free> kept(sent);
+      std::string_view rest(sent, static_cast<std::size_t>(size));
+      const auto take_bytes = [&](std::size_t count) {
+        if (rest.size() < count) refuse();
+        const std::string_view taken = rest.substr(0, count);
+        rest.remove_prefix(count);
+        return taken;
+      };
+      if (std::exchange(begins, false)) {
+        take_bytes(15);  // "PGCOPY", flags
+        take_bytes(big_endian_word(take_bytes(4)));
+      }
+      while (!rest.empty()) {
+        const std::uint64_t count = big_endian_word(take_bytes(2));
+        if (count == 0xFFFFU) break;  // the end
+        if (count != row.size()) refuse();
+        for (auto& field : row) {
+          const std::uint64_t length = big_endian_word(take_bytes(4));
+          field = length == 0xFFFFFFFFU ? std::nullopt : std::optional(take_bytes(length));
+        }
+        take(row);
+      }
+    }
+  } catch (...) {
+    try_cancel();
+    drain();
+    throw;
+  }
+  Result done(PQgetResult(connection_.get()));
+  drain();
+  if (size != -1 || PQresultStatus(done.get()) != PGRES_COMMAND_OK) fail(done.get());
+}
+
 std::optional<std::string> PostgresqlConnection::wait_for_notification(double seconds) {
   using Clock = std::chrono::steady_clock;
   const auto end = Clock::now() + std::chrono::duration<double>(seconds);
@@ -399,6 +454,14 @@ std::optional<std::string> PostgresqlConnection::wait_for_notification(double se
     pollfd waiting{PQsocket(connection_.get()), POLLIN, 0};
     static_cast<void>(::poll(&waiting, 1, static_cast<int>(std::min(left + 1.0, 1e6))));
   }
+}
+
+void PostgresqlConnection::try_cancel() noexcept {
+  std::array<char, 256> why{};
+  PGcancel* const cancel = PQgetCancel(connection_.get());
+  if (cancel == nullptr) return;
+  PQcancel(cancel, why.data(), static_cast<int>(why.size()));
+  PQfreeCancel(cancel);
 }
 
 void PostgresqlConnection::try_execute(const char* sql) noexcept {

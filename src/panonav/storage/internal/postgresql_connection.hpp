@@ -90,6 +90,9 @@ class PostgresqlConnection {
               const std::function<void(const PostgresqlRows&)>& take);
   /// A COPY ... FROM STDIN with these bytes.
   void copy_in(const std::string& sql, std::string_view bytes);
+  /// A COPY ... TO STDOUT in the binary form: the fields of one row after the other, empty for null.
+  void copy_out(const std::string& sql, int fields,
+                const std::function<void(std::span<const std::optional<std::string_view>>)>& take);
   /// Not within a transaction: waits until the server sends a notification and returns what it
   /// says; empty when none came within the time.
   [[nodiscard]] std::optional<std::string> wait_for_notification(double seconds);
@@ -108,12 +111,16 @@ class PostgresqlConnection {
   [[noreturn]] void fail(const pg_result* result) const;
   [[nodiscard]] std::string message() const;
   void drain() noexcept;
+  /// Asks the server to end the statement that runs.
+  void try_cancel() noexcept;
   std::filesystem::path shown_;
   std::unique_ptr<pg_conn, Close> connection_;
 };
 
 /// Numbers as PostgreSQL sends them: the most significant byte first.
 void append_big_endian(std::string& bytes, std::uint64_t value, int size);
+/// Of up to eight bytes.
+[[nodiscard]] std::uint64_t big_endian_word(std::string_view bytes);
 
 /// Rows in COPY's binary form, for `copy_in`.
 class CopyRows {

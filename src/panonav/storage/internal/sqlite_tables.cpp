@@ -234,6 +234,28 @@ void SqliteTables::read_views(std::span<const ViewId> views, const Take<ViewRow>
   find_view_.reset();
 }
 
+void SqliteTables::read_views_there(std::span<const ViewId> views, const Take<ViewRow>& take) {
+  for (const ViewId view : views) {
+    find_view_.reset();
+    if (find_view_.bind(1, std::int64_t{view.value}).step()) take(view_in(find_view_));
+  }
+  find_view_.reset();
+}
+
+void SqliteTables::read_magnitudes(ViewId first, ViewId last, std::size_t bytes,
+                                   const Take<MagnitudesRow>& take) {
+  Statement rows(database_,
+                 "SELECT id, x_m, y_m, signature FROM views WHERE id BETWEEN ? AND ? ORDER BY id");
+  rows.bind(1, std::int64_t{first.value}).bind(2, std::int64_t{last.value});
+  while (rows.step()) {
+    const auto x_m = optional_real(rows, 1);
+    const auto y_m = optional_real(rows, 2);
+    const auto signature = rows.blob(3);
+    take({id_in(rows, 0), x_m && y_m ? std::optional(Point2{*x_m, *y_m}) : std::nullopt,
+          signature.first(std::min(bytes, signature.size()))});
+  }
+}
+
 std::optional<ViewId> SqliteTables::find(std::string_view name) {
   std::optional<ViewId> found;
   if (find_name_.bind(1, name).step()) found = id_in(find_name_, 0);
@@ -262,14 +284,18 @@ std::vector<ViewId> SqliteTables::views() {
   return views;
 }
 
-std::vector<ViewId> SqliteTables::views_within(const PositionBounds& bounds) {
-  std::vector<ViewId> views;
+std::vector<PositionRow> SqliteTables::views_within(const PositionBounds& bounds) {
+  std::vector<PositionRow> views;
   Statement rows(database_,
-                 "SELECT id FROM views WHERE x_m BETWEEN ? AND ? AND y_m BETWEEN ? AND ? ORDER BY "
-                 "id");
+                 "SELECT id, x_m, y_m, heading_rad FROM views WHERE x_m BETWEEN ? AND ? AND y_m "
+                 "BETWEEN ? AND ? ORDER BY id");
   rows.bind(1, bounds.min_x_m).bind(2, bounds.max_x_m);
   rows.bind(3, bounds.min_y_m).bind(4, bounds.max_y_m);
-  while (rows.step()) views.push_back(id_in(rows, 0));
+  while (rows.step()) {
+    views.push_back({id_in(rows, 0),
+                     {optional_real(rows, 1).value_or(0.0), optional_real(rows, 2).value_or(0.0),
+                      optional_real(rows, 3)}});
+  }
   return views;
 }
 

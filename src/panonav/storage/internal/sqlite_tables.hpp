@@ -31,10 +31,13 @@ class SqliteTables final : public MemoryTables {
   void write_info(ViewId view, const ReferenceInfo& info, std::int64_t checksum) override;
   void read_views(const Take<ViewRow>& take) override;
   void read_views(std::span<const ViewId> views, const Take<ViewRow>& take) override;
+  void read_views_there(std::span<const ViewId> views, const Take<ViewRow>& take) override;
+  void read_magnitudes(ViewId first, ViewId last, std::size_t bytes,
+                       const Take<MagnitudesRow>& take) override;
   [[nodiscard]] std::optional<ViewId> find(std::string_view name) override;
   [[nodiscard]] std::vector<std::string> names() override;
   [[nodiscard]] std::vector<ViewId> views() override;
-  [[nodiscard]] std::vector<ViewId> views_within(const PositionBounds& bounds) override;
+  [[nodiscard]] std::vector<PositionRow> views_within(const PositionBounds& bounds) override;
   [[nodiscard]] std::vector<ViewId> views_with(BesideViews table) override;
   [[nodiscard]] std::optional<StoredBytes> bytes(BesideViews table, ViewId view) override;
 
