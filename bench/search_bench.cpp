@@ -17,6 +17,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/memory/visual_memory.hpp"
+#include "panonav/storage/memory_address.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "panonav/storage/place_search.hpp"
 #include "rivals.hpp"
@@ -99,6 +100,7 @@ NewView view_of(std::size_t number) {
 int fill(const std::string& address, std::size_t views) {
   MemoryHeader header;
   header.shape = ViewSet::shape;
+  if (memory_exists(address)) return 0;
   MemoryFile file = MemoryFile::create(address, header);
   const auto start = Clock::now();
   std::vector<NewView> some;

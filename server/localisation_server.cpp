@@ -23,6 +23,7 @@
 #include "panonav/core/text.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
+#include "panonav/pipeline/searched_recogniser.hpp"
 #include "panonav/storage/memory_address.hpp"
 #include "panonav/storage/memory_changes.hpp"
 #include "panonav/storage/memory_file.hpp"
@@ -125,13 +126,40 @@ class MemoryWatch {
   std::optional<MemoryChanges> changes_;
 };
 
-/// A memory as it was read.
+/// A memory as it was read: held, or searched where it lies.
 struct LoadedMemory {
-  LoadedMemory(const std::filesystem::path& path, const LocaliserOptions& localiser)
-      : file(MemoryFile::open(path, Access::read_only)),
-        recogniser(file, {.localiser = localiser}) {}
+  LoadedMemory(const std::filesystem::path& path_, const LocalisationServerOptions& options)
+      : path(path_), file(MemoryFile::open(path, Access::read_only)) {
+    if (is_server_address(path) && file.views().size() > options.max_held_views) {
+      searched.emplace(path, PlaceRecogniserOptions{.localiser = options.localiser});
+    } else {
+      held.emplace(file, PlaceRecogniserOptions{.localiser = options.localiser});
+    }
+  }
+  [[nodiscard]] std::size_t size() const {
+    return held ? held->memory().size() : searched->size();
+  }
+  [[nodiscard]] Place localise(const Observation& seen) const {
+    return held ? held->localise(seen) : searched->localise(seen);
+  }
+  /// A file that is open, also after its server was away.
+  [[nodiscard]] std::optional<std::vector<std::uint8_t>> thumbnail(const std::string& view) {
+    const auto read = [&]() -> std::optional<std::vector<std::uint8_t>> {
+      const auto id = view.empty() ? std::nullopt : file.find(view);
+      return id ? file.thumbnail(*id) : std::nullopt;
+    };
+    try {
+      return read();
+    } catch (const FileError&) {
+      if (!searched) throw;
+    }
+    file = MemoryFile::open(path, Access::read_only);
+    return read();
+  }
+  std::filesystem::path path;
   MemoryFile file;  // of the thread that speaks HTTP, once it is there
-  PlaceRecogniser recogniser;
+  std::optional<PlaceRecogniser> held;
+  std::optional<SearchedRecogniser> searched;
 };
 
 /// Counts how long something took, as Prometheus wants it.
@@ -214,7 +242,7 @@ struct LocalisationServer::Implementation {
       }
       at->second.memory = memory;
       at->second.watch.emplace(memory.path);
-      at->second.loaded = std::make_shared<LoadedMemory>(memory.path, options.localiser);
+      at->second.loaded = std::make_shared<LoadedMemory>(memory.path, options);
     }
     const auto cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
     server.emplace(HttpServerOptions{.address = options.address,
@@ -351,7 +379,7 @@ struct LocalisationServer::Implementation {
     const auto memory = loaded(name);
     const SignatureShape& shape = memory->file.header().shape;
     return {{"name", name},
-            {"views", memory->recogniser.memory().size()},
+            {"views", memory->size()},
             {"rows", shape.rows},
             {"components", shape.components}};
   }
@@ -359,10 +387,8 @@ struct LocalisationServer::Implementation {
   [[nodiscard]] HttpAnswer thumbnail(const std::string& name, const std::string& view) const {
     const auto memory = loaded(name);
     try {
-      const auto id = view.empty() ? std::nullopt : memory->file.find(view);
-      if (!id) return refusal(404, "the memory has no view of that name");
-      const auto picture = memory->file.thumbnail(*id);
-      if (!picture) return refusal(404, "the memory holds no picture of that view");
+      const auto picture = memory->thumbnail(view);
+      if (!picture) return refusal(404, "the memory has no view of that name with a picture");
       const bool jpeg = image_format(*picture, "the picture") == ImageFormat::jpeg;
       return {.type = jpeg ? "image/jpeg" : "image/png",
               .content = std::string(picture->begin(), picture->end())};
@@ -396,8 +422,9 @@ struct LocalisationServer::Implementation {
     text += described("panonav_memory_views", "gauge", "Views of a memory.");
     for (const auto& [name, one] : served) {
       text += "panonav_memory_views{memory=\"" + name + "\"} " +
-              std::to_string(one.loaded->recogniser.memory().size()) + "\n";
+              std::to_string(one.loaded->size()) + "\n";
     }
+    text += search_metrics();
     text += described("panonav_memory_reloads_total", "counter",
                       "Times that a changed memory file was read again, by result.");
     for (const auto& [name, one] : served) {
@@ -408,6 +435,32 @@ struct LocalisationServer::Implementation {
     text += described("process_resident_memory_bytes", "gauge", "Memory that the process holds.") +
             "process_resident_memory_bytes " + std::to_string(resident_bytes()) + "\n";
     return {.type = "text/plain; version=0.0.4; charset=utf-8", .content = std::move(text)};
+  }
+
+  /// Of memories that are searched where they lie.
+  [[nodiscard]] std::string search_metrics() const {
+    const auto of_each = [this](const std::string& name, const std::string& type,
+                                const std::string& help, const auto& value) {
+      std::string lines;
+      for (const auto& [memory, one] : served) {
+        if (!one.loaded->searched) continue;
+        lines += name + "{memory=\"" + memory + "\"} " + value(*one.loaded->searched) + "\n";
+      }
+      return lines.empty() ? lines : described(name, type, help) + lines;
+    };
+    return of_each("panonav_sketch_bytes", "gauge", "Bytes of sketches of a memory.",
+                   [](const SearchedRecogniser& of) { return std::to_string(of.bytes()); }) +
+           of_each("panonav_searches_total", "counter", "Exact searches in a memory on its server.",
+                   [](const SearchedRecogniser& of) {
+                     return std::to_string(of.counters().searches);
+                   }) +
+           of_each("panonav_search_views_read_total", "counter",
+                   "Views that searches read in full.",
+                   [](const SearchedRecogniser& of) {
+                     return std::to_string(of.counters().views_read);
+                   }) +
+           of_each("panonav_search_seconds_total", "counter", "Time that searches took.",
+                   [](const SearchedRecogniser& of) { return to_text(of.counters().seconds); });
   }
 
   // ---- on the threads that answer
@@ -426,7 +479,7 @@ struct LocalisationServer::Implementation {
       const std::shared_ptr<LoadedMemory> memory = served.at(job->memory).loaded;
       lock.unlock();
       bool known = false;
-      HttpAnswer given = localise(*job, memory->recogniser, known);
+      HttpAnswer given = localise(*job, *memory, known);
       lock.lock();
       if (given.status == 200) {
         answering.add(Clock::now() - from);
@@ -441,16 +494,20 @@ struct LocalisationServer::Implementation {
     }
   }
 
-  static HttpAnswer localise(const Job& job, const PlaceRecogniser& recogniser, bool& known) {
+  static HttpAnswer localise(const Job& job, const LoadedMemory& memory, bool& known) {
+    bool decoded = false;
     try {
       const auto* const bytes = reinterpret_cast<const std::uint8_t*>(job.picture.data());
       const Observation seen(
           decode_image(std::span(bytes, job.picture.size()), "the picture", picture_limits));
-      const Place place = recogniser.localise(seen);
+      decoded = true;
+      const Place place = memory.localise(seen);
       known = place.known;
       ordered_json json{{"memory", job.memory}};
       json.update(place_json(place));
       return json_answer(json);
+    } catch (const FileError& error) {  // the picture's, or the memory's server
+      return refusal(decoded ? 503 : 422, error.what());
     } catch (const Error& error) {
       return refusal(422, error.what());
     } catch (const std::exception& error) {
@@ -467,13 +524,22 @@ struct LocalisationServer::Implementation {
       pause = options.look_every;
       for (auto& [name, one] : served) {
         lock.unlock();
-        const bool same = !one.watch->changed();
+        const auto from = Clock::now();
         std::shared_ptr<LoadedMemory> again;
         std::string fault;
-        const auto from = Clock::now();
+        if (const auto searched = loaded(name); searched->searched) {
+          if (refresh(name, *searched->searched, fault)) {
+            lock.lock();
+            ++(fault.empty() ? one.reloads : one.failed_reloads);
+            lock.unlock();
+          }
+          lock.lock();
+          continue;
+        }
+        const bool same = !one.watch->changed();
         if (!same) {
           try {
-            again = std::make_shared<LoadedMemory>(one.memory.path, options.localiser);
+            again = std::make_shared<LoadedMemory>(one.memory.path, options);
           } catch (const std::exception& error) {
             fault = readable_line(error.what());
           }
@@ -483,7 +549,7 @@ struct LocalisationServer::Implementation {
           if (options.note) {
             options.note(name + ": " +
                          (again ? "the memory was changed; " +
-                                      std::to_string(again->recogniser.memory().size()) + " views"
+                                      std::to_string(again->size()) + " views"
                                 : "the memory was changed and cannot be read; the memory stays as "
                                   "it was: " +
                                       fault));
@@ -500,7 +566,28 @@ struct LocalisationServer::Implementation {
     }
   }
 
+  /// Whether the memory was changed, or its server lost; then `fault` says why. A fault is told
+  /// once, until the server is back.
+  bool refresh(const std::string& name, SearchedRecogniser& searched, std::string& fault) {
+    bool changed = false;
+    try {
+      changed = searched.refresh();
+    } catch (const std::exception& error) {
+      fault = readable_line(error.what());
+    }
+    const bool told = !fault.empty() && !lost.insert(name).second;
+    if (fault.empty()) lost.erase(name);
+    if (!changed && (fault.empty() || told)) return false;
+    if (options.note) {
+      options.note(name + ": " +
+                   (changed ? "the memory was changed; " + std::to_string(searched.size()) + " views"
+                            : "the memory cannot be searched: " + fault));
+    }
+    return true;
+  }
+
   const LocalisationServerOptions options;
+  std::set<std::string> lost;  // memories whose server is away; of the watcher
   mutable std::mutex mutex;
   std::condition_variable came;          // a picture, or the end
   std::condition_variable ended;         // for the watcher

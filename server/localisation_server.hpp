@@ -25,6 +25,9 @@ struct LocalisationServerOptions {
   std::size_t max_waiting = 64;       ///< pictures that wait for a thread; further ones get 503
   std::string token;                  ///< that clients must send; empty: none
   LocaliserOptions localiser;
+  /// Memories on a server with more views are not held but searched where they lie
+  /// (`SearchedRecogniser`), with some milliseconds more for each picture.
+  std::size_t max_held_views = 200'000;
   /// How often memory files are looked at for changes.
   std::chrono::milliseconds look_every{1000};
   /// Is told in one line what happens to a memory while it is served; called on another thread.
@@ -35,7 +38,8 @@ struct LocalisationServerOptions {
 /// in, JSON out, as `PlaceRecogniser` answers, to the bit. Pictures wait in a bounded queue; a
 /// picture has at most 16 MiB and 33,554,432 pixels, and those that wait have 128 MiB together. A
 /// memory whose file was changed is read again while the old one answers, and stays as it was where
-/// the file cannot be read any more. Holds every memory; one thread speaks HTTP, one reads memories
+/// the file cannot be read any more. Holds every memory but those of more than `max_held_views` views
+/// on a server, whose pictures get 503 while it is away; one thread speaks HTTP, one reads memories
 /// again.
 ///
 /// Without a token, a page of another origin gets nothing, nor one that reached this machine by a

@@ -47,7 +47,8 @@ struct Sketched {
   }
   void expect_exact(const PackedSignature& query, int top, int components,
                     const SearchMask& mask) const {
-    const SearchResult found = sketches.search(query, {top, components}, mask, read());
+    Executor executor(1 + top % 3);
+    const SearchResult found = sketches.search(query, {top, components}, mask, read(), executor);
     const int compared = components == 0 ? oracle.shape.components : components;
     EXPECT_EQ(found.matches, oracle.nearest(query, top, compared, mask))
         << "top " << top << ", components " << components;
@@ -96,12 +97,12 @@ TEST_P(SketchedSearch, FindsWhatAFullScanFinds) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Shapes, SketchedSearch,
-                         ::testing::Values(SketchedCase{{80, 15}, Kind::clustered, 15000},
+                         ::testing::Values(SketchedCase{{80, 15}, Kind::clustered, 7000},
                                            SketchedCase{{80, 15}, Kind::random, 3000},
-                                           SketchedCase{{80, 15}, Kind::repeated, 14000},
+                                           SketchedCase{{80, 15}, Kind::repeated, 7000},
                                            SketchedCase{{80, 15}, Kind::dark, 3000},
                                            SketchedCase{{20, 15}, Kind::clustered, 9000},
-                                           SketchedCase{{1, 6}, Kind::clustered, 9000},
+                                           SketchedCase{{1, 6}, Kind::clustered, 140000},
                                            SketchedCase{{1, 1}, Kind::random, 2000},
                                            SketchedCase{{7, 3}, Kind::repeated, 700},
                                            SketchedCase{{3, 200}, Kind::clustered, 2000},
@@ -114,18 +115,19 @@ INSTANTIATE_TEST_SUITE_P(Shapes, SketchedSearch,
 
 TEST(ViewSketches, AlmostAllViewsAreRuledOutAndFewStatementsAreAsked) {
   Sketched all({80, 15}, Kind::clustered, 41);
-  all.insert(30000);
+  all.insert(7000);
   all.statements = 0;
   std::uint64_t in_full = 0;
+  Executor executor;
   for (int i = 0; i < 20; ++i) {
     const PackedSignature query = all.maker.next();
-    const SearchResult found = all.sketches.search(query, {10, 0}, {}, all.read());
+    const SearchResult found = all.sketches.search(query, {10, 0}, {}, all.read(), executor);
     in_full += found.views_in_full;
     EXPECT_LT(found.bytes_read, found.bytes_in_full / 20);
   }
   EXPECT_LT(in_full, 20U * 300);
   EXPECT_LE(all.statements, 20U * 6);
-  EXPECT_LT(all.sketches.bytes(), 30000U * 600);
+  EXPECT_LT(all.sketches.bytes(), 7000U * 1700);
 }
 
 TEST(ViewSketches, AnEmptyOneFindsNothing) {
@@ -199,11 +201,12 @@ TEST(ViewSketches, RefuseWhatDoesNotFit) {
   const PackedSignature query = all.maker.next();
   const std::vector<std::uint8_t> rows(79, 1);
   const auto read = all.read();
-  EXPECT_THROW((void)all.sketches.search(query, {0, 0}, {}, read), ContractError);
-  EXPECT_THROW((void)all.sketches.search(query, {1, 16}, {}, read), ContractError);
-  EXPECT_THROW((void)all.sketches.search(query, {1, 0}, {{}, rows}, read), ContractError);
+  Executor executor;
+  EXPECT_THROW((void)all.sketches.search(query, {0, 0}, {}, read, executor), ContractError);
+  EXPECT_THROW((void)all.sketches.search(query, {1, 16}, {}, read, executor), ContractError);
+  EXPECT_THROW((void)all.sketches.search(query, {1, 0}, {{}, rows}, read, executor), ContractError);
   EXPECT_THROW(
-      (void)all.sketches.search(ViewMaker({20, 15}, Kind::random, 1).next(), {1, 0}, {}, read),
+      (void)all.sketches.search(ViewMaker({20, 15}, Kind::random, 1).next(), {1, 0}, {}, read, executor),
       ContractError);
   EXPECT_THROW(all.sketches.insert(std::vector{ViewId{99}}, std::vector<std::uint8_t>(1199)),
                ContractError);
@@ -211,7 +214,8 @@ TEST(ViewSketches, RefuseWhatDoesNotFit) {
                    query, {1, 0}, {},
                    [](std::span<const ViewId> views, const ViewSketches::TakeView& take) {
                      take(views.front(), {});
-                   }),
+                   },
+                   executor),
                ContractError);
 }
 

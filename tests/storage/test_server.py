@@ -13,13 +13,14 @@ import subprocess
 import sys
 import tempfile
 import time
+import urllib.error
 import urllib.request
 
 PANONAV, TEST_STORAGE, SERVER = sys.argv[1:4]
 SHARED = ("MemoryFileContent.HeadersComeBack:MemoryFileContent.ContentComesBack:MemoryFileContent.IdsAre*:"
           "MemoryFileContent.Para*:MemoryFileContent.ABad*:MemoryFileContent.Readers*:MemoryFileContent.TwoW*:"
           "MapTables.*:RouteTables.W*:RouteTables.B*:MemoryFileUndo.*:"
-          "ViewsOfAMemoryFile.AreThose*:ViewsOfAMemoryFile.See*:MemoryOnServer.*:SynchronisedMemory.*"
+          "ViewsOfAMemoryFile.AreThose*:ViewsOfAMemoryFile.See*:MemoryOnServer.*:SynchronisedMemory.*:PlaceSearch.*"
           # What attacks a file, and how many changes a file keeps for undo: a server keeps the last one.
           "-*Tampered*:MemoryFileUndo.Damage*:MemoryFileUndo.BringsBackAll*:MemoryFileUndo.History*")
 
@@ -152,6 +153,79 @@ def served(server, folder):
     finally:
         serving.send_signal(signal.SIGINT)
         serving.wait(timeout=60)
+
+
+class Serving:
+    """`serve` of one memory in a process of its own."""
+    def __init__(self, memory, *words):
+        self.process = subprocess.Popen([PANONAV, "serve", f"m={memory}", "--listen", "0", "--json", *words],
+                                        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        self.url = json.loads(self.process.stdout.readline())["url"].rstrip("/")
+
+    def get(self, path, body=None):
+        try:
+            with urllib.request.urlopen(urllib.request.Request(self.url + path, body), timeout=60) as answer:
+                return answer.status, answer.read().decode()
+        except urllib.error.HTTPError as error:
+            return error.code, error.read().decode()
+
+    def localise(self, picture):
+        status, answer = self.get("/v1/memories/m/localise", picture.read_bytes())
+        return status, re.sub(r'"bytes_read":\d+', "", answer)
+
+    def end(self):
+        self.process.send_signal(signal.SIGINT)
+        assert self.process.wait(timeout=60) == 0
+
+
+def searched(server, folder):
+    """Two processes that search a memory on the server where it lies answer as one that holds it, to the last digit,
+    also while others change it and once the server was away."""
+    memory = server.memory("searched")
+    run(PANONAV, "memorise", folder / "grid", memory)
+    pictures = sorted((folder / "drive").glob("*.png"))[::6] + sorted((folder / "grid").glob("*.png"))[:2]
+    assert len(pictures) >= 5
+    serving = [Serving(memory, "--max-held-views", "0"), Serving(memory, "--max-held-views", "0")]
+    try:
+        def same(views):
+            holding = Serving(memory)
+            try:
+                for one in serving:
+                    for _ in range(600):
+                        if f'"views":{views},' in one.get("/v1/memories")[1]:
+                            break
+                        time.sleep(0.05)
+                    assert f'"views":{views},' in one.get("/v1/memories")[1], (views, one.get("/v1/memories"))
+                for picture in pictures:
+                    held = holding.localise(picture)
+                    assert held[0] == 200 and '"matches":[{' in held[1], held
+                    for one in serving:
+                        assert one.localise(picture) == held, (picture, one.localise(picture), held)
+                assert "panonav_sketch_bytes" not in holding.get("/metrics")[1]
+            finally:
+                holding.end()
+        count = lambda: int(json.loads(run(PANONAV, "info", memory, "--json"))["views"])
+        before = count()
+        same(before)
+        run(PANONAV, "forget", memory, "view_00001.png", "view_00004.png")
+        same(before - 2)
+        run(PANONAV, "undo", memory)
+        same(before)
+        run(PANONAV, "memorise", folder / "drive", memory)
+        same(count())
+        metrics = serving[0].get("/metrics")[1]
+        for name, least in (("panonav_sketch_bytes", 1000), ("panonav_searches_total", len(pictures)),
+                            ("panonav_search_views_read_total", len(pictures)), ("panonav_memory_views", before)):
+            assert float(re.search(name + r'\{memory="m"\} (\S+)', metrics)[1]) >= least, metrics
+        assert float(re.search(r'panonav_search_seconds_total\{memory="m"\} (\S+)', metrics)[1]) > 0.0
+        server.stop()
+        status, answer = serving[0].localise(pictures[0])
+        assert status == 503 and len(answer.strip().splitlines()) == 1 and "error" in answer, (status, answer)
+        server.start()
+        same(count())
+    finally:
+        for one in serving:
+            one.end()
 
 
 def roles(server, folder):
@@ -458,6 +532,8 @@ def main():
             print("copies")
             served(server, folder)
             print("served")
+            searched(server, folder)
+            print("searched")
             roles(server, folder)
             print("roles")
             synchronised(server, folder)

@@ -26,6 +26,7 @@ struct ServeArguments {
   std::string listen = "8080";
   std::optional<std::string> token_file;
   int max_waiting = 64;
+  int max_held_views = 200000;
   LocaliserOptions localiser;
 };
 
@@ -71,6 +72,7 @@ ExitCode serve(const ServeArguments& wanted, Session& session) {
   options.port = place.port;
   options.threads = session.executor().threads();
   options.max_waiting = static_cast<std::size_t>(wanted.max_waiting);
+  options.max_held_views = static_cast<std::size_t>(wanted.max_held_views);
   if (wanted.token_file) options.token = read_token(*wanted.token_file);
   options.localiser = wanted.localiser;
   options.note = [&](const std::string& line) {
@@ -107,6 +109,9 @@ Run declare_serve(Arguments& arguments) {
   arguments.option("--max-waiting", wanted->max_waiting, 1,
                    "Pictures that may wait for a thread; clients of further ones are told to try "
                    "again");
+  arguments.option("--max-held-views", wanted->max_held_views, 0,
+                   "Memories on a server with more views are not held: 350 bytes a view instead of "
+                   "2700, and some milliseconds more for each picture");
   arguments.options("localiser", wanted->localiser);
   arguments.common({"--top"});
   return [wanted](Session& session) { return serve(*wanted, session); };

@@ -124,11 +124,31 @@ std::string fingerprint(const VisualMemory& memory) {
   return text.str();
 }
 
+/// Those of other views than the memory's are not taken; null: of whichever views.
+std::optional<LearntModels> read_models(const MemoryFile& file, const VisualMemory* memory) {
+  const auto text = file.parameter(parameter_name);
+  if (!text) return std::nullopt;
+  const Reader reader(*text);
+  if (reader.word() != learning_version) return std::nullopt;
+  const std::string views = reader.word();
+  if (memory != nullptr && views != fingerprint(*memory)) return std::nullopt;
+  LearntModels models;
+  visit_members(models.place, reader);
+  visit_members(models.position, reader);
+  reader(models.spacing_m);
+  reader(models.by_features);
+  bool has_observation = false;
+  reader(has_observation);
+  if (has_observation) visit_members(models.observation.emplace(), reader);
+  if (!reader.ok()) return std::nullopt;
+  return models;
+}
+
 }  // namespace
 
 FeatureSource features_in(const MemoryFile& file) {
   const MemoryHeader& header = file.header();
-  if (!header.elevations || file.info().views_with_features == 0) return {};
+  if (!header.elevations || !file.has_features()) return {};
   return [&file, shape = PanoramaShape{header.shape.rows, header.panorama_columns},
           band = *header.elevations](ViewId view) -> std::optional<LocalFeatures> {
     const auto bytes = file.features(view);
@@ -171,22 +191,11 @@ void keep_models(MemoryFile& file) {
 }
 
 std::optional<LearntModels> kept_models(const MemoryFile& file, const VisualMemory& memory) {
-  const auto text = file.parameter(parameter_name);
-  if (!text) return std::nullopt;
-  const Reader reader(*text);
-  if (reader.word() != learning_version || reader.word() != fingerprint(memory)) {
-    return std::nullopt;
-  }
-  LearntModels models;
-  visit_members(models.place, reader);
-  visit_members(models.position, reader);
-  reader(models.spacing_m);
-  reader(models.by_features);
-  bool has_observation = false;
-  reader(has_observation);
-  if (has_observation) visit_members(models.observation.emplace(), reader);
-  if (!reader.ok()) return std::nullopt;
-  return models;
+  return read_models(file, &memory);
+}
+
+std::optional<LearntModels> kept_models(const MemoryFile& file) {
+  return read_models(file, nullptr);
 }
 
 }  // namespace panonav

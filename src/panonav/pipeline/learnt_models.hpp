@@ -40,5 +40,7 @@ void keep_models(MemoryFile& file);
 /// over the signatures, 40 ms for 100,000 of 20 x 15.
 [[nodiscard]] std::optional<LearntModels> kept_models(const MemoryFile& file,
                                                       const VisualMemory& memory);
+/// The models that were kept last, whichever views the file has now.
+[[nodiscard]] std::optional<LearntModels> kept_models(const MemoryFile& file);
 
 }  // namespace panonav

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/pipeline/internal/asked_view.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
 
 namespace panonav {
@@ -104,22 +105,19 @@ PlaceRecogniser& PlaceRecogniser::operator=(PlaceRecogniser&&) noexcept = defaul
 Place PlaceRecogniser::localise(const Observation& observation,
                                 std::span<const std::string> excluded_names) const {
   const auto& [memory, encoder, localiser, accuracy, areas] = std::as_const(*implementation_);
-  std::optional<Panorama> unwarped;  // where it is needed
-  const auto panorama = [&, &made = encoder]() -> const Panorama& {
-    if (!unwarped) unwarped = made.panorama(observation);
-    return *unwarped;
-  };
-  const PackedSignature query =
-      localiser.ranks_by_features() ? encoder.packed(panorama()) : encoder.packed(observation);
+  AskedView asked(encoder, observation);
+  const PackedSignature query = asked.query(localiser.ranks_by_features());
   std::vector<ViewId> excluded;
   for (const std::string& name : excluded_names) {
     if (const auto view = memory.find(name)) excluded.push_back(*view);
   }
   const SearchMask mask{excluded, {}};
-  const Localisation found =
-      localiser.localise(query, mask, [&, &made = encoder](Handedness handedness) {
-        return made.features(handedness == Handedness::as_seen ? panorama() : mirrored(panorama()));
-      });
+  Place place = place_of(localiser.localise(query, mask, asked.features()), memory);
+  if (accuracy) place.areas = localise_hierarchically(memory, *areas, query, *accuracy, mask);
+  return place;
+}
+
+Place place_of(const Localisation& found, const VisualMemory& memory) {
   Place place{.known_probability = found.known_probability,
               .known = found.known,
               .heading_rad = found.heading_rad,
@@ -135,7 +133,6 @@ Place PlaceRecogniser::localise(const Observation& observation,
     const auto& [position, radius_m, shares] = *found.position;
     place.position = PlacePosition{position.x_m, position.y_m, radius_m};
   }
-  if (accuracy) place.areas = localise_hierarchically(memory, *areas, query, *accuracy, mask);
   return place;
 }
 

@@ -272,6 +272,10 @@ std::optional<std::vector<std::uint8_t>> MemoryFile::thumbnail(ViewId view) cons
   return implementation_->bytes(BesideViews::thumbnails, view);
 }
 
+bool MemoryFile::has_features() const {
+  return implementation_->tables->has_any(BesideViews::features);
+}
+
 std::optional<std::vector<std::uint8_t>> MemoryFile::features(ViewId view) const {
   return implementation_->bytes(BesideViews::features, view);
 }

@@ -178,6 +178,8 @@ class MemoryFile {
   /// The picture file that was stored with the view; empty where there is none.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> thumbnail(ViewId view) const;
 
+  /// Whether any view has local features. Cost: a look-up.
+  [[nodiscard]] bool has_features() const;
   /// The packed local features of the view; empty where there are none.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> features(ViewId view) const;
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <exception>
 #include <map>
@@ -14,6 +15,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/executor.hpp"
 #include "panonav/storage/internal/memory_file_access.hpp"
 #include "panonav/storage/internal/memory_tables.hpp"
 #include "panonav/storage/memory_address.hpp"
@@ -321,6 +323,7 @@ struct PlaceSearch::Implementation {
   mutable std::mutex mutex;  // of `current` and `idle`
   std::shared_ptr<const Sketched> current;
   mutable std::vector<std::unique_ptr<MemoryTables>> idle;
+  mutable std::atomic<int> running = 0;  // searches
 
   std::mutex refreshing;  // of all below
   std::unique_ptr<MemoryTables> own;
@@ -402,6 +405,18 @@ std::size_t PlaceSearch::Snapshot::size() const noexcept {
 SearchResult PlaceSearch::Snapshot::search(const PackedSignature& query,
                                            const SearchOptions& options, const SearchMask& mask) {
   Implementation& own = *implementation_;
+  // A search alone takes all cores; several at a time share them.
+  struct Running {
+    explicit Running(std::atomic<int>& all_) : all(all_), number(++all_) {}
+    ~Running() { --all; }
+    Running(const Running&) = delete;
+    Running& operator=(const Running&) = delete;
+    std::atomic<int>& all;
+    int number;
+  };
+  const Running running(own.search->running);
+  const auto cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  Executor executor(size() < 100000 ? 1 : std::clamp(cores / running.number, 1, 16));
   return own.sketched->sketches.search(
       query, options, mask,
       [&own](std::span<const ViewId> views, const ViewSketches::TakeView& take) {
@@ -414,7 +429,8 @@ SearchResult PlaceSearch::Snapshot::search(const PackedSignature& query,
           const auto found = own.kept.find(view);
           if (found != own.kept.end()) take(view, found->second.signature.magnitudes);
         }
-      });
+      },
+      executor);
 }
 
 VisualMemory PlaceSearch::Snapshot::load(std::span<const ViewId> views) {
@@ -439,6 +455,12 @@ VisualMemory PlaceSearch::Snapshot::load(std::span<const ViewId> views) {
     }
   }
   return memory;
+}
+
+std::optional<ViewId> PlaceSearch::Snapshot::find(std::string_view name) {
+  std::optional<ViewId> found;
+  implementation_->guarded([&] { found = implementation_->tables->find(name); });
+  return found;
 }
 
 std::vector<ViewId> PlaceSearch::Snapshot::views_within(std::span<const PositionBounds> bounds) {

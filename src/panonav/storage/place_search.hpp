@@ -4,7 +4,9 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "panonav/memory/view_sketches.hpp"
@@ -46,13 +48,16 @@ class PlaceSearch {
 
     [[nodiscard]] std::size_t size() const noexcept;  ///< Views that are sketched.
     /// As `VisualMemory::search` over those views that are sketched and that the memory has: one or
-    /// two statements to the server, a few where many views look alike.
+    /// two statements to the server, a few where many views look alike. On all cores while no other
+    /// search of this memory runs.
     [[nodiscard]] SearchResult search(const PackedSignature& query,
                                       const SearchOptions& options = {},
                                       const SearchMask& mask = {});
     /// Those of the views that the memory has, without links, in one statement; what this snapshot
     /// read before is not read again.
     [[nodiscard]] VisualMemory load(std::span<const ViewId> views);
+    /// The view of that name; empty when there is none.
+    [[nodiscard]] std::optional<ViewId> find(std::string_view name);
     /// Views whose positions lie within one of the rectangles, ascending, each once.
     [[nodiscard]] std::vector<ViewId> views_within(std::span<const PositionBounds> bounds);
 

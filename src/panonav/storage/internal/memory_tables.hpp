@@ -137,6 +137,7 @@ class MemoryTables {
   [[nodiscard]] virtual std::vector<PositionRow> views_within(const PositionBounds& bounds) = 0;
   /// Ascending.
   [[nodiscard]] virtual std::vector<ViewId> views_with(BesideViews table) = 0;
+  [[nodiscard]] virtual bool has_any(BesideViews table) = 0;
   [[nodiscard]] virtual std::optional<StoredBytes> bytes(BesideViews table, ViewId view) = 0;
 
   /// With a < b; a pair that is there gets the new kind.

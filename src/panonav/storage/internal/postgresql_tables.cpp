@@ -404,9 +404,16 @@ std::vector<std::string> PostgresqlTables::names() {
 }
 
 std::vector<ViewId> PostgresqlTables::views() {
-  std::vector<ViewId> views;
-  const Rows rows = run("SELECT id FROM panonav.views WHERE memory = $1 ORDER BY id");
-  for (int i = 0; i < rows.size(); ++i) views.push_back(id_in(rows, i, 0));
+  std::vector<ViewId> views;  // by COPY, as they may be many
+  connection_.copy_out("COPY (SELECT id FROM panonav.views WHERE memory = " +
+                           std::to_string(memory_) + " ORDER BY id) TO STDOUT (FORMAT binary)",
+                       1, [&](std::span<const std::optional<std::string_view>> fields) {
+                         const std::uint64_t id = fields[0] ? big_endian_word(*fields[0]) : 0;
+                         if (id < 1 || id > std::uint64_t{UINT32_MAX}) {
+                           fail_damaged("a view id is out of range");
+                         }
+                         views.push_back({static_cast<std::uint32_t>(id)});
+                       });
   return views;
 }
 
@@ -427,6 +434,11 @@ std::vector<PositionRow> PostgresqlTables::views_within(const PositionBounds& bo
                       rows.real(i, 3)}});
   }
   return views;
+}
+
+bool PostgresqlTables::has_any(BesideViews table) {
+  return run("SELECT (EXISTS (SELECT FROM " + table_of(table) + " WHERE memory = $1))::int4::int8")
+             .integer(0, 0) != 0;
 }
 
 std::vector<ViewId> PostgresqlTables::views_with(BesideViews table) {

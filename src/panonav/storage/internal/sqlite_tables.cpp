@@ -299,6 +299,12 @@ std::vector<PositionRow> SqliteTables::views_within(const PositionBounds& bounds
   return views;
 }
 
+bool SqliteTables::has_any(BesideViews table) {
+  if (!has(table)) return false;
+  const std::string sql = "SELECT EXISTS (SELECT 1 FROM " + std::string(name_of(table)) + ")";
+  return database_.integer(sql.c_str()) != 0;
+}
+
 std::vector<ViewId> SqliteTables::views_with(BesideViews table) {
   std::vector<ViewId> views;
   if (!has(table)) return views;

@@ -39,6 +39,7 @@ class SqliteTables final : public MemoryTables {
   [[nodiscard]] std::vector<ViewId> views() override;
   [[nodiscard]] std::vector<PositionRow> views_within(const PositionBounds& bounds) override;
   [[nodiscard]] std::vector<ViewId> views_with(BesideViews table) override;
+  [[nodiscard]] bool has_any(BesideViews table) override;
   [[nodiscard]] std::optional<StoredBytes> bytes(BesideViews table, ViewId view) override;
 
   void write_links(std::span<const Link> links) override;
