@@ -134,9 +134,8 @@ std::vector<Queries> make_queries() {
                              {"another building", {}},
                              {"noise", {}}};
   const ViewSet& set = rendered_views();
-  const ViewSet other =
-      simulated_views(Places::rooms, 6000, 100,
-                      std::filesystem::path(PANONAV_BENCH_CACHE) / "other.bin", 5000);
+  const ViewSet other = simulated_views(
+      Places::rooms, 6000, 100, std::filesystem::path(PANONAV_BENCH_CACHE) / "other.bin", 5000);
   Random random(9);
   const auto bytes_of = [](std::span<const std::uint8_t> from) {
     return std::vector<std::uint8_t>(from.begin(), from.end());
@@ -261,9 +260,9 @@ int ask(const std::string& address, std::size_t views) {
   const double taken_s = seconds_since(start);
   std::cout << "start: " << search.size() << " views in " << fixed(taken_s, 1) << " s; sketches "
             << fixed(1e-9 * double(search.bytes()), 2) << " GB, "
-            << fixed(double(search.bytes()) / double(search.size()), 0) << " bytes a view; resident "
-            << fixed(gigabytes("VmRSS:") - before, 2) << " GB more, at most "
-            << fixed(gigabytes("VmHWM:"), 2) << " GB in all\n";
+            << fixed(double(search.bytes()) / double(search.size()), 0)
+            << " bytes a view; resident " << fixed(gigabytes("VmRSS:") - before, 2)
+            << " GB more, at most " << fixed(gigabytes("VmHWM:"), 2) << " GB in all\n";
   std::vector<const PackedSignature*> sampled;
   std::vector<std::vector<Match>> found;
   for (int round = 0; round < 2; ++round) {
@@ -287,9 +286,8 @@ int ask(const std::string& address, std::size_t views) {
           found.push_back(result.matches);
         }
       }
-      std::cout << "  " << kind.name << ": " << times(ms) << "; processor time "
-                << times(own_ms) << "; "
-                << in_full / kind.all.size() << " views read in full, "
+      std::cout << "  " << kind.name << ": " << times(ms) << "; processor time " << times(own_ms)
+                << "; " << in_full / kind.all.size() << " views read in full, "
                 << fixed(1e-6 * double(bytes) / double(kind.all.size()), 0) << " MB\n";
     }
   }

@@ -136,9 +136,7 @@ struct LoadedMemory {
       held.emplace(file, PlaceRecogniserOptions{.localiser = options.localiser});
     }
   }
-  [[nodiscard]] std::size_t size() const {
-    return held ? held->memory().size() : searched->size();
-  }
+  [[nodiscard]] std::size_t size() const { return held ? held->memory().size() : searched->size(); }
   [[nodiscard]] Place localise(const Observation& seen) const {
     return held ? held->localise(seen) : searched->localise(seen);
   }
@@ -547,12 +545,12 @@ struct LocalisationServer::Implementation {
           pause = std::max(pause, std::chrono::duration_cast<std::chrono::milliseconds>(
                                       10 * (Clock::now() - from)));
           if (options.note) {
-            options.note(name + ": " +
-                         (again ? "the memory was changed; " +
-                                      std::to_string(again->size()) + " views"
-                                : "the memory was changed and cannot be read; the memory stays as "
-                                  "it was: " +
-                                      fault));
+            options.note(
+                name + ": " +
+                (again ? "the memory was changed; " + std::to_string(again->size()) + " views"
+                       : "the memory was changed and cannot be read; the memory stays as "
+                         "it was: " +
+                             fault));
           }
         }
         lock.lock();
@@ -580,8 +578,9 @@ struct LocalisationServer::Implementation {
     if (!changed && (fault.empty() || told)) return false;
     if (options.note) {
       options.note(name + ": " +
-                   (changed ? "the memory was changed; " + std::to_string(searched.size()) + " views"
-                            : "the memory cannot be searched: " + fault));
+                   (changed
+                        ? "the memory was changed; " + std::to_string(searched.size()) + " views"
+                        : "the memory cannot be searched: " + fault));
     }
     return true;
   }

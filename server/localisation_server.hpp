@@ -38,9 +38,9 @@ struct LocalisationServerOptions {
 /// in, JSON out, as `PlaceRecogniser` answers, to the bit. Pictures wait in a bounded queue; a
 /// picture has at most 16 MiB and 33,554,432 pixels, and those that wait have 128 MiB together. A
 /// memory whose file was changed is read again while the old one answers, and stays as it was where
-/// the file cannot be read any more. Holds every memory but those of more than `max_held_views` views
-/// on a server, whose pictures get 503 while it is away; one thread speaks HTTP, one reads memories
-/// again.
+/// the file cannot be read any more. Holds every memory but those of more than `max_held_views`
+/// views on a server, whose pictures get 503 while it is away; one thread speaks HTTP, one reads
+/// memories again.
 ///
 /// Without a token, a page of another origin gets nothing, nor one that reached this machine by a
 /// name that is not "localhost" (DNS rebinding); every program that reaches the port is answered.

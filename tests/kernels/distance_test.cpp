@@ -135,10 +135,9 @@ TEST_P(Distance, CellBoundsFollowTheirDefinition) {
     for (const int limit : {int{ascending[ascending.size() / 3]}, 0, 254, 255}) {
       std::vector<std::uint8_t> bounds(expected.size());
       std::vector<std::uint32_t> indices(expected.size());
-      indices.resize(
-          kernels.cell_bounds(codes.data(), blocks,
-                              {tables.data(), pairs, static_cast<std::uint8_t>(limit)},
-                              bounds.data(), indices.data()));
+      indices.resize(kernels.cell_bounds(codes.data(), blocks,
+                                         {tables.data(), pairs, static_cast<std::uint8_t>(limit)},
+                                         bounds.data(), indices.data()));
       EXPECT_EQ(bounds, expected) << pairs << " pairs";
       std::vector<std::uint32_t> wanted;
       for (std::uint32_t view = 0; view < expected.size(); ++view) {

@@ -145,11 +145,11 @@ TEST(ViewSketches, AnEmptyOneFindsNothing) {
 }
 
 TEST(ViewSketches, ViewsThatAreGoneWhenTheyAreReadAreLeftOut) {
-  Sketched all({80, 15}, Kind::clustered, 51);
-  all.insert(8000);
+  Sketched all({20, 15}, Kind::clustered, 51);
+  all.insert(7000);
   const PackedSignature query = all.maker.next();
   // Also those that look best by their sketches: the search goes on to others.
-  for (int round = 0; round < 8; ++round) {
+  for (int round = 0; round < 4; ++round) {
     for (const Match& match : all.oracle.nearest(query, 12, 15, {}))
       all.oracle.views.erase(match.view);
     all.expect_exact(query, 10, 0, {});
@@ -205,9 +205,9 @@ TEST(ViewSketches, RefuseWhatDoesNotFit) {
   EXPECT_THROW((void)all.sketches.search(query, {0, 0}, {}, read, executor), ContractError);
   EXPECT_THROW((void)all.sketches.search(query, {1, 16}, {}, read, executor), ContractError);
   EXPECT_THROW((void)all.sketches.search(query, {1, 0}, {{}, rows}, read, executor), ContractError);
-  EXPECT_THROW(
-      (void)all.sketches.search(ViewMaker({20, 15}, Kind::random, 1).next(), {1, 0}, {}, read, executor),
-      ContractError);
+  EXPECT_THROW((void)all.sketches.search(ViewMaker({20, 15}, Kind::random, 1).next(), {1, 0}, {},
+                                         read, executor),
+               ContractError);
   EXPECT_THROW(all.sketches.insert(std::vector{ViewId{99}}, std::vector<std::uint8_t>(1199)),
                ContractError);
   EXPECT_THROW((void)all.sketches.search(

@@ -160,6 +160,12 @@ TEST_F(MemoryOnServer, ChangesAreToldWithTheirAreas) {
     throw FileError("a", "b");
   }),
                FileError);
+  // A view without a position lies in no area, beside one that does.
+  std::vector<NewView> two = random_views(3, 2);
+  two[0].info.pose.reset();
+  two[1].info.pose = ReferencePose{1.0, 1.0, {}};
+  file.append(two);
+  EXPECT_TRUE(changes.wait(std::chrono::seconds(20)).value().areas.empty());
   file.set_parameter("a", "b");
   EXPECT_TRUE(changes.wait(std::chrono::seconds(20))->areas.empty());
   EXPECT_THROW(MemoryChanges(folder / "m.panonav"), FileError);

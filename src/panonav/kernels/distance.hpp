@@ -31,11 +31,11 @@ struct DistanceKernels {
   void (*cell_tables)(const int32_t* low, const int32_t* high, const int32_t* sums,
                       const float* factors, size_t dimensions, uint8_t* tables);
 
-  /// For each view v of `blocks` blocks of `cell_block` views: bounds[v] = the sum over its codes of
-  /// tables[16 * d + code], at most 255. Writes the positions of those <= query.limit, ascending, to
-  /// `indices`, which has room for all, and returns their number. A block consists of `pairs` rows of
-  /// `cell_block` bytes; byte v of each is of view v: the code of an even dimension in its lower four
-  /// bits, that of the next one in the upper four.
+  /// For each view v of `blocks` blocks of `cell_block` views: bounds[v] = the sum over its codes
+  /// of tables[16 * d + code], at most 255. Writes the positions of those <= query.limit,
+  /// ascending, to `indices`, which has room for all, and returns their number. A block consists of
+  /// `pairs` rows of `cell_block` bytes; byte v of each is of view v: the code of an even dimension
+  /// in its lower four bits, that of the next one in the upper four.
   size_t (*cell_bounds)(const uint8_t* codes, size_t blocks, const CellQuery& query,
                         uint8_t* bounds, uint32_t* indices);
 

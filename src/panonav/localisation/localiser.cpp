@@ -103,8 +103,7 @@ void visit_options(LocaliserOptions& options, OptionVisitor& visitor) {
 }
 
 int first_matches(const LocaliserOptions& options, bool by_features) {
-  return std::max(
-      {options.top, PositionModel::candidates, by_features ? verified_candidates : 0});
+  return std::max({options.top, PositionModel::candidates, by_features ? verified_candidates : 0});
 }
 
 bool looks_further(const PlaceModel& model, std::span<const RankedMatch> first) {

@@ -67,8 +67,8 @@ void visit_options(LocaliserOptions& options, OptionVisitor& visitor);
 /// How many views a search finds for `Localiser::localise` at first. `by_features`: whether local
 /// features of the query decide between matches.
 [[nodiscard]] int first_matches(const LocaliserOptions& options, bool by_features);
-/// Whether none of these matches explains the query, so that `reranked_views` are searched for where
-/// these are more than the first ones.
+/// Whether none of these matches explains the query, so that `reranked_views` are searched for
+/// where these are more than the first ones.
 [[nodiscard]] bool looks_further(const PlaceModel& model, std::span<const RankedMatch> first);
 
 /// Finds places of a memory from single views, in any heading of the robot.

@@ -42,7 +42,8 @@ class NeighbourSupport {
 
   /// Puts the match with the least score, by its supported difference, and its neighbours first,
   /// each group in the order that it was in. Only matches whose score is within a quarter of the
-  /// first one's are looked at, `max_examined` at most. `ranked` stays as it is when no match has neighbours.
+  /// first one's are looked at, `max_examined` at most. `ranked` stays as it is when no match has
+  /// neighbours.
   void put_best_supported_first(const ColumnProfiles& query, std::vector<RankedMatch>& ranked,
                                 std::span<const ViewId> excluded = {}) const;
 

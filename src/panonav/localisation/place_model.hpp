@@ -128,8 +128,8 @@ inline constexpr int doubtful_features = 4;
 [[nodiscard]] std::array<double, doubtful_features> doubtful_features_of(
     const PlaceEvidence& evidence) noexcept;
 
-/// The views that a `PlaceCriterion` draws from a memory of these views: 80, each by its own number,
-/// or all, in the order in which they were drawn. Cost: 30 ns a view.
+/// The views that a `PlaceCriterion` draws from a memory of these views: 80, each by its own
+/// number, or all, in the order in which they were drawn. Cost: 30 ns a view.
 [[nodiscard]] std::vector<ViewId> drawn_views(std::span<const ViewId> views);
 
 /// Tells a place of the memory from an unknown one, view by view. All components of the memory

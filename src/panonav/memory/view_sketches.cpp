@@ -194,10 +194,12 @@ class SketchSearch {
     }
     query_.choose_unit(layout_, typical_bound(*segments_.front().sketches));
     if (segments_.size() > first_segments) {
-      for_segments(0, order_.size(), 64, [this](std::uint32_t number, std::size_t place,
-                                                SegmentScratch& scratch, std::size_t /*chunk*/) {
-        order_[place].first = least_of_sample(*segments_[number].sketches, number, scratch);
-      });
+      for_segments(0, order_.size(), 64,
+                   [this](std::uint32_t number, std::size_t place, SegmentScratch& scratch,
+                          std::size_t /*chunk*/) {
+                     order_[place].first =
+                         least_of_sample(*segments_[number].sketches, number, scratch);
+                   });
       std::ranges::sort(order_);
     }
     std::vector<SketchedView> best;
@@ -205,10 +207,9 @@ class SketchSearch {
     while (begin < order_.size() && (begin == 0 || best.size() < 2 * top_)) {
       const std::size_t end = std::min(order_.size(), begin + first_segments);
       std::vector<std::vector<SketchedView>> found(end - begin);
-      for_segments(begin, end, 1, [&](std::uint32_t number, std::size_t /*place*/,
-                                      SegmentScratch& scratch, std::size_t chunk) {
-        take_best(number, scratch, found[chunk]);
-      });
+      for_segments(begin, end, 1,
+                   [&](std::uint32_t number, std::size_t /*place*/, SegmentScratch& scratch,
+                       std::size_t chunk) { take_best(number, scratch, found[chunk]); });
       for (const auto& of_segment : found) {
         best.insert(best.end(), of_segment.begin(), of_segment.end());
       }
@@ -281,10 +282,11 @@ class SketchSearch {
     while (begin < order_.size()) {
       const std::size_t end = std::min(order_.size(), begin + std::max(2 * chunk, 3 * begin));
       std::vector<std::vector<SketchedView>> found((end - begin + chunk - 1) / chunk);
-      for_segments(begin, end, chunk, [&](std::uint32_t number, std::size_t /*place*/,
-                                          SegmentScratch& scratch, std::size_t of_chunk) {
-        take_within(number, nearest_.limit(), scratch, found[of_chunk]);
-      });
+      for_segments(begin, end, chunk,
+                   [&](std::uint32_t number, std::size_t /*place*/, SegmentScratch& scratch,
+                       std::size_t of_chunk) {
+                     take_within(number, nearest_.limit(), scratch, found[of_chunk]);
+                   });
       for (const auto& of_chunk : found) {
         waiting.insert(waiting.end(), of_chunk.begin(), of_chunk.end());
       }

@@ -50,8 +50,8 @@ class ViewSketches {
 
   /// The nearest views: exactly what `VisualMemory::search` finds in a memory of those of the views
   /// that `read` knows. Calls `read` a few times, in a steady state: what it gave once must not be
-  /// gone within one search. `views_in_full` of the result are those read. The same on any number of
-  /// threads. Throws ContractError as `VisualMemory::search`, and what `read` throws.
+  /// gone within one search. `views_in_full` of the result are those read. The same on any number
+  /// of threads. Throws ContractError as `VisualMemory::search`, and what `read` throws.
   [[nodiscard]] SearchResult search(const PackedSignature& query, const SearchOptions& options,
                                     const SearchMask& mask, const ReadViews& read,
                                     Executor& executor) const;

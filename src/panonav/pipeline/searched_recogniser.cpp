@@ -62,17 +62,16 @@ std::vector<PositionBounds> joined(std::vector<PositionBounds> boxes) {
            b.min_y_m <= a.max_y_m;
   };
   for (std::size_t i = 0; i < boxes.size();) {
-    const auto other = std::find_if(
-        boxes.begin() + static_cast<std::ptrdiff_t>(i) + 1, boxes.end(),
-        [&](const PositionBounds& box) { return overlap(boxes[i], box); });
+    const auto other =
+        std::find_if(boxes.begin() + static_cast<std::ptrdiff_t>(i) + 1, boxes.end(),
+                     [&](const PositionBounds& box) { return overlap(boxes[i], box); });
     if (other == boxes.end()) {
       ++i;
       continue;
     }
-    boxes[i] = {std::min(boxes[i].min_x_m, other->min_x_m),
-                std::max(boxes[i].max_x_m, other->max_x_m),
-                std::min(boxes[i].min_y_m, other->min_y_m),
-                std::max(boxes[i].max_y_m, other->max_y_m)};
+    boxes[i] = {
+        std::min(boxes[i].min_x_m, other->min_x_m), std::max(boxes[i].max_x_m, other->max_x_m),
+        std::min(boxes[i].min_y_m, other->min_y_m), std::max(boxes[i].max_y_m, other->max_y_m)};
     boxes.erase(other);
     i = 0;
   }
@@ -109,8 +108,9 @@ struct SearchedRecogniser::Implementation {
     validate(options);
     const int most = search.header().shape.components;
     if (options_.areas) {
-      throw ContractError("areas", "asked for",
-                          "none in a memory that is not held: they take the positions of all views");
+      throw ContractError(
+          "areas", "asked for",
+          "none in a memory that is not held: they take the positions of all views");
     }
     if (options.components > most) {
       throw ContractError("components", options.components,
@@ -179,8 +179,8 @@ struct SearchedRecogniser::Implementation {
         const PositionBounds area = area_bounds(pose->position());
         add_views(some, snapshot.views_within(std::span(&area, 1)));
       } else {
-        const auto at = static_cast<std::size_t>(std::ranges::lower_bound(views, seed) -
-                                                 views.begin());
+        const auto at =
+            static_cast<std::size_t>(std::ranges::lower_bound(views, seed) - views.begin());
         const std::size_t first = at - std::min(at, beside);
         add_views(some, views.subspan(first, std::min(2 * beside, views.size() - first)));
       }
@@ -253,8 +253,7 @@ struct SearchedRecogniser::Implementation {
 
   /// Where the references lie that may support one of the matches.
   static std::vector<PositionBounds> around(const VisualMemory& part,
-                                            std::span<const RankedMatch> ranked,
-                                            double spacing_m) {
+                                            std::span<const RankedMatch> ranked, double spacing_m) {
     std::vector<PositionBounds> boxes;
     const double radius_m = NeighbourSupport::radius_m(spacing_m);
     if (!(radius_m > 0.0)) return boxes;
@@ -262,8 +261,8 @@ struct SearchedRecogniser::Implementation {
          ranked.first(std::min(ranked.size(), NeighbourSupport::max_examined))) {
       const auto& pose = part.info(match.match.view).pose;
       if (!pose || !pose->heading_rad) continue;
-      boxes.push_back({pose->x_m - radius_m, pose->x_m + radius_m, pose->y_m - radius_m,
-                       pose->y_m + radius_m});
+      boxes.push_back(
+          {pose->x_m - radius_m, pose->x_m + radius_m, pose->y_m - radius_m, pose->y_m + radius_m});
     }
     return joined(std::move(boxes));
   }

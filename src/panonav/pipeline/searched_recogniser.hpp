@@ -24,9 +24,9 @@ struct SearchCounters {
 /// than a machine. What is learnt of a memory takes views of all of it; of up to `learnt_views`
 /// views it is as `PlaceRecogniser` has it, and so are the answers, to the bit, but for
 /// `bytes_read`. Of larger ones it is what was kept last (`keep_models`), whichever views came
-/// since, and where nothing was kept it is learnt from whole areas with that many views in all: then
-/// places elsewhere that look alike count less than they should. Several threads may ask at a time,
-/// each with a connection of its own.
+/// since, and where nothing was kept it is learnt from whole areas with that many views in all:
+/// then places elsewhere that look alike count less than they should. Several threads may ask at a
+/// time, each with a connection of its own.
 class SearchedRecogniser {
  public:
   /// Views of which models are learnt at most.

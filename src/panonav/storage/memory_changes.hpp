@@ -24,7 +24,8 @@ inline constexpr double memory_area_side_m = 10.0;
 
 /// What somebody changed in a memory on a server.
 struct MemoryChange {
-  /// Areas in which views were added, removed or changed; empty: something else, or many areas.
+  /// Areas in which views were added, removed or changed; empty: something else, views without a
+  /// position among them, or many areas.
   std::vector<MemoryArea> areas;
   friend bool operator==(const MemoryChange&, const MemoryChange&) = default;
 };

@@ -370,11 +370,10 @@ struct PlaceSearch::Snapshot::Implementation {
       tables->read_views_there(views, [&](const ViewRow& row) {
         const auto bytes = tables->checked(row, search->header.shape, scratch).signature;
         const auto half = static_cast<std::ptrdiff_t>(search->header.shape.size());
-        kept.insert_or_assign(row.id,
-                              Kept{row.info,
-                                   {search->header.shape,
-                                    {bytes.begin(), bytes.begin() + half},
-                                    {bytes.begin() + half, bytes.end()}}});
+        kept.insert_or_assign(row.id, Kept{row.info,
+                                           {search->header.shape,
+                                            {bytes.begin(), bytes.begin() + half},
+                                            {bytes.begin() + half, bytes.end()}}});
       });
     });
   }

@@ -198,8 +198,8 @@ size_t DistanceBody<set>::cell_bounds(const uint8_t* codes, size_t blocks, const
         __builtin_memcpy(bounds + at, &sums, sizeof sums);
         uint64_t bits = Vector::at_most(sums, query.limit);
         for (; bits != 0; bits &= bits - 1) {
-          indices[found++] = first + static_cast<uint32_t>(at) +
-                             static_cast<uint32_t>(__builtin_ctzll(bits));
+          indices[found++] =
+              first + static_cast<uint32_t>(at) + static_cast<uint32_t>(__builtin_ctzll(bits));
         }
       }
     }

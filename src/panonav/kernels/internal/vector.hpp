@@ -140,7 +140,8 @@ struct ByteVector<Instructions::avx2> {
   static Register add_saturated(Register a, Register b) { return _mm256_adds_epu8(a, b); }
   static uint64_t at_most(Register a, uint8_t limit) {
     const Register top = _mm256_set1_epi8(static_cast<char>(limit));
-    return static_cast<uint32_t>(_mm256_movemask_epi8(_mm256_cmpeq_epi8(_mm256_min_epu8(a, top), a)));
+    return static_cast<uint32_t>(
+        _mm256_movemask_epi8(_mm256_cmpeq_epi8(_mm256_min_epu8(a, top), a)));
   }
   static constexpr int halved = 32;
   static void halve(const uint8_t* upper, const uint8_t* lower, uint8_t* to) {
@@ -272,8 +273,7 @@ struct ByteVector<Instructions::neon> {
   static uint64_t at_most(Register a, uint8_t limit) {
     const uint8x16_t bit = {1, 2, 4, 8, 16, 32, 64, 128, 1, 2, 4, 8, 16, 32, 64, 128};
     const uint8x16_t low = vandq_u8(vcleq_u8(bytes(a), vdupq_n_u8(limit)), bit);
-    return vaddv_u8(vget_low_u8(low)) |
-           static_cast<uint64_t>(vaddv_u8(vget_high_u8(low))) << 8U;
+    return vaddv_u8(vget_low_u8(low)) | static_cast<uint64_t>(vaddv_u8(vget_high_u8(low))) << 8U;
   }
   static constexpr int halved = 8;
   static void halve(const uint8_t* upper, const uint8_t* lower, uint8_t* to) {

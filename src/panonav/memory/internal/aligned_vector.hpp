@@ -26,8 +26,8 @@ struct CacheLineAllocator {
 };
 
 /// Allocates on borders of large pages, which the system is asked for: bytes that are read here and
-/// there then cost no look-up of small pages. Straight from the system, as a heap keeps gaps between
-/// blocks on such borders.
+/// there then cost no look-up of small pages. Straight from the system, as a heap keeps gaps
+/// between blocks on such borders.
 template <class T>
 struct LargePageAllocator {
   static constexpr std::size_t page = std::size_t{2} << 20U;
@@ -54,10 +54,14 @@ struct LargePageAllocator {
     if (is_small(count)) return CacheLineAllocator<T>().deallocate(pointer, count);
     munmap(pointer, rounded(count));
   }
-  friend bool operator==(LargePageAllocator, LargePageAllocator) { return true; }
+  friend bool operator==(LargePageAllocator, LargePageAllocator) {
+    return true;
+  }
 
  private:
-  static bool is_small(std::size_t count) { return count * sizeof(T) < page / 2; }
+  static bool is_small(std::size_t count) {
+    return count * sizeof(T) < page / 2;
+  }
   static std::size_t rounded(std::size_t count) {
     return (count * sizeof(T) + page - 1) / page * page;
   }

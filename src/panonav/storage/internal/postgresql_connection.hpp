@@ -90,7 +90,8 @@ class PostgresqlConnection {
               const std::function<void(const PostgresqlRows&)>& take);
   /// A COPY ... FROM STDIN with these bytes.
   void copy_in(const std::string& sql, std::string_view bytes);
-  /// A COPY ... TO STDOUT in the binary form: the fields of one row after the other, empty for null.
+  /// A COPY ... TO STDOUT in the binary form: the fields of one row after the other, empty for
+  /// null.
   void copy_out(const std::string& sql, int fields,
                 const std::function<void(std::span<const std::optional<std::string_view>>)>& take);
   /// Not within a transaction: waits until the server sends a notification and returns what it

@@ -102,13 +102,17 @@ class PostgresqlTables final : public MemoryTables {
   [[nodiscard]] PostgresqlConnection& connection() noexcept { return connection_; }
   [[nodiscard]] std::int64_t memory() const noexcept { return memory_; }
   /// What a notification says of the areas that were changed since it was asked last: empty for
-  /// many.
+  /// many, and where views without a position were changed.
   [[nodiscard]] std::string take_areas();
   /// Views say which connection added them: its number.
   std::int64_t session();
   /// The notification of the transaction will say so.
   void changed_at(const std::optional<double>& x_m, const std::optional<double>& y_m) {
-    if (x_m && y_m) areas_.insert(area_of(*x_m, *y_m));
+    if (x_m && y_m) {
+      areas_.insert(area_of(*x_m, *y_m));
+    } else {
+      elsewhere_ = true;
+    }
   }
 
  private:
@@ -131,6 +135,7 @@ class PostgresqlTables final : public MemoryTables {
   std::optional<std::int64_t> session_;
   bool has_incoming_ = false;   // the table of views on their way
   std::set<MemoryArea> areas_;  // that the transaction changes
+  bool elsewhere_ = false;      // it also changes views without a position
 };
 
 struct FoundMemory {

@@ -56,7 +56,9 @@ class PostgresqlTables::Part final : public MemoryTables::Transaction {
       tables_.session_.reset();
       tables_.has_incoming_ = false;
     }
-    if (!within_another_) tables_.areas_.clear();
+    if (within_another_) return;
+    tables_.areas_.clear();
+    tables_.elsewhere_ = false;
   }
   void commit() override {
     if (within_another_) {
@@ -89,7 +91,9 @@ std::unique_ptr<MemoryTables::Transaction> PostgresqlTables::transaction(Kind ki
 std::string PostgresqlTables::take_areas() {
   constexpr std::size_t max_bytes = 4000;  // PostgreSQL takes up to 8000
   std::string said;
-  for (const MemoryArea& area : std::exchange(areas_, {})) {
+  const std::set<MemoryArea> changed = std::exchange(areas_, {});
+  if (std::exchange(elsewhere_, false)) return {};
+  for (const MemoryArea& area : changed) {
     if (!said.empty()) said += ' ';
     said += to_text(area.column) + "," + to_text(area.row);
     if (said.size() > max_bytes) return {};
@@ -269,7 +273,8 @@ void PostgresqlTables::insert(std::span<const ViewId> ids, std::span<const NewVi
     add_beside(ids[i], view.features);
     thumbnails = thumbnails || !view.thumbnail.empty();
     features = features || !view.features.empty();
-    if (pose) changed_at(pose->x_m, pose->y_m);
+    changed_at(pose ? std::optional(pose->x_m) : std::nullopt,
+               pose ? std::optional(pose->y_m) : std::nullopt);
   }
   connection_.copy_in("COPY pg_temp.panonav_incoming FROM STDIN (FORMAT binary)", rows.finish());
   std::string sql =
@@ -336,7 +341,8 @@ void PostgresqlTables::write_info(ViewId view, const ReferenceInfo& info, std::i
       values);
   if (!taken.empty()) refuse_taken_name("view", info.name, path());
   changed_rows(before);
-  if (info.pose) changed_at(info.pose->x_m, info.pose->y_m);
+  changed_at(info.pose ? std::optional(info.pose->x_m) : std::nullopt,
+             info.pose ? std::optional(info.pose->y_m) : std::nullopt);
 }
 
 void PostgresqlTables::read_views(const Take<ViewRow>& take) {
@@ -370,11 +376,11 @@ void PostgresqlTables::read_views_there(std::span<const ViewId> views, const Tak
 // By COPY, which takes a third of the time of rows of a statement.
 void PostgresqlTables::read_magnitudes(ViewId first, ViewId last, std::size_t bytes,
                                        const Take<MagnitudesRow>& take) {
-  const std::string sql =
-      "COPY (SELECT id, x_m, y_m, substr(signature, 1, " + std::to_string(bytes) +
-      ") FROM panonav.views WHERE memory = " + std::to_string(memory_) + " AND id BETWEEN " +
-      std::to_string(first.value) + " AND " + std::to_string(last.value) +
-      " ORDER BY id) TO STDOUT (FORMAT binary)";
+  const std::string sql = "COPY (SELECT id, x_m, y_m, substr(signature, 1, " +
+                          std::to_string(bytes) +
+                          ") FROM panonav.views WHERE memory = " + std::to_string(memory_) +
+                          " AND id BETWEEN " + std::to_string(first.value) + " AND " +
+                          std::to_string(last.value) + " ORDER BY id) TO STDOUT (FORMAT binary)";
   connection_.copy_out(sql, 4, [&](std::span<const std::optional<std::string_view>> fields) {
     const auto number = [&](std::size_t field) {
       if (!fields[field] || fields[field]->size() != 8) fail_damaged("a view of a wrong type");
@@ -420,7 +426,8 @@ std::vector<ViewId> PostgresqlTables::views() {
 std::vector<PositionRow> PostgresqlTables::views_within(const PositionBounds& bounds) {
   std::vector<PositionRow> views;
   const Rows rows = connection_.run(
-      "SELECT id, x_m, y_m, heading_rad FROM panonav.views WHERE memory = $1 AND x_m IS NOT NULL AND "
+      "SELECT id, x_m, y_m, heading_rad FROM panonav.views WHERE memory = $1 AND x_m IS NOT NULL "
+      "AND "
       "x_m BETWEEN $2 AND $3 AND y_m BETWEEN $4 AND $5 ORDER BY id",
       Values()
           .add(memory_)
@@ -429,9 +436,9 @@ std::vector<PositionRow> PostgresqlTables::views_within(const PositionBounds& bo
           .add(std::optional(bounds.min_y_m))
           .add(std::optional(bounds.max_y_m)));
   for (int i = 0; i < rows.size(); ++i) {
-    views.push_back({id_in(rows, i, 0),
-                     {rows.real(i, 1).value_or(0.0), rows.real(i, 2).value_or(0.0),
-                      rows.real(i, 3)}});
+    views.push_back(
+        {id_in(rows, i, 0),
+         {rows.real(i, 1).value_or(0.0), rows.real(i, 2).value_or(0.0), rows.real(i, 3)}});
   }
   return views;
 }

@@ -386,7 +386,9 @@ std::vector<Upload> ServerExchange::take_changes(const std::string& file, std::i
     server_checksums.push_back(view.upload.server_checksum);
     rows.begin_row(6).add(std::int64_t{view.upload.server_view.value});
     add_info(rows, view.info);
-    if (view.info.pose) tables_.changed_at(view.info.pose->x_m, view.info.pose->y_m);
+    const auto& pose = view.info.pose;
+    tables_.changed_at(pose ? std::optional(pose->x_m) : std::nullopt,
+                       pose ? std::optional(pose->y_m) : std::nullopt);
   }
   const PostgresqlRows before =
       connection().run("SELECT x_m, y_m FROM panonav.views WHERE memory = $1 AND id = ANY($2)",
