@@ -99,9 +99,11 @@ struct SearchedRecogniser::Implementation {
     bool has_features = false;
   };
 
-  Implementation(const std::filesystem::path& memory, const PlaceRecogniserOptions& options_)
+  Implementation(const std::filesystem::path& memory, const PlaceRecogniserOptions& options_,
+                 std::size_t learnt_views_)
       : path(memory),
         options(options_.localiser),
+        learnt_views(learnt_views_),
         search(memory),
         encoder(search.header(), options_.source.value_or(search.header().source)),
         read_features(memory) {
@@ -282,6 +284,7 @@ struct SearchedRecogniser::Implementation {
 
   std::filesystem::path path;
   LocaliserOptions options;
+  std::size_t learnt_views;
   PlaceSearch search;
   ViewEncoder encoder;
   mutable ReadFeatures read_features;
@@ -291,8 +294,9 @@ struct SearchedRecogniser::Implementation {
 };
 
 SearchedRecogniser::SearchedRecogniser(const std::filesystem::path& memory,
-                                       const PlaceRecogniserOptions& options)
-    : implementation_(std::make_unique<Implementation>(memory, options)) {}
+                                       const PlaceRecogniserOptions& options,
+                                       std::size_t learnt_views)
+    : implementation_(std::make_unique<Implementation>(memory, options, learnt_views)) {}
 SearchedRecogniser::~SearchedRecogniser() = default;
 SearchedRecogniser::SearchedRecogniser(SearchedRecogniser&&) noexcept = default;
 SearchedRecogniser& SearchedRecogniser::operator=(SearchedRecogniser&&) noexcept = default;

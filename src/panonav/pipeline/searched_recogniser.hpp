@@ -29,13 +29,14 @@ struct SearchCounters {
 /// time, each with a connection of its own.
 class SearchedRecogniser {
  public:
-  /// Views of which models are learnt at most.
-  static constexpr std::size_t learnt_views = 20000;
+  /// Views of which models are learnt at most, where nothing else is said.
+  static constexpr std::size_t default_learnt_views = 20000;
 
   /// Throws as `PlaceSearch` and `PlaceRecogniser`; ContractError where areas are wanted, which are
   /// cut out of the positions of all views.
   explicit SearchedRecogniser(const std::filesystem::path& memory,
-                              const PlaceRecogniserOptions& options = {});
+                              const PlaceRecogniserOptions& options = {},
+                              std::size_t learnt_views = default_learnt_views);
   ~SearchedRecogniser();
   /// What is left of the other may only be destroyed or assigned to.
   SearchedRecogniser(SearchedRecogniser&&) noexcept;
