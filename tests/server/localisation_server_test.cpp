@@ -52,7 +52,7 @@ class LocalisationServerTest : public ::testing::Test {
   static std::string get(const LocalisationServer& server, const std::string& path,
                          const std::string& more = "", const std::string& method = "GET",
                          const std::string& body = "") {
-    return Peer(server.url() + "/", 60).ask(path, more, method, body);
+    return Peer(server.url() + "/").ask(path, more, method, body);
   }
   static json body_of(const std::string& answer) {
     return json::parse(answer.substr(std::min(answer.find("\r\n\r\n"), answer.size())));
@@ -125,7 +125,7 @@ TEST_F(LocalisationServerTest, RefusesWhatIsNoPictureAndGoesOn) {
   EXPECT_NE(metrics.find("\npanonav_localisation_seconds_bucket{le=\"+Inf\"} 1\n"),
             std::string::npos);
   EXPECT_NE(metrics.find("\npanonav_memory_views{memory=\"hall\"} 40\n"), std::string::npos);
-  Peer peer(server.url() + "/", 60);
+  Peer peer(server.url() + "/");
   peer.say("POST /v1/memories/hall/localise HTTP/1.1\r\nHost: localhost\r\nContent-Length: " +
            std::to_string((16 << 20) + 1) + "\r\n\r\n");
   EXPECT_EQ(status_of(peer.hear_all()), 413);
@@ -134,7 +134,7 @@ TEST_F(LocalisationServerTest, RefusesWhatIsNoPictureAndGoesOn) {
 TEST_F(LocalisationServerTest, LetsAClientAskBeforeItSendsAPicture) {
   const LocalisationServer server(hall(), {});
   const std::string picture = picture_at(world_, {1.0, 1.0, 0.0});
-  Peer peer(server.url() + "/", 60);
+  Peer peer(server.url() + "/");
   for (int times = 0; times < 2; ++times) {  // over one connection
     peer.say("POST /v1/memories/hall/localise HTTP/1.1\r\nHost: localhost\r\nExpect: " +
              std::string("100-continue\r\nContent-Length: ") + std::to_string(picture.size()) +
@@ -171,7 +171,7 @@ TEST_F(LocalisationServerTest, TheQueueIsBoundedAndWhoHasGoneIsNotAnswered) {
       std::to_string(slow.size()) + "\r\n\r\n";
   std::vector<std::unique_ptr<Peer>> peers;
   for (int i = 0; i < 20; ++i) {
-    peers.push_back(std::make_unique<Peer>(server.url() + "/", 60));
+    peers.push_back(std::make_unique<Peer>(server.url() + "/"));
     peers.back()->say(head + slow);
   }
   int busy = 0;
@@ -202,7 +202,7 @@ TEST_F(LocalisationServerTest, AsksForTheTokenWhereThereIsOne) {
   const std::string token = "Authorization: Bearer 0123456789abcdef\r\n";
   EXPECT_EQ(status_of(get(server, "/v1/memories", token)), 200);
   // Then a proxy may call it by any name.
-  Peer peer(server.url() + "/", 60);
+  Peer peer(server.url() + "/");
   peer.say("GET /v1/memories HTTP/1.1\r\nHost: panonav.example\r\n" + token +
            "Connection: close\r\n\r\n");
   EXPECT_EQ(status_of(peer.hear_all()), 200);
@@ -211,7 +211,7 @@ TEST_F(LocalisationServerTest, AsksForTheTokenWhereThereIsOne) {
 TEST_F(LocalisationServerTest, WithoutATokenPagesOfOthersGetNothing) {
   const LocalisationServer server(hall(), {});
   const auto answer = [&](const std::string& host, const std::string& origin) {
-    Peer peer(server.url() + "/", 60);
+    Peer peer(server.url() + "/");
     peer.say("GET /v1/memories HTTP/1.1\r\nHost: " + host + "\r\nConnection: close\r\n" +
              (origin.empty() ? "" : "Origin: " + origin + "\r\n") + "\r\n");
     return status_of(peer.hear_all());
@@ -238,11 +238,11 @@ TEST_F(LocalisationServerTest, ReadsAChangedMemoryAgain) {
     EXPECT_TRUE(notes.empty()) << notes.front();  // nobody changed it
   }
   memorise(folder_ / "hall.panonav", world_, 40, 64);
-  EXPECT_TRUE(within(std::chrono::seconds(60), [&] { return views() == 64; }));
+  EXPECT_TRUE(soon([&] { return views() == 64; }));
   // What cannot be read any more is served as it was.
   std::filesystem::remove(folder_ / "hall.panonav");
   std::ofstream(folder_ / "hall.panonav") << "no memory";
-  EXPECT_TRUE(within(std::chrono::seconds(60), [&] {
+  EXPECT_TRUE(soon([&] {
     const std::lock_guard lock(mutex);
     return !notes.empty() && notes.back().find("cannot be read") != std::string::npos;
   }));
@@ -270,11 +270,11 @@ TEST_F(LocalisationServerTest, WhoWaitsAtTheEndIsAnswered) {
   std::optional<Peer> peer;
   {
     const LocalisationServer server(hall(), {.threads = 1});
-    peer.emplace(server.url() + "/", 60);
+    peer.emplace(server.url() + "/");
     const std::string picture = picture_at(world_, {1.0, 1.0, 0.0});
     peer->say("POST /v1/memories/hall/localise HTTP/1.1\r\nHost: localhost\r\nContent-Length: " +
               std::to_string(picture.size()) + "\r\n\r\n" + picture);
-    ASSERT_TRUE(within(std::chrono::seconds(20), [&] {
+    ASSERT_TRUE(soon([&] {
       return get(server, "/metrics").find("panonav_waiting_seconds_count 1\n") != std::string::npos;
     }));
   }
