@@ -28,9 +28,12 @@ inline std::optional<std::filesystem::path> real_data(std::string_view folder) {
 }  // namespace panonav::testing
 
 /// For tests that count rates over thousands of trials: other tests run the same code once, and
-/// under a sanitizer the trials take minutes.
-#define PANONAV_SKIP_RATES_UNDER_SANITIZERS() \
-  if (panonav::testing::sanitized) GTEST_SKIP() << "a rate over many trials"
+/// under a sanitizer the trials take minutes. On an emulated processor they may be skipped, too: by
+/// the environment variable PANONAV_SKIP_RATES.
+#define PANONAV_SKIP_RATES_UNDER_SANITIZERS()                                        \
+  if (panonav::testing::sanitized || std::getenv("PANONAV_SKIP_RATES") != nullptr) { \
+    GTEST_SKIP() << "a rate over many trials";                                       \
+  }
 
 /// Skips the test unless `found`, an optional, holds real data from the folder `name`.
 #define PANONAV_REQUIRE_DATA(found, name) \
