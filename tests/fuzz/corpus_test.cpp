@@ -1,7 +1,7 @@
 // What the fuzzers start from and what they found, on every build.
 #include <gtest/gtest.h>
 
-#include <chrono>
+#include <ctime>
 #include <filesystem>
 
 #include "fuzz/targets.hpp"
@@ -12,6 +12,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// Of this thread: other tests run beside this one.
+double processor_time_s() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
 TEST(FuzzCorpus, EveryFileGivesAValueOrOneLineInTime) {
   for (const FuzzTarget& target : fuzz_targets()) {
     const fs::path folder = fs::path(PANONAV_FUZZ_CORPUS) / target.name;
@@ -19,10 +26,10 @@ TEST(FuzzCorpus, EveryFileGivesAValueOrOneLineInTime) {
     for (const auto& file : fs::directory_iterator(folder)) {
       SCOPED_TRACE(file.path().string());
       const std::string bytes = bytes_of(file.path());
-      const auto start = std::chrono::steady_clock::now();
+      const double start_s = processor_time_s();
       EXPECT_NO_THROW(
           target.read({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}));
-      EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5));
+      EXPECT_LT(processor_time_s() - start_s, 5.0);
       ++files;
     }
     EXPECT_GE(files, 2) << folder;
