@@ -42,10 +42,16 @@ void memorise(const std::filesystem::path& path, const ToyWorld& world, std::siz
   memoriser.finish();
 }
 
-/// A memory of 40 views of a world, and a server of it.
+/// A memory of 40 views of a world, learnt once, and a copy of it for each test.
 class LocalisationServerTest : public ::testing::Test {
  protected:
-  LocalisationServerTest() { memorise(folder_ / "hall.panonav", world_, 0, 40); }
+  LocalisationServerTest() {
+    static const TemporaryFolder learnt;
+    if (!std::filesystem::exists(learnt / "hall.panonav")) {
+      memorise(learnt / "hall.panonav", world_, 0, 40);
+    }
+    std::filesystem::copy(learnt / "hall.panonav", folder_ / "hall.panonav");
+  }
 
   std::vector<ServedMemory> hall() const { return {{"hall", folder_ / "hall.panonav"}}; }
 
