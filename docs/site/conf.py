@@ -34,6 +34,10 @@ mathjax_options = {"defer": "defer"}
 
 def setup(app):
     def escape(_app, _what, _name, _object, _options, lines):
-        lines[:] = [re.sub(r"([|*`_])", r"\\\1", line) for line in lines]  # docstrings are plain text
+        example = False
+        for i, line in enumerate(lines):  # docstrings are plain text, but for examples, which end with an empty line
+            example = line.lstrip().startswith(">>>") or (example and line.strip() != "")
+            if not example:
+                lines[i] = re.sub(r"([|*`_])", r"\\\1", line)
 
     app.connect("autodoc-process-docstring", escape)
