@@ -21,7 +21,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-
 void add_optional(RecordBytes& bytes, const std::optional<double>& value) {
   if (value) {
     bytes.add(*value);

@@ -315,6 +315,9 @@ void ServerExchange::stage(std::span<const NewView> views) {
     add_beside(signature);
     add_beside(views[i].thumbnail);
     add_beside(views[i].features);
+    const auto& pose = views[i].info.pose;
+    tables_.changed_at(pose ? std::optional(pose->x_m) : std::nullopt,
+                       pose ? std::optional(pose->y_m) : std::nullopt);
   }
   connection().copy_in("COPY pg_temp.panonav_staged FROM STDIN (FORMAT binary)", rows.finish());
 }
