@@ -129,7 +129,7 @@ inline constexpr int doubtful_features = 4;
     const PlaceEvidence& evidence) noexcept;
 
 /// The views that a `PlaceCriterion` draws from a memory of these views: 80, each by its own
-/// number, or all, in the order in which they were drawn. Cost: 30 ns a view.
+/// number, or all, in the order in which they were drawn.
 [[nodiscard]] std::vector<ViewId> drawn_views(std::span<const ViewId> views);
 
 /// Tells a place of the memory from an unknown one, view by view. All components of the memory

@@ -14,7 +14,7 @@ namespace panonav {
 
 /// Sketches of views that are held elsewhere, such as on a server: what a search needs to tell the
 /// few views that can be among the nearest, which alone are read in full (docs/search.md). Of 80 x
-/// 15 they take 340 bytes a view in place of 2400. A copy shares the sketches with the original and
+/// 15 they take 350 bytes a view in place of 2400. A copy shares the sketches with the original and
 /// costs little, so that one thread changes a copy while others search the original.
 class ViewSketches {
  public:
@@ -40,7 +40,7 @@ class ViewSketches {
 
   /// Adds views, none of which may be there already, with their magnitudes one view after the
   /// other. Those that are added together should have been taken near each other. Throws
-  /// ContractError on another number of magnitudes. Cost: a microsecond a view, and up to 10 ms.
+  /// ContractError on another number of magnitudes. Cost: some microseconds a view.
   void insert(std::span<const ViewId> views, std::span<const std::uint8_t> magnitudes);
   /// Adds all views of the other, none of which may be there already. Throws ContractError on
   /// another shape.

@@ -14,7 +14,7 @@
 
 namespace panonav {
 
-/// Exact search in a memory that is not held: of each view it keeps a sketch (340 bytes for 80 x
+/// Exact search in a memory that is not held: of each view it keeps a sketch (350 bytes for 80 x
 /// 15) and reads the few views that can be among the nearest when it is asked. For memories on a
 /// server that are larger than a machine, and for any number of machines that search one memory;
 /// nothing is written. A memory file is searched the same way. Several threads may use one object,
@@ -74,7 +74,7 @@ class PlaceSearch {
                                     const SearchMask& mask = {}) const;
 
   /// Takes over which views came and went since: of a server that tells which areas changed, those
-  /// areas are compared, otherwise the ids of all views (0.3 s a million). Searches go on
+  /// areas are compared, otherwise the ids of all views. Searches go on
   /// meanwhile. Returns whether anything changed that others told or that was found. Throws
   /// FileError; then what is sketched stays, and the next call compares all.
   bool refresh();
