@@ -250,7 +250,7 @@ def told(program, memory):
     done = subprocess.run([program, "--gtest_filter=SynchronisedMemory.AMemoryIsTold"], capture_output=True, text=True,
                           env=os.environ | {"PANONAV_TEST_SERVER": "x", "PANONAV_TEST_TOLD": str(memory)})
     assert done.returncode == 0, done.stdout[-2000:]
-    return sorted(line for line in done.stdout.splitlines() if line.startswith("view "))
+    return sorted(line for line in done.stdout.splitlines() if line.startswith("view\t"))
 
 
 def faults_of(wanted, kinds, rng):
@@ -368,8 +368,8 @@ def experiment(arguments, folder):
     expected = told(arguments.test_storage, server.address())
     different = [robot.number for robot in robots if told(arguments.test_storage, robot.file) != expected]
 
-    there = collections.Counter(line.split()[2] for line in expected)
-    positions = {line.split()[2]: float(line.split()[3]) for line in expected}
+    there = collections.Counter(line.split("\t")[2] for line in expected)
+    positions = {line.split("\t")[2]: float(line.split("\t")[3]) for line in expected}
     lost = [view for view in ledger.added if view not in ledger.removing and view not in there]
     doubled = [view for view, count in there.items() if count > 1]
     back = [view for view in ledger.removed if view in there]
@@ -383,11 +383,13 @@ def experiment(arguments, folder):
         last = max(i for i, (_, _, done) in enumerate(moves) if done)
         if positions[view] not in {x for _, x, _ in moves[last:]}:
             unmoved.append(view)
-    years = {time.gmtime(float(line.split()[4])).tm_year for line in expected}
+    years = {time.gmtime(float(line.split("\t")[4])).tm_year for line in expected}
     print(f"views added {len(ledger.added)}, removed {len(ledger.removed)}, there at the end {len(expected)}, stamped in "
           f"{len(years)} different years; views moved by one robot {moved}; changes that gave way {ledger.conflicts}")
     print(f"lost {len(lost)}, doubled {len(doubled)}, brought back {len(back)}, from nowhere {len(unknown)}, moves lost "
           f"{len(unmoved)}, converged {'yes' if not different and new == 0 else 'no: ' + str(different)}")
+    if lost or doubled or back or unknown:
+        print("these are", lost[:3], doubled[:3], back[:3], unknown[:3])
     times = sorted(ledger.seconds)
     print(f"{len(times)} synchronisations: median {statistics.median(times):.3f} s, 95 % within "
           f"{times[int(0.95 * len(times))]:.3f} s, slowest {times[-1]:.3f} s; {sum(ledger.refused.values())} refused: " +

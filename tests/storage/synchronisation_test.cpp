@@ -790,12 +790,12 @@ TEST_F(SynchronisedMemory, AMemoryIsTold) {
   const char* memory = std::getenv("PANONAV_TEST_TOLD");
   if (memory == nullptr) GTEST_SKIP() << "no PANONAV_TEST_TOLD";
   for (const auto& [name, seen] : content(memory)) {
-    std::cout << "view " << name << ' '
-              << checksum(seen.signature.magnitudes, checksum(seen.signature.phases)) << ' '
-              << (seen.info.pose ? seen.info.pose->x_m : -1.0) << ' '
-              << seen.info.stamp_s.value_or(-1.0) << ' ' << seen.thumbnail.has_value()
+    std::cout << "view\t" << name << '\t'
+              << checksum(seen.signature.magnitudes, checksum(seen.signature.phases)) << '\t'
+              << (seen.info.pose ? seen.info.pose->x_m : -1.0) << '\t'
+              << seen.info.stamp_s.value_or(-1.0) << '\t' << seen.thumbnail.has_value()
               << seen.features.has_value();
-    for (const auto& [other, kind] : seen.links) std::cout << ' ' << other << ':' << kind;
+    for (const auto& [other, kind] : seen.links) std::cout << '\t' << other << ':' << kind;
     std::cout << '\n';
   }
 }
