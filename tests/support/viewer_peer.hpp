@@ -20,8 +20,9 @@ namespace panonav {
 using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
-/// For what must come: it only ends tests that fail, and so is enough for emulated processors too.
-inline constexpr std::chrono::seconds patience(300);
+/// For what must come. It only ends tests that fail, and so is enough for emulated processors,
+/// where a server that waits ten times as long as it read a changed memory is late by minutes.
+inline constexpr std::chrono::seconds patience(900);
 
 /// Somebody who connects to a server of this machine. Reads and writes wait so long at most.
 class Peer {
