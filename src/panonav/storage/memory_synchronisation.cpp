@@ -474,7 +474,6 @@ class Synchronisation {
                          view_checksum(scratch_, id, view.info, signature), sent_},
                         bytes_checksum(id, view.thumbnail),
                         bytes_checksum(id, view.features)});
-      if (view.info.pose) server_.tables().changed_at(view.info.pose->x_m, view.info.pose->y_m);
     }
     // Views whose names were taken just now are not among them: the next time finds other names.
     for (const Upload& upload : server_.take_views(state_.file, sent_, staged)) {

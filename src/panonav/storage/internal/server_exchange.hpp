@@ -100,7 +100,8 @@ class ServerExchange {
   /// The same as `uploads`, once nobody is writing.
   [[nodiscard]] std::vector<Upload> settled_uploads(const std::string& file,
                                                     std::span<const ViewId> views);
-  /// Brings views to a table of the connection's own. Their numbers are their places in `views`.
+  /// Brings views to a table of the connection's own; `take_views` will tell their areas. Their
+  /// numbers are their places in `views`.
   void stage(std::span<const NewView> views);
   /// The last id before those that nobody else gets.
   [[nodiscard]] std::uint32_t reserve_ids(std::size_t count);
