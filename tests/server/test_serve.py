@@ -42,6 +42,7 @@ def main() -> int:
         assert "--listen is 99999; allowed: a port" in refusal(str(memory), "--listen", "99999")
         assert "allowed: a name that no other memory has" in refusal(str(memory), str(memory), "--listen", "0")
         assert "no such file" in refusal(str(folder / "none.panonav"), "--listen", "0").lower()
+        assert "--max-held-views" in refusal(str(memory), "--listen", "0", "--max-held-views", "5")
         (folder / "short").write_text("secret\n")
         assert "is no token" in refusal(str(memory), "--listen", "0", "--token-file", str(folder / "short"))
         (folder / "token").write_text("a token of some length".replace(" ", "-") + "\n")

@@ -57,7 +57,7 @@ std::string read_token(const std::string& path) {
   return token;
 }
 
-ExitCode serve(const ServeArguments& wanted, Session& session) {
+ExitCode serve(const Arguments& arguments, const ServeArguments& wanted, Session& session) {
   std::mutex mutex;
   std::condition_variable asked;
   bool stopped = false;
@@ -81,6 +81,9 @@ ExitCode serve(const ServeArguments& wanted, Session& session) {
   };
   std::vector<ServedMemory> memories;
   for (const std::string& memory : wanted.memories) memories.push_back(served_memory(memory));
+  if (std::ranges::none_of(memories, is_server_address, &ServedMemory::path)) {
+    arguments.refuse_unused({"--max-held-views"}, "where all memories are files");
+  }
   const LocalisationServer server(memories, options);
   std::unique_lock lock(mutex);
   if (session.json()) {
@@ -99,8 +102,8 @@ ExitCode serve(const ServeArguments& wanted, Session& session) {
 Run declare_serve(Arguments& arguments) {
   auto wanted = std::make_shared<ServeArguments>();
   arguments.positionals("MEMORY", wanted->memories,
-                        "Memory files, known to clients by their names without .panonav, or "
-                        "NAME=FILE");
+                        "Memory files, or addresses of memories on a server, known to clients by "
+                        "their names without .panonav, or NAME=FILE");
   arguments.option("--listen PORT", wanted->listen,
                    "Port for programs of this machine (0: a free one); ADDRESS:PORT serves the "
                    "network of that address, too");
@@ -111,10 +114,10 @@ Run declare_serve(Arguments& arguments) {
                    "again");
   arguments.option("--max-held-views", wanted->max_held_views, 0,
                    "Memories on a server with more views are not held: 350 bytes a view instead of "
-                   "2700, and some milliseconds more for each picture");
+                   "2700, and a longer time for each picture (docs/scale.md)");
   arguments.options("localiser", wanted->localiser);
   arguments.common({"--top"});
-  return [wanted](Session& session) { return serve(*wanted, session); };
+  return [wanted, &arguments](Session& session) { return serve(arguments, *wanted, session); };
 }
 
 }  // namespace
