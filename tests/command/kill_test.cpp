@@ -130,8 +130,7 @@ class Kill : public ::testing::Test {
     restore();
     const auto begin = Clock::now();
     run_well(arguments);
-    const auto duration =
-        std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - begin);
+    auto duration = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - begin);
     const std::string wanted = content_of(memory);
     const std::string unchanged = base.empty() ? "" : content_of(base);
     ASSERT_NE(wanted, unchanged) << "the verb does nothing";
@@ -156,7 +155,11 @@ class Kill : public ::testing::Test {
       ::kill(child, SIGKILL);
       int status = 0;
       ASSERT_EQ(::waitpid(child, &status, 0), child);
-      if (!WIFSIGNALED(status)) continue;
+      if (!WIFSIGNALED(status)) {
+        // On a busy machine the first run took longer than others do.
+        duration = std::max(duration * 3 / 4, std::chrono::microseconds(1));
+        continue;
+      }
       ++killed;
 
       const bool there = fs::exists(memory);
