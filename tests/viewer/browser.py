@@ -8,7 +8,7 @@ import time
 
 PROGRAM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 # A machine that tests something else, too, is slow. What is waited for comes, or never.
-PATIENCE_S = 30.0
+PATIENCE_S = 90.0
 PHONE = {"width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": True}
 DESK = {"width": 1280, "height": 800, "deviceScaleFactor": 1, "mobile": False}
 # Contrast of text against the ground behind it, by WCAG 2: the least of all elements that show text.

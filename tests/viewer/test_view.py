@@ -72,11 +72,11 @@ def look_at_demo(browser, file, shots):
         browser.call("Input.dispatchMouseEvent", type=kind, x=1270, y=300, button="left", clickCount=1, buttons=1)
     assert not browser.ask(f"{story}.some(plan => plan.playing)")
     unfolding = "document.querySelector('#part5 ~ .pictures pn-plan')"
-    browser.ask(f"{unfolding}.scrollIntoView({{ block: 'center' }})")
-    browser.wait(f"{unfolding}.frames")
-    browser.ask(f"{unfolding}.scrollIntoView({{ block: 'center' }})")  # what is drawn now has other heights
-    browser.wait(f"{unfolding}.playing")
-    browser.wait(f"{unfolding}.index === {unfolding}.frames.length - 1 && !{unfolding}.playing")
+    # It plays while it is in view, and parts above it that are drawn meanwhile have other heights.
+    look = f"{unfolding}.scrollIntoView({{ block: 'center' }})"
+    browser.wait(f"({look}, {unfolding}.frames)")
+    browser.wait(f"({look}, {unfolding}.playing)")
+    browser.wait(f"({look}, {unfolding}.index === {unfolding}.frames.length - 1 && !{unfolding}.playing)")
     assert browser.ask("document.querySelectorAll('pn-run').length") == 3
     for number in range(3):
         run = f"document.querySelectorAll('pn-run')[{number}]"
