@@ -43,6 +43,20 @@ std::vector<MemoryArea> areas_around(double x_m, double y_m, double radius_m) {
   return around;
 }
 
+namespace {
+
+void require_path_and_address(const std::filesystem::path& file,
+                              const std::filesystem::path& server) {
+  if (is_server_address(file)) {
+    throw ContractError("file", without_passwords(file.string()), "the path of a memory file");
+  }
+  if (!is_server_address(server)) {
+    throw ContractError("server", server.string(), "the address of a memory on a server");
+  }
+}
+
+}  // namespace
+
 #ifdef PANONAV_WITH_POSTGRESQL
 
 namespace {
@@ -1044,12 +1058,7 @@ SynchronisationReport synchronise_memory(const std::filesystem::path& file,
                                          const SynchronisationOptions& options,
                                          const std::function<void(std::size_t)>& advance) {
   const auto begin = std::chrono::steady_clock::now();
-  if (is_server_address(file)) {
-    throw ContractError("file", without_passwords(file.string()), "the path of a memory file");
-  }
-  if (!is_server_address(server)) {
-    throw ContractError("server", server.string(), "the address of a memory on a server");
-  }
+  require_path_and_address(file, server);
   const ServerAddress address = parse_server_address(server);
   std::unique_ptr<ServerExchange> exchange;
   std::error_code ignored;
@@ -1069,10 +1078,11 @@ SynchronisationReport synchronise_memory(const std::filesystem::path& file,
 
 #else
 
-SynchronisationReport synchronise_memory(const std::filesystem::path&,
+SynchronisationReport synchronise_memory(const std::filesystem::path& file,
                                          const std::filesystem::path& server,
                                          const SynchronisationOptions&,
                                          const std::function<void(std::size_t)>&) {
+  require_path_and_address(file, server);
   (void)postgresql_memory_exists(parse_server_address(server));  // says that there is no libpq
   return {};
 }
