@@ -375,6 +375,19 @@ struct ViewSketches::Implementation {
   /// Of the last segment while it is not full: it is sketched anew when views come.
   std::shared_ptr<const std::vector<std::uint8_t>> growing;
   std::size_t size = 0;
+
+  /// The views of the segment that grows, with their magnitudes; none where all are full.
+  void add_growing(std::vector<ViewId>& ids, std::vector<std::uint8_t>& magnitudes) const {
+    if (!growing) return;
+    const LiveSegment& last = segments.back();
+    const std::size_t view_bytes = layout->shape().size();
+    for (std::size_t row = 0; row < last.sketches->rows(); ++row) {
+      if (!last.has(row)) continue;
+      ids.push_back(last.sketches->views()[row]);
+      const auto from = growing->begin() + static_cast<std::ptrdiff_t>(row * view_bytes);
+      magnitudes.insert(magnitudes.end(), from, from + static_cast<std::ptrdiff_t>(view_bytes));
+    }
+  }
 };
 
 ViewSketches::ViewSketches(SignatureShape shape) {
@@ -427,14 +440,8 @@ void ViewSketches::insert(std::span<const ViewId> views, std::span<const std::ui
   // What the last segment holds comes first.
   std::vector<ViewId> ids;
   std::vector<std::uint8_t> bytes;
+  own.add_growing(ids, bytes);
   if (own.growing) {
-    const LiveSegment& last = own.segments.back();
-    for (std::size_t row = 0; row < last.sketches->rows(); ++row) {
-      if (!last.has(row)) continue;
-      ids.push_back(last.sketches->views()[row]);
-      const auto from = own.growing->begin() + static_cast<std::ptrdiff_t>(row * view_bytes);
-      bytes.insert(bytes.end(), from, from + static_cast<std::ptrdiff_t>(view_bytes));
-    }
     own.segments.pop_back();
     own.growing.reset();
   }
@@ -478,16 +485,9 @@ void ViewSketches::insert(const ViewSketches& other) {
   own.segments.insert(at, given.segments.begin(),
                       given.segments.begin() + static_cast<std::ptrdiff_t>(full));
   for (std::size_t i = 0; i < full; ++i) own.size += given.segments[i].count;
-  if (!given.growing) return;
-  const LiveSegment& last = given.segments.back();
   std::vector<ViewId> ids;
   std::vector<std::uint8_t> bytes;
-  for (std::size_t row = 0; row < last.sketches->rows(); ++row) {
-    if (!last.has(row)) continue;
-    ids.push_back(last.sketches->views()[row]);
-    const auto from = given.growing->begin() + static_cast<std::ptrdiff_t>(row * shape().size());
-    bytes.insert(bytes.end(), from, from + static_cast<std::ptrdiff_t>(shape().size()));
-  }
+  given.add_growing(ids, bytes);
   insert(ids, bytes);
 }
 

@@ -227,11 +227,8 @@ class Synchronisation {
   std::optional<LocalRow> read_row(ViewId view) {
     if (!local_.contains(view)) return std::nullopt;
     LocalRow read;
-    file_.read_views(std::span(&view, 1), [&](const ViewRow& row) {
-      if (row.signature.size() != 2 * header_.shape.size() ||
-          row.checksum != view_checksum(scratch_, row.id, row.info, row.signature)) {
-        file_.fail_damaged("view " + std::to_string(view.value) + " does not match its checksum");
-      }
+    file_.read_views(std::span(&view, 1), [&](const ViewRow& found) {
+      const ViewRow& row = file_.checked(found, header_.shape, scratch_);
       read = {row.info, row.checksum, Bytes(row.signature.begin(), row.signature.end())};
     });
     return read;

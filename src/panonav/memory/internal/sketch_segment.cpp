@@ -52,7 +52,7 @@ SegmentLayout::SegmentLayout(SignatureShape shape) : shape_(shape) {
 void SegmentLayout::sum_blocks(const std::uint8_t* magnitudes, std::int32_t* sums) const {
   std::array<std::int32_t*, levels> at{sums, sums + dimensions_[0],
                                        sums + dimensions_[0] + dimensions_[1]};
-  const std::int32_t* const end = sums + total();
+  std::int32_t* const end = sums + total();
   for (int k = 0; k < shape_.components; ++k) {
     const std::uint8_t* const rows = magnitudes + static_cast<std::size_t>(k) * shape_.rows;
     const int finest = blocks_[2][k];
@@ -72,7 +72,7 @@ void SegmentLayout::sum_blocks(const std::uint8_t* magnitudes, std::int32_t* sum
   }
   std::fill(at[0], sums + dimensions_[0], 0);
   std::fill(at[1], sums + dimensions_[0] + dimensions_[1], 0);
-  std::fill(at[2], const_cast<std::int32_t*>(end), 0);
+  std::fill(at[2], end, 0);
 }
 
 std::vector<std::int32_t> SegmentLayout::counted(int components,

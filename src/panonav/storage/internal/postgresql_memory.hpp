@@ -114,6 +114,15 @@ class PostgresqlTables final : public MemoryTables {
       elsewhere_ = true;
     }
   }
+  void changed_at(const std::optional<ReferencePose>& pose) {
+    if (pose) {
+      changed_at(pose->x_m, pose->y_m);
+    } else {
+      elsewhere_ = true;
+    }
+  }
+  /// Throws FileError on a number that no view has.
+  [[nodiscard]] ViewId view_id(std::int64_t number) const;
 
  private:
   class Part;
@@ -122,7 +131,9 @@ class PostgresqlTables final : public MemoryTables {
   Rows run(const std::string& sql, std::string_view name) {
     return connection_.run(sql, Values().add(memory_).add(name));
   }
-  [[nodiscard]] ViewId id_in(const Rows& rows, int row, int column) const;
+  [[nodiscard]] ViewId id_in(const Rows& rows, int row, int column) const {
+    return view_id(rows.integer(row, column));
+  }
   [[nodiscard]] ViewRow view_in(const Rows& rows) const;
   [[nodiscard]] std::vector<std::string> texts(const std::string& sql);
   void changed_rows(const Rows& rows);

@@ -107,10 +107,9 @@ void PostgresqlTables::notify() {
                   Values().add(std::string_view(channel_)).add(std::string_view(said)));
 }
 
-ViewId PostgresqlTables::id_in(const Rows& rows, int row, int column) const {
-  const std::int64_t id = rows.integer(row, column);
-  if (id < 1 || id > std::int64_t{UINT32_MAX}) fail_damaged("a view id is out of range");
-  return {static_cast<std::uint32_t>(id)};
+ViewId PostgresqlTables::view_id(std::int64_t number) const {
+  if (number < 1 || number > std::int64_t{UINT32_MAX}) fail_damaged("a view id is out of range");
+  return {static_cast<std::uint32_t>(number)};
 }
 
 ViewRow PostgresqlTables::view_in(const Rows& rows) const {
@@ -263,7 +262,6 @@ void PostgresqlTables::insert(std::span<const ViewId> ids, std::span<const NewVi
   };
   for (std::size_t i = 0; i < views.size(); ++i) {
     const NewView& view = views[i];
-    const auto& pose = view.info.pose;
     pack_signature(view.signature, signature);
     rows.begin_row(12).add(std::int64_t{ids[i].value});
     add_info(rows, view.info);
@@ -273,8 +271,7 @@ void PostgresqlTables::insert(std::span<const ViewId> ids, std::span<const NewVi
     add_beside(ids[i], view.features);
     thumbnails = thumbnails || !view.thumbnail.empty();
     features = features || !view.features.empty();
-    changed_at(pose ? std::optional(pose->x_m) : std::nullopt,
-               pose ? std::optional(pose->y_m) : std::nullopt);
+    changed_at(view.info.pose);
   }
   connection_.copy_in("COPY pg_temp.panonav_incoming FROM STDIN (FORMAT binary)", rows.finish());
   std::string sql =
@@ -341,8 +338,7 @@ void PostgresqlTables::write_info(ViewId view, const ReferenceInfo& info, std::i
       values);
   if (!taken.empty()) refuse_taken_name("view", info.name, path());
   changed_rows(before);
-  changed_at(info.pose ? std::optional(info.pose->x_m) : std::nullopt,
-             info.pose ? std::optional(info.pose->y_m) : std::nullopt);
+  changed_at(info.pose);
 }
 
 void PostgresqlTables::read_views(const Take<ViewRow>& take) {
@@ -386,9 +382,7 @@ void PostgresqlTables::read_magnitudes(ViewId first, ViewId last, std::size_t by
       if (!fields[field] || fields[field]->size() != 8) fail_damaged("a view of a wrong type");
       return big_endian_word(*fields[field]);
     };
-    const std::uint64_t id = number(0);
-    if (id < 1 || id > std::uint64_t{UINT32_MAX}) fail_damaged("a view id is out of range");
-    MagnitudesRow row{{static_cast<std::uint32_t>(id)}, std::nullopt, {}};
+    MagnitudesRow row{view_id(static_cast<std::int64_t>(number(0))), std::nullopt, {}};
     if (fields[1] && fields[2]) {
       row.position = Point2{std::bit_cast<double>(number(1)), std::bit_cast<double>(number(2))};
     }
@@ -415,10 +409,7 @@ std::vector<ViewId> PostgresqlTables::views() {
                            std::to_string(memory_) + " ORDER BY id) TO STDOUT (FORMAT binary)",
                        1, [&](std::span<const std::optional<std::string_view>> fields) {
                          const std::uint64_t id = fields[0] ? big_endian_word(*fields[0]) : 0;
-                         if (id < 1 || id > std::uint64_t{UINT32_MAX}) {
-                           fail_damaged("a view id is out of range");
-                         }
-                         views.push_back({static_cast<std::uint32_t>(id)});
+                         views.push_back(view_id(static_cast<std::int64_t>(id)));
                        });
   return views;
 }

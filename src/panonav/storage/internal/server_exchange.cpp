@@ -91,12 +91,6 @@ PostgresqlValues ServerExchange::values() const {
   return values;
 }
 
-ViewId ServerExchange::id_in(const PostgresqlRows& rows, int row, int column) const {
-  const std::int64_t id = rows.integer(row, column);
-  if (id < 1 || id > std::int64_t{UINT32_MAX}) tables_.fail_damaged("a view id is out of range");
-  return {static_cast<std::uint32_t>(id)};
-}
-
 // id, name, x_m, y_m, heading_rad, stamp_s, checksum
 ServerView ServerExchange::view_in(const PostgresqlRows& rows, int row) const {
   ServerView view;
@@ -315,9 +309,7 @@ void ServerExchange::stage(std::span<const NewView> views) {
     add_beside(signature);
     add_beside(views[i].thumbnail);
     add_beside(views[i].features);
-    const auto& pose = views[i].info.pose;
-    tables_.changed_at(pose ? std::optional(pose->x_m) : std::nullopt,
-                       pose ? std::optional(pose->y_m) : std::nullopt);
+    tables_.changed_at(views[i].info.pose);
   }
   connection().copy_in("COPY pg_temp.panonav_staged FROM STDIN (FORMAT binary)", rows.finish());
 }
@@ -389,9 +381,7 @@ std::vector<Upload> ServerExchange::take_changes(const std::string& file, std::i
     server_checksums.push_back(view.upload.server_checksum);
     rows.begin_row(6).add(std::int64_t{view.upload.server_view.value});
     add_info(rows, view.info);
-    const auto& pose = view.info.pose;
-    tables_.changed_at(pose ? std::optional(pose->x_m) : std::nullopt,
-                       pose ? std::optional(pose->y_m) : std::nullopt);
+    tables_.changed_at(view.info.pose);
   }
   const PostgresqlRows before =
       connection().run("SELECT x_m, y_m FROM panonav.views WHERE memory = $1 AND id = ANY($2)",

@@ -140,7 +140,9 @@ class ServerExchange {
   [[noreturn]] void refuse_removed() const;
   [[nodiscard]] std::vector<Upload> uploads_in(const PostgresqlRows& rows) const;
   [[nodiscard]] ServerView view_in(const PostgresqlRows& rows, int row) const;
-  [[nodiscard]] ViewId id_in(const PostgresqlRows& rows, int row, int column) const;
+  [[nodiscard]] ViewId id_in(const PostgresqlRows& rows, int row, int column) const {
+    return tables_.view_id(rows.integer(row, column));
+  }
 
   PostgresqlTables tables_;
   bool may_add_ = false;
