@@ -18,7 +18,6 @@
 #include "panonav/motion/odometry.hpp"
 #include "panonav/motion/path.hpp"
 #include "panonav/panorama/preprocessing.hpp"
-#include "panonav/simulation/scenes.hpp"
 
 namespace panonav {
 
@@ -97,8 +96,10 @@ class DrivingRobot {
     double left_m = 0.0;  // to the next picture
     while (static_cast<int>(path.size()) < pictures) {
       Point2 goal = space.random_pose(random).position();
-      if (drive_ == DailyDrive::rounds) goal = longest_ago(grid, at).value_or(goal);
-      passed_[square_of(goal)] = day_;
+      if (drive_ == DailyDrive::rounds) {
+        goal = longest_ago(grid, at).value_or(goal);
+        passed_[square_of(goal)] = day_;
+      }
       const auto way = space.shortest_path(at, goal);
       if (!way) continue;
       for (const Point2 next : *way) {
@@ -238,9 +239,7 @@ class LearningRobot {
 
 void reproduce_days(const ElsewhereReproductionOptions& options, const std::string& name,
                     Executor& executor, Reproduction& result) {
-  const bool built_in = std::ranges::find(scene_names(), name) != scene_names().end();
-  Scene first =
-      built_in ? make_scene(name, {.seed = options.seed}) : read_world(options.data, name);
+  Scene first = scene_named(options.data, name, options.seed);
   first.name = name;
   ChangingScene changing(first, options.seed);
   const PlaceRecording place = record_place(std::move(first),

@@ -17,7 +17,6 @@
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/pipeline/homing_guide.hpp"
-#include "panonav/simulation/scenes.hpp"
 
 namespace panonav {
 
@@ -225,10 +224,8 @@ void reproduce_home_vectors(const ElsewhereReproductionOptions& options,
 void reproduce_tilted_homing(const ElsewhereReproductionOptions& options, Executor& executor,
                              Reproduction& result) {
   for (const std::string& name : elsewhere_grounds(options)) {
-    const bool built_in = std::ranges::find(scene_names(), name) != scene_names().end();
-    HomingPlace place = make_homing_place(
-        built_in ? make_scene(name, {.seed = options.seed}) : read_world(options.data, name), {},
-        executor);
+    HomingPlace place =
+        make_homing_place(scene_named(options.data, name, options.seed), {}, executor);
     const auto tasks = random_homing_tasks(place, options.runs, homing_radius_m, options.seed);
     struct Condition {
       int tilt_deg;

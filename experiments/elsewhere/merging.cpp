@@ -21,7 +21,6 @@
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/memory_merge.hpp"
 #include "panonav/simulation/recording.hpp"
-#include "panonav/simulation/scenes.hpp"
 
 namespace panonav {
 
@@ -117,14 +116,11 @@ void reproduce_merging(const ElsewhereReproductionOptions& options, Executor& ex
                        Reproduction& result) {
   const std::filesystem::path folder = options.out / "merged";
   std::filesystem::create_directories(folder);
-  const std::vector<std::string> worlds = worlds_in(options.data);
   std::map<std::string, std::vector<Session>> sessions;
   for (const char* const name : {"loop", "small_warehouse", "small_house"}) {
-    const bool built_in = std::ranges::find(scene_names(), name) != scene_names().end();
-    if (!built_in && std::ranges::find(worlds, name) == worlds.end()) continue;
-    Scene scene =
-        built_in ? make_scene(name, {.seed = options.seed}) : read_world(options.data, name);
-    const PlaceRecording place = empty_place(std::move(scene), options.seed, 512, executor);
+    if (!has_scene(options.data, name)) continue;
+    const PlaceRecording place =
+        empty_place(scene_named(options.data, name, options.seed), options.seed, 512, executor);
     for (int i = 0; i < options.walks; ++i) {
       sessions[name].push_back(
           walk_through(place, std::string(name) + "_" + std::to_string(i), options.walk_pictures,
@@ -132,12 +128,13 @@ void reproduce_merging(const ElsewhereReproductionOptions& options, Executor& ex
     }
   }
   for (const auto& [name, walks] : sessions) {
-    std::size_t sharing = 0;
-    std::size_t joined = 0;
-    std::size_t apart = 0;
-    std::size_t apart_joined = 0;
-    std::size_t between = 0;
-    std::size_t between_joined = 0;
+    struct Pairs {
+      std::size_t all = 0;
+      std::size_t joined = 0;
+    };
+    Pairs sharing;
+    Pairs between;
+    Pairs apart;
     std::size_t wrong = 0;
     double worst_shape = 0.0;
     for (std::size_t i = 0; i < walks.size(); ++i) {
@@ -145,31 +142,32 @@ void reproduce_merging(const ElsewhereReproductionOptions& options, Executor& ex
       const Session& second = walks[(i + 1) % walks.size()];
       const double share = std::max(first.share_beside(second), second.share_beside(first));
       const auto found = join(first, second, folder);
-      (share >= shared_much ? sharing : share < shared_hardly ? apart : between) += 1;
+      Pairs& alike = share >= shared_much ? sharing : share < shared_hardly ? apart : between;
+      ++alike.all;
       if (!found) continue;
-      (share >= shared_much ? joined : share < shared_hardly ? apart_joined : between_joined) += 1;
+      ++alike.joined;
       if (found->rms_m > wrong_rms_m) ++wrong;
       worst_shape = std::max(worst_shape, found->shape_difference);
     }
     const std::string id = "elsewhere.merge." + name;
     const std::string what = "memories of two walks through " + name + " ";
-    if (sharing > 0) {
-      add_rate(result, id + ".joined", what + "that share 13 % of the way or more: joined", joined,
-               sharing, at_least(0.95));
+    if (sharing.all > 0) {
+      add_rate(result, id + ".joined", what + "that share 13 % of the way or more: joined",
+               sharing.joined, sharing.all, at_least(0.95));
     }
-    if (joined + apart_joined + between_joined > 0) {
+    if (const auto joined = sharing.joined + between.joined + apart.joined; joined > 0) {
       add_rate(result, id + ".wrong", what + "that were joined: off by more than 2 m rms", wrong,
-               joined + apart_joined + between_joined, at_most(0.0));
+               joined, at_most(0.0));
       add_row(result, id + ".shape", what + "that were joined: shape difference of the worst map",
               worst_shape, "", at_most(0.02));
     }
-    if (between > 0) {
+    if (between.all > 0) {
       add_rate(result, id + ".between", what + "that share 2 to 13 % of the way: joined",
-               between_joined, between);
+               between.joined, between.all);
     }
-    if (apart > 0) {
+    if (apart.all > 0) {
       add_rate(result, id + ".apart", what + "that share less than 2 % of the way: joined",
-               apart_joined, apart);
+               apart.joined, apart.all);
     }
   }
   std::size_t pairs = 0;

@@ -73,8 +73,7 @@ RecordedGround record_ground(const ElsewhereReproductionOptions& options, const 
   ground.built_in = std::ranges::find(scene_names(), name) != scene_names().end();
   for (int i = 0; i < (ground.built_in ? options.scenes : 1); ++i) {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
-    Scene scene =
-        ground.built_in ? make_scene(name, {.seed = seed}) : read_world(options.data, name);
+    Scene scene = scene_named(options.data, name, seed);
     scene.name = name;
     ground.variants.push_back(record_place(std::move(scene),
                                            {.seed = seed,

@@ -6,7 +6,6 @@
 #include "experiments/reproduction_stages.hpp"
 #include "experiments/runs/worlds.hpp"
 #include "panonav/core/error.hpp"
-#include "panonav/simulation/scenes.hpp"
 
 namespace panonav {
 
@@ -59,10 +58,7 @@ Reproduction reproduce_elsewhere(const ElsewhereReproductionOptions& options, Ex
                       }});
   }
   for (const char* const name : {"office", "small_warehouse"}) {
-    const std::vector<std::string> worlds = worlds_in(options.data);
-    const bool is_there = std::ranges::find(scene_names(), name) != scene_names().end() ||
-                          std::ranges::find(worlds, name) != worlds.end();
-    if (!is_there) continue;
+    if (!has_scene(options.data, name)) continue;
     stages.push_back({std::string("days in ") + name, 60.0,
                       [&, name] { reproduce_days(options, name, executor, result); }});
   }

@@ -1,7 +1,10 @@
 #include "experiments/runs/worlds.hpp"
 
+#include <algorithm>
+
 #include "panonav/io/image_file.hpp"
 #include "panonav/simulation/load_gazebo.hpp"
+#include "panonav/simulation/scenes.hpp"
 
 namespace panonav {
 
@@ -42,6 +45,22 @@ Scene read_world(const std::filesystem::path& data, const std::string& name) {
   GazeboOptions reading;
   reading.textures.read = [](const std::filesystem::path& path) { return read_image(path); };
   return load_gazebo(world, reading);
+}
+
+namespace {
+
+bool is_built_in(const std::string& name) {
+  return std::ranges::find(scene_names(), name) != scene_names().end();
+}
+
+}  // namespace
+
+bool has_scene(const std::filesystem::path& data, const std::string& name) {
+  return is_built_in(name) || !those_in(data, {name}).empty();
+}
+
+Scene scene_named(const std::filesystem::path& data, const std::string& name, std::uint64_t seed) {
+  return is_built_in(name) ? make_scene(name, {.seed = seed}) : read_world(data, name);
 }
 
 }  // namespace panonav

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -18,5 +19,11 @@ namespace panonav {
 [[nodiscard]] std::vector<std::string> all_worlds_in(const std::filesystem::path& data);
 /// One of these. Throws FileError.
 [[nodiscard]] Scene read_world(const std::filesystem::path& data, const std::string& name);
+
+/// Whether that is a built-in scene or a world that is there.
+[[nodiscard]] bool has_scene(const std::filesystem::path& data, const std::string& name);
+/// The built-in scene of this seed, or the world. Throws FileError.
+[[nodiscard]] Scene scene_named(const std::filesystem::path& data, const std::string& name,
+                                std::uint64_t seed);
 
 }  // namespace panonav

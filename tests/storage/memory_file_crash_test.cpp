@@ -14,6 +14,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/storage/memory_file.hpp"
+#include "support/child_process.hpp"
 #include "support/memory_samples.hpp"
 #include "support/temporary_folder.hpp"
 
@@ -24,18 +25,6 @@ namespace {
 NewView numbered_view(SignatureShape shape, int number) {
   Random random(99, static_cast<std::uint64_t>(number));
   return random_view(random, shape, number);
-}
-
-// Runs `body` in a child process; its return value is the child's exit code.
-pid_t start_child(const std::function<int()>& body) {
-  const pid_t child = ::fork();
-  if (child != 0) return child;
-  int code = 99;
-  try {
-    code = body();
-  } catch (...) {
-  }
-  std::_Exit(code);
 }
 
 int exit_code_of(pid_t child) {

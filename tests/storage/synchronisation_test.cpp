@@ -20,6 +20,7 @@
 #include "panonav/storage/memory_changes.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "panonav/storage/memory_synchronisation.hpp"
+#include "support/child_process.hpp"
 #include "support/memory_samples.hpp"
 
 namespace panonav::testing {
@@ -499,18 +500,6 @@ TEST_F(SynchronisedMemory, AFileKeepsTheAreasAroundIt) {
   // And with no areas all of it comes.
   (void)sync("b");
   EXPECT_TRUE(is_same(content(folder / "b"), content(server("x"))));
-}
-
-/// Runs `body` in a child process that may be killed; its return value is the exit code.
-pid_t start_child(const std::function<int()>& body) {
-  const pid_t child = ::fork();
-  if (child != 0) return child;
-  int code = 99;
-  try {
-    code = body();
-  } catch (...) {
-  }
-  std::_Exit(code);
 }
 
 TEST_F(SynchronisedMemory, AKillAtAnyMomentLosesAndDoublesNothing) {

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <unistd.h>
+
+#include <cstdlib>
+#include <functional>
+
+namespace panonav::testing {
+
+/// Runs `body` in a child process, which may be killed; its return value is the child's exit code,
+/// 99 when it throws.
+inline pid_t start_child(const std::function<int()>& body) {
+  const pid_t child = ::fork();
+  if (child != 0) return child;
+  int code = 99;
+  try {
+    code = body();
+  } catch (...) {
+  }
+  std::_Exit(code);
+}
+
+}  // namespace panonav::testing
