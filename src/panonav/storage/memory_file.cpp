@@ -51,6 +51,28 @@ void require_view(const NewView& view, SignatureShape shape) {
 
 }  // namespace
 
+ViewId MemoryTables::view_id(std::int64_t number) const {
+  if (number < 1 || number > std::int64_t{UINT32_MAX}) fail_damaged("a view id is out of range");
+  return {static_cast<std::uint32_t>(number)};
+}
+
+Link MemoryTables::checked(const LinkRow& row) const {
+  Link link{row.a, row.b, LinkKind::sequence};
+  if (row.kind < 0 || row.kind > static_cast<int>(LinkKind::closure)) {
+    fail_damaged("a link of unknown kind");
+  }
+  if (link.b <= link.a) {
+    fail_damaged("a link of views " + std::to_string(link.a.value) + " and " +
+                 std::to_string(link.b.value) + "; allowed: the smaller id first");
+  }
+  link.kind = static_cast<LinkKind>(row.kind);
+  if (row.checksum != link_checksum(link)) {
+    fail_damaged("the link of views " + std::to_string(link.a.value) + " and " +
+                 std::to_string(link.b.value) + " does not match its checksum");
+  }
+  return link;
+}
+
 const ViewRow& MemoryTables::checked(const ViewRow& row, SignatureShape shape,
                                      RecordBytes& scratch) const {
   if (row.signature.size() != 2 * shape.size() ||
@@ -92,23 +114,6 @@ void MemoryFile::Implementation::change_info(ViewId view,
     new_checksum = view_checksum(scratch, view, *info, row.signature);
   });
   tables->write_info(view, info.value(), new_checksum);
-}
-
-Link MemoryFile::Implementation::checked(const LinkRow& row) const {
-  Link link{row.a, row.b, LinkKind::sequence};
-  if (row.kind < 0 || row.kind > static_cast<int>(LinkKind::closure)) {
-    tables->fail_damaged("a link of unknown kind");
-  }
-  if (link.b <= link.a) {
-    tables->fail_damaged("a link of views " + std::to_string(link.a.value) + " and " +
-                         std::to_string(link.b.value) + "; allowed: the smaller id first");
-  }
-  link.kind = static_cast<LinkKind>(row.kind);
-  if (row.checksum != link_checksum(link)) {
-    tables->fail_damaged("the link of views " + std::to_string(link.a.value) + " and " +
-                         std::to_string(link.b.value) + " does not match its checksum");
-  }
-  return link;
 }
 
 std::optional<std::vector<std::uint8_t>> MemoryFile::Implementation::bytes(BesideViews table,
@@ -302,7 +307,7 @@ VisualMemory MemoryFile::load() const {
   const auto reading = tables.transaction(MemoryTables::Kind::reading);
   try {
     tables.read_views([&](const ViewRow& row) { implementation_->append_row(row, memory); });
-    tables.read_links([&](const LinkRow& row) { memory.link(implementation_->checked(row)); });
+    tables.read_links([&](const LinkRow& row) { memory.link(tables.checked(row)); });
   } catch (const ContractError& error) {
     tables.fail_damaged(error.what());
   }
@@ -343,7 +348,7 @@ std::vector<Link> MemoryFile::links() const {
   std::vector<Link> links;
   MemoryTables& tables = *implementation_->tables;
   const auto reading = tables.transaction(MemoryTables::Kind::reading);
-  tables.read_links([&](const LinkRow& row) { links.push_back(implementation_->checked(row)); });
+  tables.read_links([&](const LinkRow& row) { links.push_back(tables.checked(row)); });
   return links;
 }
 
@@ -394,7 +399,7 @@ std::vector<MemoryFault> MemoryFile::verify() const {
       const std::pair ends(row.a, row.b);
       if (ends <= std::exchange(before, ends)) tables.fail_damaged("links are out of order");
       check_part([&] {
-        const Link link = implementation_->checked(row);
+        const Link link = tables.checked(row);
         if (!views.contains(link.a) || !views.contains(link.b)) {
           tables.fail_damaged("a link of views " + std::to_string(link.a.value) + " and " +
                               std::to_string(link.b.value) + ", of which one is missing");

@@ -603,14 +603,9 @@ class Synchronisation {
   SynchronisedLinks local_links() {
     SynchronisedLinks links;
     file_.read_links([&](const LinkRow& row) {
-      const Link link{row.a, row.b, static_cast<LinkKind>(row.kind)};
-      if (row.kind < 0 || row.kind > static_cast<int>(LinkKind::closure) ||
-          row.checksum != link_checksum(link)) {
-        file_.fail_damaged("the link of views " + std::to_string(row.a.value) + " and " +
-                           std::to_string(row.b.value) + " does not match its checksum");
-      }
-      const auto a = views_.find(row.a);
-      const auto b = views_.find(row.b);
+      const Link link = file_.checked(row);
+      const auto a = views_.find(link.a);
+      const auto b = views_.find(link.b);
       if (a == views_.end() || b == views_.end()) return;
       if (!a->second.server_view || !b->second.server_view) return;
       links[std::minmax(*a->second.server_view, *b->second.server_view)] = link.kind;

@@ -18,7 +18,6 @@ struct MemoryFile::Implementation {
 
   /// The row itself. Throws FileError when it does not match its checksum.
   const ViewRow& checked(const ViewRow& row);
-  [[nodiscard]] Link checked(const LinkRow& row) const;
   /// Appends a row to a memory, checked.
   void append_row(const ViewRow& row, VisualMemory& memory);
   /// Within a transaction. Throws as `refuse_view`.

@@ -99,8 +99,12 @@ class MemoryTables {
   /// What messages of damage call the memory.
   [[nodiscard]] virtual const std::filesystem::path& place() const noexcept = 0;
   [[noreturn]] void fail_damaged(std::string_view what) const;
+  /// Throws FileError on a number that no view has.
+  [[nodiscard]] ViewId view_id(std::int64_t number) const;
   /// The row itself. Throws FileError when it does not match its checksum.
   const ViewRow& checked(const ViewRow& row, SignatureShape shape, RecordBytes& scratch) const;
+  /// The link that the row tells. Throws as above, and on a row that no link has.
+  [[nodiscard]] Link checked(const LinkRow& row) const;
   [[nodiscard]] virtual std::unique_ptr<Transaction> transaction(Kind kind) = 0;
 
   /// Every checksum is checked.

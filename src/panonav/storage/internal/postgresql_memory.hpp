@@ -121,8 +121,6 @@ class PostgresqlTables final : public MemoryTables {
       elsewhere_ = true;
     }
   }
-  /// Throws FileError on a number that no view has.
-  [[nodiscard]] ViewId view_id(std::int64_t number) const;
 
  private:
   class Part;

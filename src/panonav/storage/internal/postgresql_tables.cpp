@@ -107,11 +107,6 @@ void PostgresqlTables::notify() {
                   Values().add(std::string_view(channel_)).add(std::string_view(said)));
 }
 
-ViewId PostgresqlTables::view_id(std::int64_t number) const {
-  if (number < 1 || number > std::int64_t{UINT32_MAX}) fail_damaged("a view id is out of range");
-  return {static_cast<std::uint32_t>(number)};
-}
-
 ViewRow PostgresqlTables::view_in(const Rows& rows) const {
   ViewRow view;
   view.id = id_in(rows, 0, 0);

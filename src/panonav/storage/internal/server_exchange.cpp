@@ -225,15 +225,8 @@ std::vector<Link> ServerExchange::links_in(const KeptAreas& areas,
           " = ANY(" + (areas ? "$4)" : "$2)"),
       given.add(blocks));
   for (int i = 0; i < rows.size(); ++i) {
-    Link link{id_in(rows, i, 0), id_in(rows, i, 1), LinkKind::sequence};
-    const std::int64_t kind = rows.integer(i, 2);
-    link.kind = static_cast<LinkKind>(kind);
-    if (kind < 0 || kind > static_cast<int>(LinkKind::closure) || link.b <= link.a ||
-        rows.integer(i, 3) != link_checksum(link)) {
-      tables_.fail_damaged("the link of views " + std::to_string(link.a.value) + " and " +
-                           std::to_string(link.b.value) + " does not match its checksum");
-    }
-    links.push_back(link);
+    links.push_back(tables_.checked(
+        LinkRow{id_in(rows, i, 0), id_in(rows, i, 1), rows.integer(i, 2), rows.integer(i, 3)}));
   }
   return links;
 }

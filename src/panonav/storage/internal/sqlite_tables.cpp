@@ -78,9 +78,7 @@ std::unique_ptr<MemoryTables::Transaction> SqliteTables::transaction(Kind kind) 
 }
 
 ViewId SqliteTables::id_in(const Statement& row, int column) const {
-  const std::int64_t id = row.integer(column);
-  if (id < 1 || id > std::int64_t{UINT32_MAX}) fail_damaged("a view id is out of range");
-  return {static_cast<std::uint32_t>(id)};
+  return view_id(row.integer(column));
 }
 
 ViewRow SqliteTables::view_in(const Statement& row) const {
