@@ -1,12 +1,12 @@
 // A memory as another one: from a file to a server, and back.
 
-#include <algorithm>
 #include <utility>
 
 #include "panonav/core/error.hpp"
 #include "panonav/storage/internal/map_tables.hpp"
 #include "panonav/storage/internal/memory_file_access.hpp"
 #include "panonav/storage/internal/memory_file_implementation.hpp"
+#include "panonav/storage/internal/memory_rows.hpp"
 #include "panonav/storage/internal/route_tables.hpp"
 
 namespace panonav {
@@ -37,10 +37,8 @@ void MemoryFile::copy_to(const std::filesystem::path& path) const {
     }
     const std::vector<ViewId> all = views();
     constexpr std::size_t at_once = 1000;  // some megabytes
-    for (std::size_t at = 0; at < all.size(); at += at_once) {
-      const auto ids = std::span(all).subspan(at, std::min(at_once, all.size() - at));
-      to.insert(ids, views_of(*this, ids));
-    }
+    in_parts(all, at_once,
+             [&](std::span<const ViewId> ids) { to.insert(ids, views_of(*this, ids)); });
     to.write_links(links());
     for (const std::string& name : map_names()) write_map(to, name, read_map(from, name).value());
     for (const std::string& name : route_names()) {

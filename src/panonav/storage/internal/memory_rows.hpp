@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <span>
@@ -14,6 +16,14 @@ namespace panonav {
 
 /// What every way of keeping a memory has in common: the bytes of its rows, their checksums, and
 /// what is refused.
+
+/// Calls work(part) for one part of the rows after the other.
+template <class Row, class Work>
+void in_parts(const std::vector<Row>& rows, std::size_t at_once, const Work& work) {
+  for (std::size_t at = 0; at < rows.size(); at += at_once) {
+    work(std::span(rows).subspan(at, std::min(at_once, rows.size() - at)));
+  }
+}
 
 /// Magnitudes, then phases, into `bytes`.
 void pack_signature(const PackedSignature& signature, std::vector<std::uint8_t>& bytes);

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -8,7 +7,6 @@
 #include <memory>
 #include <optional>
 #include <set>
-#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,14 +16,6 @@
 #include "panonav/storage/memory_synchronisation.hpp"
 
 namespace panonav {
-
-/// Calls work(part) for one part of the rows after the other.
-template <class Row, class Work>
-void in_parts(const std::vector<Row>& rows, std::size_t at_once, const Work& work) {
-  for (std::size_t at = 0; at < rows.size(); at += at_once) {
-    work(std::span(rows).subspan(at, std::min(at_once, rows.size() - at)));
-  }
-}
 
 /// One synchronisation of an open file with an open memory. What the members hold is what is in the
 /// file or about to be written there; `changed_` and `stored_links_` tell which. Members are in

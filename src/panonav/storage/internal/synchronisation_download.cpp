@@ -2,6 +2,7 @@
 
 #include "panonav/storage/internal/synchronisation.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "panonav/core/error.hpp"

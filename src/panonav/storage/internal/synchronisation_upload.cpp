@@ -2,6 +2,8 @@
 
 #include "panonav/storage/internal/synchronisation.hpp"
 
+#include <algorithm>
+
 #include "panonav/core/error.hpp"
 #include "panonav/storage/internal/map_tables.hpp"
 #include "panonav/storage/internal/memory_rows.hpp"
